@@ -1,0 +1,1 @@
+"""SDF in, SDF out: worlds and scenarios as plain data."""

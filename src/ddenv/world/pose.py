@@ -1,0 +1,81 @@
+"""Rigid poses as plain data, in SDF's convention."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A rigid transform: position (x, y, z) in m and unit quaternion (w, x, y, z).
+
+    `a @ b` is the pose of b's frame seen from a's parent, as with homogeneous matrices.
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_rpy(cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> Pose:
+        """SDF's `x y z roll pitch yaw`: m and rad, rotations about the fixed x, then y, then z axis."""
+        cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+        cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+        cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+        quaternion = (
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        )
+        return cls((x, y, z), quaternion)
+
+    def rotation(self) -> np.ndarray:
+        """Rotation matrix, shape (3, 3)."""
+        w, x, y, z = self.quaternion
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    def rotate(self, vector: Vector) -> Vector:
+        """`vector`, given in this frame, expressed in the parent's axes."""
+        w, x, y, z = self.quaternion
+        vx, vy, vz = vector
+        tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+        return (
+            vx + w * tx + y * tz - z * ty,
+            vy + w * ty + z * tx - x * tz,
+            vz + w * tz + x * ty - y * tx,
+        )
+
+    def yaw(self) -> float:
+        """Heading about the vertical axis, rad in (-pi, pi]."""
+        w, x, y, z = self.quaternion
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+    def inverse(self) -> Pose:
+        w, x, y, z = self.quaternion
+        turn = Pose((0.0, 0.0, 0.0), (w, -x, -y, -z))
+        px, py, pz = turn.rotate(self.position)
+        return Pose((-px, -py, -pz), turn.quaternion)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        px, py, pz = self.rotate(other.position)
+        aw, ax, ay, az = self.quaternion
+        bw, bx, by, bz = other.quaternion
+        quaternion = (
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        )
+        x, y, z = self.position
+        return Pose((x + px, y + py, z + pz), quaternion)
