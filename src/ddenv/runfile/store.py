@@ -1,0 +1,214 @@
+"""Reading and writing a run file (`NAME.ddenv`, SQLite in WAL mode).
+
+The engine is the only writer of events; viewers append commands and read. Nothing in the file is ever executed: documents
+are text, event data is JSON, trajectories are little-endian float64 rows.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import sys
+import tempfile
+import time
+from array import array
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ddenv.errors import UserError
+
+APPLICATION_ID = 0x64644531
+SCHEMA_VERSION = 1
+COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
+
+_SCHEMA = """
+CREATE TABLE document (name TEXT PRIMARY KEY, content BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE event (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, kind TEXT NOT NULL, data TEXT NOT NULL);
+CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, kind TEXT NOT NULL, data TEXT NOT NULL);
+CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
+CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
+"""
+ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened (or, in the command table, that a viewer asks for). `time` is Unix time, s."""
+
+    id: int
+    time: float
+    kind: str
+    data: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """A test that is running now: simulated `time` s and the robot's pose (x, y, z, qw, qx, qy, qz)."""
+
+    slot: int
+    test: int
+    time: float
+    pose: tuple[float, ...]
+
+
+def create(path: Path, documents: dict[str, bytes]) -> None:
+    """Makes a new run file, whole or not at all. Raises UserError if it exists or cannot be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
+    os.close(handle)
+    try:
+        connection = sqlite3.connect(name, isolation_level=None)
+        connection.executescript(_SCHEMA)
+        connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        connection.close()
+        os.link(name, path)
+    except FileExistsError:
+        raise UserError(f"{path}: exists already; choose another name, or attach with 'ddenv open {path}'") from None
+    except (OSError, sqlite3.Error) as error:
+        raise UserError(f"{path}: cannot be written: {error}") from None
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+class RunFile:
+    """An open run file. Raises UserError for a file that is missing, no run file, or of a newer version."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
+        try:
+            self._db = sqlite3.connect(path, isolation_level=None, timeout=10.0)
+            application = self._db.execute("PRAGMA application_id").fetchone()[0]
+            version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        except sqlite3.Error as error:
+            raise UserError(f"{path}: is no ddenv run file ({error})") from None
+        if application != APPLICATION_ID:
+            raise UserError(f"{path}: is no ddenv run file")
+        if version > SCHEMA_VERSION:
+            raise UserError(f"{path}: was written by a newer ddenv (format {version}); this one reads up to {SCHEMA_VERSION}")
+
+    def __enter__(self) -> RunFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._db.close()
+
+    def document(self, name: str) -> bytes:
+        row = self._one("SELECT content FROM document WHERE name = ?", (name,))
+        if row is None:
+            raise UserError(f"{self.path}: damaged run file: it has no document '{name}'")
+        return bytes(row[0])
+
+    def events(self, after: int = 0) -> list[Event]:
+        """All events with an id above `after`, in order."""
+        return self._entries("event", after)
+
+    def commands(self, after: int = 0) -> list[Event]:
+        """What viewers asked for, in order."""
+        return self._entries("command", after)
+
+    def send(self, kind: str, **data: Any) -> int:
+        """Asks the engine for something; returns the command's id. See `ddenv.runfile.commands`."""
+        with self._writing() as db:
+            return self._insert(db, "command", kind, data)
+
+    def motion(self, test: int, model: str = ROBOT) -> array | None:
+        """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
+        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, model))
+        return None if row is None else _floats(bytes(row[0]), self.path)
+
+    def motions(self, test: int) -> dict[str, array]:
+        """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
+        rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (test,))
+        return {model: _floats(bytes(samples), self.path) for model, samples in rows}
+
+    def live(self) -> list[Live]:
+        """The tests that run now, by worker slot."""
+        rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
+        return [Live(slot, test, at, tuple(json.loads(pose))) for slot, test, at, pose in rows]
+
+    # What follows is for the engine alone.
+
+    def own(self) -> None:
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event."""
+        with self._writing() as db:
+            db.execute("DELETE FROM live")
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = NORMAL")
+
+    def append(self, kind: str, data: dict[str, Any], motions: dict[str, bytes] | None = None) -> Event:
+        """Records one event, with the trajectories of its test, in one transaction."""
+        with self._writing() as db:
+            db.execute("BEGIN IMMEDIATE")
+            id = self._insert(db, "event", kind, data)
+            for model, samples in (motions or {}).items():
+                db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (data["test"], model, samples))
+            at = db.execute("SELECT time FROM event WHERE id = ?", (id,)).fetchone()[0]
+            db.execute("COMMIT")
+        return Event(id, at, kind, data)
+
+    def set_live(self, running: list[Live]) -> None:
+        """Replaces the table of running tests."""
+        rows = [(live.slot, live.test, live.time, json.dumps(live.pose)) for live in running]
+        with self._writing() as db:
+            db.execute("BEGIN IMMEDIATE")
+            db.execute("DELETE FROM live")
+            db.executemany("INSERT INTO live VALUES (?, ?, ?, ?)", rows)
+            db.execute("COMMIT")
+
+    def settle(self) -> None:
+        """Folds the write-ahead log back, so that the run is one file again."""
+        with self._writing() as db:
+            db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+
+    def _insert(self, db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
+        text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+        return db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text)).lastrowid
+
+    def _entries(self, table: str, after: int) -> list[Event]:
+        rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id", (after,))
+        try:
+            return [Event(id, at, kind, json.loads(data)) for id, at, kind, data in rows]
+        except ValueError:
+            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is not JSON") from None
+
+    def _one(self, query: str, values: tuple = ()) -> tuple | None:
+        rows = self._all(query, values)
+        return rows[0] if rows else None
+
+    def _all(self, query: str, values: tuple = ()) -> list[tuple]:
+        try:
+            return self._db.execute(query, values).fetchall()
+        except sqlite3.Error as error:
+            raise UserError(f"{self.path}: damaged run file: {error}") from None
+
+    @contextmanager
+    def _writing(self):
+        try:
+            yield self._db
+        except sqlite3.Error as error:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise UserError(f"{self.path}: cannot be written: {error}; what is in it is intact") from None
+
+
+def _floats(samples: bytes, path: Path) -> array:
+    values = array("d")
+    if len(samples) % (8 * COLUMNS):
+        raise UserError(f"{path}: damaged run file: a trajectory is cut short")
+    values.frombytes(samples)
+    if sys.byteorder == "big":
+        values.byteswap()
+    return values

@@ -1,0 +1,89 @@
+"""Loads a scenario from YAML, with complaints that name the file, the key, the value and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from ddenv.errors import UserError
+from ddenv.world.bundled import SCENARIOS, bundled_names
+from ddenv.world.read import read_bytes
+from ddenv.world.scenario import Scenario
+
+
+def find_scenario(name: str) -> Path:
+    """The file of a bundled scenario, or the path itself. Raises UserError, with the nearest name for a typo."""
+    path = Path(name)
+    if path.suffix.lower() in (".yaml", ".yml") or path.is_file():
+        return path
+    bundled = SCENARIOS / f"{name}.yaml"
+    if re.fullmatch(r"[\w-]+", name) and bundled.is_file():
+        return bundled
+    names = bundled_names()
+    raise UserError(f"no scenario '{name}'{_nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file")
+
+
+def load_scenario(path: Path) -> Scenario:
+    """The scenario in the YAML file `path`, with its file names made absolute. Raises UserError."""
+    content = read_bytes(path)
+    try:
+        data = yaml.safe_load(content)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = "" if mark is None else f":{mark.line + 1}"
+        problem = getattr(error, "problem", None) or "not text"
+        raise UserError(f"{path}{line}: not valid YAML: {problem}") from None
+    except RecursionError:
+        raise UserError(f"{path}: not valid YAML: nested too deeply") from None
+    if not isinstance(data, dict):
+        raise UserError(f"{path}: expected keys such as name, world, robot and goal; found {_shown(data)}")
+    scenario = validate(data, str(path))
+    folder = path.resolve().parent
+    robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
+    return scenario.model_copy(update={"world": folder / scenario.world, "robot": robot})
+
+
+def validate(data: dict[str, Any], where: str) -> Scenario:
+    """`data` as a scenario. Raises UserError with the first wrong key; `where` names its file."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise UserError(f"{where}: {complaint(error.errors()[0], Scenario)}") from None
+
+
+def complaint(error: Any, model: type[BaseModel]) -> str:
+    """One of pydantic's errors in our words: the key, the value, what is allowed."""
+    location = [str(part) for part in error["loc"]]
+    key = ".".join(location)
+    if error["type"] == "extra_forbidden":
+        known = sorted(_section(model, location[:-1]).model_fields)
+        return f"{key}: unknown key{_nearest(location[-1], known)}; allowed are {', '.join(known)}"
+    if error["type"] == "missing":
+        return f"{key}: is missing"
+    context = error.get("ctx", {})
+    if error["type"] == "literal_error":
+        allowed = context["expected"].replace("'", "").replace(" or ", ", ")
+        return f"{key}: {_shown(error['input'])} is not allowed{_nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}"
+    message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
+    return f"{key}: {message.replace('input should', 'should')}, found {_shown(error['input'])}"
+
+
+def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
+    for part in location:
+        model = model.model_fields[part].annotation
+    return model
+
+
+def _nearest(word: str, known: list[str]) -> str:
+    match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {match[0]}?)" if match else ""
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
