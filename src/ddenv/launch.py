@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import platformdirs
+import yaml
 
 from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
+from ddenv.world.bundled import SDF
+from ddenv.world.load import validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
-from ddenv.world.read import parse_model, parse_world, read_model, read_world
+from ddenv.world.read import parse_model, parse_world, read_bytes, read_model, read_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.write import without, write_file
 
 SUFFIX = ".ddenv"
 
@@ -44,6 +49,66 @@ def free_run_path(scenario_name: str) -> Path:
     return path
 
 
+def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
+    """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
+    data = {
+        "name": world.stem or "world",
+        "world": str(world.resolve()),
+        "robot": {
+            "model": str(SDF / "robots" / "husky.sdf"),
+            "spawn": dict(zip(("x", "y", "z", "yaw"), spawn, strict=True)),
+        },
+        "goal": dict(zip(("x", "y"), goal, strict=True)),
+    }
+    return validate(data, str(world))
+
+
+def with_options(
+    scenario: Scenario,
+    *,
+    pair: str | None = None,
+    iterations: int | None = None,
+    n_partitions: int | None = None,
+    seed: int | None = None,
+    timeout: float | None = None,
+    epsilon: float | None = None,
+    spawn: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
+    world: Path | None = None,
+) -> Scenario:
+    """`scenario` with some of its settings replaced. Raises UserError.
+
+    `timeout` is in simulated s, `epsilon` in m, `spawn` x, y, z m and yaw rad (0 if left out), `goal` x, y m.
+    """
+    data = scenario.model_dump(mode="json")
+    reduction = {"pair": pair, "iterations": iterations, "n_partitions": n_partitions, "seed": seed}
+    failure = {"timeout": timeout, "epsilon": epsilon}
+    data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
+    data["failure"].update({key: value for key, value in failure.items() if value is not None})
+    if spawn is not None:
+        data["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
+    if goal is not None:
+        data["goal"].update(zip(("x", "y"), goal, strict=True))
+    if world is not None:
+        data["world"] = str(world.resolve())
+    return validate(data, "options")
+
+
+def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
+    """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
+    if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
+        raise UserError(f"--name: '{name}' cannot be a file's name; use letters, digits, - and _")
+    if output is None or output.suffix in (".sdf", ".world"):
+        if output is not None and not output.parent.is_dir():
+            raise UserError(f"--output: there is no folder {output.parent}")
+        return free_run_path(scenario_name) if name is None else runs_folder() / f"{name}{SUFFIX}"
+    if output.is_dir():
+        return output / f"{name or scenario_name}{SUFFIX}"
+    if output.suffix != SUFFIX:
+        raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
+    return output
+
+
 def load_parts(scenario: Scenario) -> tuple[World, Model]:
     """The world and the robot of a scenario, checked against each other. Raises UserError."""
     world, robot = read_world(scenario.world), read_model(scenario.robot.model)
@@ -59,14 +124,12 @@ def load_parts(scenario: Scenario) -> tuple[World, Model]:
 
 def create_run(scenario: Scenario, path: Path) -> None:
     """Writes a new run file that holds all a reduction needs. Raises UserError, with nothing written."""
-    world, robot = load_parts(scenario)
+    world, _ = load_parts(scenario)
     documents = {
         "scenario": scenario.model_dump_json().encode(),
         "world": world.text,
-        "robot": scenario.robot.model.read_bytes(),
-        "elements": json.dumps(world.elements(frozenset(scenario.protected))).encode(),
+        "robot": read_bytes(scenario.robot.model),
     }
-    assert robot.links
     create(path, documents)
 
 
@@ -79,6 +142,25 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     world = parse_world(run.document("world"), scenario.world)
     robot = parse_model(run.document("robot"), scenario.robot.model)
     return scenario, world, robot
+
+
+def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> list[Path]:
+    """Writes the environment that a run has left as an SDF world, and a scenario for it; returns what was written."""
+    with RunFile(run) as file:
+        scenario, world, _ = read_parts(file)
+        robot = file.document("robot")
+        state = fold(file.events())
+    if not state.elements:
+        raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
+    write_file(sdf, without(world, frozenset(state.elements) - frozenset(state.environment)))
+    if scenario_file is None:
+        return [sdf]
+    model = scenario_file.with_suffix(".robot.sdf")
+    write_file(model, robot)
+    data = scenario.model_dump(mode="json")
+    data["world"], data["robot"]["model"] = str(sdf.resolve()), str(model.resolve())
+    write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+    return [sdf, model, scenario_file]
 
 
 def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:

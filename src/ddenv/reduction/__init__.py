@@ -1,0 +1,1 @@
+"""The reduction itself, pure: partitioning, prioritization, algorithms, verdicts and statistics. It runs nothing."""

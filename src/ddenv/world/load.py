@@ -68,7 +68,8 @@ def complaint(error: Any, model: type[BaseModel]) -> str:
     context = error.get("ctx", {})
     if error["type"] == "literal_error":
         allowed = context["expected"].replace("'", "").replace(" or ", ", ")
-        return f"{key}: {_shown(error['input'])} is not allowed{_nearest(str(error['input']), allowed.split(', '))}; use one of {allowed}"
+        nearest = _nearest(str(error["input"]), allowed.split(", "))
+        return f"{key}: {_shown(error['input'])} is not allowed{nearest}; use one of {allowed}"
     message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
     return f"{key}: {message.replace('input should', 'should')}, found {_shown(error['input'])}"
 

@@ -107,7 +107,9 @@ def _pose(parent: Element, path: Path) -> Pose:
         return Pose()
     frame = element.get("relative_to") or element.get("frame")
     if frame:
-        raise complain(element, path, f"a pose relative to '{frame}' is not supported yet; give it relative to its parent")
+        raise complain(
+            element, path, f"a pose relative to '{frame}' is not supported yet; give it relative to its parent"
+        )
     return Pose.from_rpy(*numbers(element, path, 6))
 
 

@@ -18,7 +18,9 @@ Partitioning = Literal["model2model", "timeseg"]
 Prioritization = Literal["failure-proximal", "avg-trajectory-proximal", "sequential", "random"]
 PARTITIONINGS: tuple[str, ...] = Partitioning.__args__
 PRIORITIZATIONS: tuple[str, ...] = Prioritization.__args__
-PAIRS = tuple(f"{partitioning}/{prioritization}" for partitioning in PARTITIONINGS for prioritization in PRIORITIZATIONS)
+PAIRS = tuple(
+    f"{partitioning}/{prioritization}" for partitioning in PARTITIONINGS for prioritization in PRIORITIZATIONS
+)
 Pair = Literal[PAIRS]  # type: ignore[valid-type]
 
 
@@ -63,7 +65,9 @@ class Sensors(Section):
     gyro: NotNegative = Field(0.01, description="IMU yaw rate, rad/s")
     gyro_bias: NotNegative = Field(0.0, description="constant error of the yaw rate, rad/s")
     odometry: NotNegative = Field(0.02, description="wheel speeds, as a fraction of the speed")
-    odometry_bias: NotNegative = Field(0.0, description="constant error of the wheel speeds, as a fraction of the speed")
+    odometry_bias: NotNegative = Field(
+        0.0, description="constant error of the wheel speeds, as a fraction of the speed"
+    )
 
 
 class Controller(Section):

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.model import World
 
+_LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
+
 
 def without(world: World, removed: frozenset[str]) -> bytes:
-    """The text of `world` with the models named in `removed` cut out, each with the white space before it."""
+    """The text of `world` with the models named in `removed` cut out, each with the indentation and line it stood on."""
     unknown = removed - {model.name for model in world.models}
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
     spans = sorted(model.span for model in world.models if model.name in removed)
     kept, at = [], 0
     for start, end in spans:
-        kept.append(world.text[at:start].rstrip(b" \t\r\n") if _own_line(world.text, end) else world.text[at:start])
+        kept.append(_LINE_START.sub(b"", world.text[at:start]) if _ends_line(world.text, end) else world.text[at:start])
         at = end
     kept.append(world.text[at:])
     return b"".join(kept)
 
 
-def _own_line(text: bytes, end: int) -> bool:
+def _ends_line(text: bytes, end: int) -> bool:
     return text[end : end + 1] in (b"\n", b"\r", b"")
 
 
@@ -39,8 +42,8 @@ def write_file(path: Path, content: bytes) -> None:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
+        Path(name).chmod(0o666 & ~_umask())
+        Path(name).replace(path)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written: {error.strerror}") from None

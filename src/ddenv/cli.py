@@ -1,0 +1,251 @@
+"""The command line: parses, calls, prints.
+
+Exit codes: 0 done (for a reduction: minimal), 1 stopped before that, 2 wrong input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ddenv import __version__
+from ddenv.errors import UserError
+
+JOBS = os.cpu_count() or 1
+
+
+class Numbers(click.ParamType):
+    """Comma-separated finite numbers, at least and at most so many."""
+
+    def __init__(self, name: str, fewest: int, most: int) -> None:
+        self.name, self.fewest, self.most = name, fewest, most
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, ...]:
+        try:
+            numbers = tuple(float(word) for word in value.split(","))
+        except ValueError:
+            numbers = ()
+        if not self.fewest <= len(numbers) <= self.most:
+            self.fail(
+                f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
+                param,
+                ctx,
+            )
+        return numbers
+
+
+def scenario_options(command):
+    """How a scenario is chosen and changed: shared by the commands that take one."""
+    for option in reversed(
+        (
+            click.option(
+                "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
+            ),
+            click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it shall go, m (for an SDF world)."),
+            click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
+            click.option("--timeout", type=float, help="Simulated time the robot has, s."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
+@click.pass_context
+def app(context: click.Context) -> None:
+    """Finds the few models of a world that make a robot fail. Without a command: the workbench."""
+    if context.invoked_subcommand is None:
+        from ddenv.workbench.app import run_workbench
+
+        context.exit(run_workbench())
+
+
+@app.command()
+@click.argument("scenario")
+@scenario_options
+@click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal.")
+@click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure.")
+@click.option("--n-partitions", type=int, help="Partitions in the first round.")
+@click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m.")
+@click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i.")
+@click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Tests at the same time.")
+@click.option("--name", help="Name of the run.")
+@click.option(
+    "--output", type=Path, help="A .ddenv file or a folder for the run; or a .sdf file for the minimal world."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
+def run(scenario, spawn, goal, world, timeout, name, output, jobs, as_json, **options) -> int:
+    """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
+    from ddenv.launch import create_run, run_path, start_engine, with_options
+
+    chosen = with_options(_scenario(scenario, spawn, goal, world, timeout), **options)
+    path = run_path(chosen.name, name, output)
+    sdf = output if output is not None and output.suffix in (".sdf", ".world") else None
+    create_run(chosen, path)
+    return _follow(path, start_engine(path, jobs), as_json, sdf)
+
+
+@app.command()
+@click.argument("run")
+@click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Tests at the same time.")
+@click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
+def resume(run: str, jobs: int, as_json: bool) -> int:
+    """Goes on with RUN (a name or a file) without a screen; no finished test is made again."""
+    from ddenv.launch import find_run, start_engine
+    from ddenv.runfile.lock import engine_lock
+    from ddenv.runfile.store import RunFile
+
+    path = find_run(run)
+    with RunFile(path), engine_lock(path):
+        pass
+    return _follow(path, start_engine(path, jobs), as_json, None)
+
+
+@app.command("open")
+@click.argument("run")
+def open_run(run: str) -> int:
+    """Attaches the workbench to RUN (a name or a file)."""
+    from ddenv.launch import find_run
+    from ddenv.runfile.store import RunFile
+
+    path = find_run(run)
+    RunFile(path).close()
+    from ddenv.workbench.app import run_workbench
+
+    return run_workbench(path)
+
+
+@app.command()
+def runs() -> int:
+    """Lists the runs."""
+    from ddenv.console.runs import run_lines
+    from ddenv.launch import runs_folder
+
+    lines = run_lines(runs_folder())
+    print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
+    return 0
+
+
+@app.command()
+@click.argument("subject", metavar="SCENARIO_OR_RUN")
+@scenario_options
+@click.option("--keep", help="Only these models, by name, separated by commas.")
+@click.option("--minimal", is_flag=True, help="Only the models that the run has left.")
+@click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
+@click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
+@click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up.")
+@click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Runs of each.")
+@click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Runs at the same time.")
+@click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
+def test(subject, spawn, goal, world, timeout, keep, jobs, as_json, leave_out, **options) -> int:
+    """Runs the robot in a scenario, or in a run's world, and prints each run's outcome."""
+    from ddenv.engine.trial import plan, run_trials
+
+    what = _subject(subject, spawn, goal, world, timeout)
+    names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
+    trials = plan(what, keep=names, leave_out=list(leave_out), **options)
+    told = []
+    for result in run_trials(what, trials, jobs):
+        told.append(result)
+        if not as_json:
+            print(_trial_line(result), flush=True)
+    if as_json:
+        print(json.dumps({"runs": told}))
+    return 0
+
+
+@app.command()
+@click.argument("run")
+@click.option("--sdf", type=Path, help="Write the environment that is left as an SDF world.")
+@click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
+def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
+    """Writes the world that RUN has left."""
+    from ddenv.launch import export_world, find_run
+
+    if sdf is None:
+        raise UserError("nothing to export: give --sdf FILE")
+    for path in export_world(find_run(run), sdf, scenario):
+        print(f"wrote {path}")
+    return 0
+
+
+def _scenario(name, spawn, goal, world, timeout):
+    """The scenario that a command line asks for."""
+    from ddenv.launch import scenario_for_world, with_options
+    from ddenv.world.load import find_scenario, load_scenario
+
+    if Path(name).suffix.lower() in (".sdf", ".world"):
+        if spawn is None or goal is None:
+            raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
+        return with_options(scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal), timeout=timeout)
+    return with_options(load_scenario(find_scenario(name)), timeout=timeout, spawn=spawn, goal=goal, world=world)
+
+
+def _subject(name, spawn, goal, world, timeout):
+    """What `ddenv test` tries: a run where there is one of that name, else a scenario."""
+    from ddenv.engine.trial import Subject, subject_of_run
+    from ddenv.launch import find_run, load_parts
+    from ddenv.runfile.store import RunFile
+
+    path = find_run(name)
+    if path.suffix == ".ddenv" and (path.exists() or name.endswith(".ddenv")):
+        if any(option is not None for option in (spawn, goal, world, timeout)):
+            raise UserError("--spawn, --goal, --world and --timeout go with a scenario; a run keeps its own")
+        with RunFile(path) as file:
+            return subject_of_run(file)
+    scenario = _scenario(name, spawn, goal, world, timeout)
+    return Subject(scenario, *load_parts(scenario))
+
+
+def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
+    from ddenv.console.follow import Interrupted, follow
+    from ddenv.console.summary import lines, summary
+    from ddenv.launch import export_world
+
+    code = 0
+    try:
+        state = follow(path, engine, sys.stderr if as_json else sys.stdout)
+        code = 0 if state.minimal else 1
+    except Interrupted as interrupted:
+        state, code = interrupted.state, 130
+    if sdf is not None and state.baseline is not None:
+        export_world(path, sdf, None)
+    print(json.dumps(summary(state, path)) if as_json else "\n".join(lines(state, path)))
+    if code == 130:
+        print(f"interrupted; go on with: ddenv resume {path}", file=sys.stderr)
+    return code
+
+
+def _trial_line(result: dict[str, Any]) -> str:
+    without = f"  without {result['without']}" if result["without"] else ""
+    if result["end_pose"] is None:
+        return f"seed {result['seed']:<4} {result['outcome']:<8} {result['failure']}{without}"
+    x, y, z = result["end_pose"][:3]
+    distance = "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
+    failure = f"  {result['failure']}" if result["failure"] else ""
+    return (
+        f"seed {result['seed']:<4} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
+        f"after {result['simulated_seconds']:.1f} s{failure}{distance}{without}"
+    )
+
+
+def main() -> None:
+    try:
+        code = app(standalone_mode=False)
+    except UserError as error:
+        print(f"ddenv: {error}", file=sys.stderr)
+        code = 2
+    except click.exceptions.Abort:
+        code = 130
+    except KeyboardInterrupt:
+        code = 130
+    except click.ClickException as error:
+        print(f"ddenv: {error.format_message()}; see 'ddenv --help'", file=sys.stderr)
+        code = 2
+    sys.exit(code)

@@ -1,0 +1,1 @@
+"""What the command line prints: a run's progress, its summary, lists and tables."""

@@ -1,0 +1,114 @@
+"""Follows a run without a screen: one line that is drawn over on a terminal, plain lines otherwise."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import TextIO
+
+from ddenv.console.words import headline, news
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import RunFile
+
+POLL = 0.2
+# How long an engine that was asked to stop may take to write its last event, s.
+STOP_WAIT = 15.0
+
+
+class Interrupted(Exception):
+    """The user interrupted, and the engine was stopped; `state` is what it left."""
+
+    def __init__(self, state: RunState) -> None:
+        super().__init__()
+        self.state = state
+
+
+def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
+    """Prints what happens until the engine ends; returns the last state. Raises UserError and Interrupted."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    view = _Line(out) if out.isatty() else _Plain(out)
+    with RunFile(path) as file:
+        state = RunState()
+        try:
+            while engine.poll() is None:
+                state = _update(file, state, view)
+                time.sleep(POLL)
+        except KeyboardInterrupt:
+            with contextlib.suppress(KeyboardInterrupt):
+                _stop(file, engine)
+            state = _update(file, state, view)
+            view.close()
+            raise Interrupted(state) from None
+        state = _update(file, state, view)
+    view.close()
+    if not state.ended or state.status == "failed":
+        raise UserError(state.reason or last_words(path))
+    return state
+
+
+def last_words(path: Path) -> str:
+    """Why an engine that is gone could not go on: the last line of its log."""
+    log = path.with_name(f"{path.name}.log")
+    lines = log.read_text(errors="replace").split("\n") if log.exists() else []
+    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+    return last or f"{path}: the engine ended without a word; go on with 'ddenv resume {path}'"
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _stop(file: RunFile, engine: subprocess.Popen) -> None:
+    file.send("stop")
+    deadline = time.monotonic() + STOP_WAIT
+    while engine.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    if engine.poll() is None and engine_is_alive(file.path):
+        engine.terminate()
+
+
+def _update(file: RunFile, state: RunState, view: _Line | _Plain) -> RunState:
+    for event in file.events(state.revision):
+        before, state = state, apply(state, event)
+        view.happened(event.kind, before, state)
+    view.now(state)
+    return state
+
+
+class _Plain:
+    """For logs and pipes: one line for each thing worth telling."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+
+    def happened(self, kind: str, before: RunState, after: RunState) -> None:
+        line = news(kind, before, after)
+        if line:
+            print(line, file=self._out, flush=True)
+
+    def now(self, state: RunState) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class _Line(_Plain):
+    """For terminals: the same lines, and below them one that is always the latest state."""
+
+    def happened(self, kind: str, before: RunState, after: RunState) -> None:
+        line = news(kind, before, after)
+        if line:
+            print(f"\r\x1b[K{line}", file=self._out, flush=True)
+
+    def now(self, state: RunState) -> None:
+        print(f"\r\x1b[K{headline(state)}", end="", file=self._out, flush=True)
+
+    def close(self) -> None:
+        print("\r\x1b[K", end="", file=self._out, flush=True)

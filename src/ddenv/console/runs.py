@@ -1,0 +1,31 @@
+"""Lists the runs of the runs folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.store import RunFile
+
+
+def run_lines(folder: Path) -> list[str]:
+    """One line a run, newest first: name, status, models left, tests. A damaged file says so in its line."""
+    paths = sorted(folder.glob("*.ddenv"), key=lambda path: path.stat().st_mtime, reverse=True)
+    width = max((len(path.stem) for path in paths), default=0)
+    return [f"{path.stem:<{width}}  {_line(path)}" for path in paths]
+
+
+def _line(path: Path) -> str:
+    try:
+        with RunFile(path) as file:
+            state = fold(file.events())
+    except UserError as error:
+        return str(error)
+    status = state.status
+    if not state.ended and status != "created" and not engine_is_alive(path):
+        status = "engine not running"
+    elif status == "finished":
+        status = "minimal" if state.minimal else "finished"
+    return f"{status:<18}  {len(state.environment):>4} of {len(state.elements)} models  {len(state.finished_tests):>5} tests"

@@ -1,0 +1,43 @@
+"""What a run came to, as plain data for `--json` and as lines for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ddenv.console.words import count
+from ddenv.runfile.state import RunState
+
+
+def summary(state: RunState, path: Path) -> dict[str, Any]:
+    """The object that `--json` prints. Durations are in s."""
+    return {
+        "models_before": len(state.elements),
+        "models_after": len(state.environment),
+        "kept": list(state.environment),
+        "tests": len(state.finished_tests),
+        "outcomes": state.outcomes(),
+        "deflake_runs": state.deflake_runs,
+        "rounds": state.rounds_done,
+        "minimal": state.minimal,
+        "failure_rate": None if state.baseline is None else state.baseline.rate,
+        "wall_seconds": round(state.working_seconds, 3),
+        "status": state.status,
+        "reason": state.reason,
+        "run_file": str(path),
+    }
+
+
+def lines(state: RunState, path: Path) -> list[str]:
+    """The same for people."""
+    before, after = len(state.elements), len(state.environment)
+    if state.baseline is None:
+        return [f"run file: {path}"]
+    what = "minimal environment" if state.minimal else "environment so far"
+    tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
+    return [
+        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {', '.join(state.environment)}",
+        f"{len(state.finished_tests)} tests ({tests}; {state.deflake_runs} re-runs) in {state.rounds_done} rounds, "
+        f"{state.working_seconds:.0f} s",
+        f"run file: {path}",
+    ]

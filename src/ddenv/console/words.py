@@ -1,0 +1,69 @@
+"""The words for what happens in a run, one line each."""
+
+from __future__ import annotations
+
+import shutil
+
+from ddenv.runfile.state import RunState
+
+
+def headline(state: RunState) -> str:
+    """The state in one line, cut to the terminal's width."""
+    models = f"{len(state.environment)} of {len(state.elements)} models"
+    where = "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
+    running = sum(test.outcome == "running" for test in state.tests)
+    line = f"{state.status} · {where} · {models} · {len(state.finished_tests)} tests, {running} running"
+    return line[: shutil.get_terminal_size().columns - 1]
+
+
+def news(kind: str, before: RunState, after: RunState) -> str:
+    """What one event changed, or "" if it is not worth a line."""
+    match kind:
+        case "engine_started":
+            resumed = " again" if before.tests else ""
+            return f"engine started{resumed} with {after.jobs} workers; {len(after.elements)} models can be removed"
+        case "baseline_finished":
+            return baseline(after)
+        case "round_started":
+            round = after.round
+            return (
+                f"round {round.number}: {len(round.environment)} models in {len(round.partitions)} partitions, "
+                f"{len(round.candidates)} candidates"
+            )
+        case "candidate_judged" if after.round is not None:
+            changed = [
+                new for old, new in zip(before.round.candidates, after.round.candidates, strict=True) if old != new
+            ]
+            return "".join(
+                f"  {one.label} ({len(one.models)} models): {one.verdict} after {count(len(one.tests), 'test')}"
+                for one in changed
+            )
+        case "reduced":
+            return f"  reduced to {count(len(after.environment), 'model')} after {len(after.finished_tests)} tests"
+        case "finished" | "engine_stopped" | "engine_failed":
+            return f"{after.status}: {after.reason}"
+    return ""
+
+
+def baseline(state: RunState) -> str:
+    """What the baseline found, and how sure a re-run is to meet the failure."""
+    found = state.baseline
+    x, y, z = found.position
+    return (
+        f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
+        f"{found.high:.0%}), ending at ({x:.2f}, {y:.2f}, {z:.2f}) m; {iterations(state)}"
+    )
+
+
+def iterations(state: RunState) -> str:
+    """How likely the re-runs of one candidate all miss f, and how many would be enough."""
+    found, given = state.baseline, state.scenario["reduction"]["iterations"]
+    line = f"{count(1 + given, 'run')} of a candidate miss it with chance {found.miss_chance:.2g}"
+    if found.iterations_95 > given:
+        line += f"; 95 % needs --iterations {found.iterations_95}"
+    return line
+
+
+def count(number: int, word: str) -> str:
+    """1 model, 2 models."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"

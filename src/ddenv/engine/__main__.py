@@ -1,0 +1,84 @@
+"""The engine as a program: `python -m ddenv.engine RUN [--jobs N] [--accept-mode automatic|ask]`.
+
+Exit codes: 0 the reduction ended by itself, 1 it was stopped, 2 it could not go on (one line on stderr says why).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+from ddenv.engine.bench import Bench
+from ddenv.engine.control import Control, Stopped
+from ddenv.engine.driver import Driver
+from ddenv.engine.journal import Journal
+from ddenv.engine.pool import Pool
+from ddenv.errors import UserError
+from ddenv.launch import read_parts
+from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.store import RunFile
+from ddenv.world.model import World
+from ddenv.world.scenario import Scenario
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m ddenv.engine", description="Works on a run until it ends.")
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    options = parser.parse_args()
+    terminated = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: terminated.set())
+    try:
+        with RunFile(options.run) as file, engine_lock(options.run):
+            return _work(file, max(1, options.jobs), options.accept_mode, terminated)
+    except UserError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _work(file: RunFile, jobs: int, accept_mode: str | None, terminated: threading.Event) -> int:
+    scenario, world, robot = read_parts(file)
+    file.own()
+    journal = Journal(file)
+    if journal.state.status == "finished":
+        return 0
+    try:
+        _begin(journal, scenario, world, jobs, accept_mode)
+        control = Control(journal, terminated)
+        pool = Pool(scenario, world, robot, jobs)
+        try:
+            Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
+        finally:
+            pool.close()
+    except Stopped as stop:
+        journal.record("engine_stopped", reason=str(stop))
+        return 1
+    except UserError as error:
+        journal.record("engine_failed", reason=str(error))
+        raise
+    finally:
+        file.set_live([])
+        file.settle()
+    return 0
+
+
+def _begin(journal: Journal, scenario: Scenario, world: World, jobs: int, accept_mode: str | None) -> None:
+    if not journal.state.elements:
+        elements = world.elements(frozenset(scenario.protected))
+        journal.record("created", scenario=scenario.model_dump(mode="json"), elements=elements)
+    for test in journal.state.tests:
+        if test.outcome == "running":
+            journal.record("test_lost", test=test.id)
+    journal.record("engine_started", pid=os.getpid(), jobs=jobs)
+    if accept_mode and accept_mode != journal.state.accept_mode:
+        journal.record("accept_mode", mode=accept_mode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""Where tests are made: the first in line on a free worker, the next ones ahead of time on the others; all is recorded."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from ddenv.engine.control import Control
+from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.pool import Broken, Pool
+from ddenv.robot.oracle import Failure, judge
+from ddenv.robot.result import RunResult
+from ddenv.runfile.store import ROBOT
+
+# How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
+WAIT = 0.05
+LIVE_PERIOD = 0.1
+
+Wanted = list[tuple[Keep, int, int | None]]
+
+
+class Bench:
+    """Makes tests with `pool`, as `control` allows, and records them in `journal`.
+
+    `failure` is f once it is fixed; before, a run that failed is recorded as "failed".
+    """
+
+    def __init__(self, journal: Journal, pool: Pool, control: Control) -> None:
+        self.failure: Failure | None = None
+        self._journal = journal
+        self._pool = pool
+        self._control = control
+        self._started: set[tuple[Keep, int]] = set()
+        self._next_live = 0.0
+        self._live_shown = False
+
+    def work(self, phase: str, round: int | None, wanted: Callable[[], Wanted]) -> None:
+        """Makes tests until none is wanted.
+
+        `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
+        them; it is asked again whenever something happened. Raises Stopped, and UserError if nothing can be simulated.
+        """
+        while tests := wanted():
+            self._start([test for test in tests if test[:2] not in self._started], phase, round)
+            self.tick()
+
+    def _start(self, tests: Wanted, phase: str, round: int | None) -> None:
+        # A step is the test that comes next in line; nothing runs ahead of it.
+        free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+        for keep, run, candidate in tests[:free]:
+            if not self._control.may_start():
+                return
+            test = self._journal.start_test(phase, keep, run, round, candidate)
+            self._started.add((keep, run))
+            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed)
+            self._control.started()
+
+    def tick(self) -> None:
+        """Obeys commands, takes in what has finished, shows the running robots. Raises Stopped."""
+        self._control.poll()
+        finished = self._pool.finished(WAIT)
+        for test, result in finished:
+            self._record(test, result)
+        if self._pool.busy == 0:
+            self._control.settled()
+            if not finished:
+                time.sleep(WAIT)
+        if time.monotonic() >= self._next_live:
+            self._next_live = time.monotonic() + LIVE_PERIOD
+            self._show_live()
+
+    def _show_live(self) -> None:
+        live = self._pool.live()
+        if live or self._live_shown:
+            self._journal.file.set_live(live)
+        self._live_shown = bool(live)
+
+    def _record(self, test: int, result: RunResult | Broken) -> None:
+        if isinstance(result, Broken):
+            data = {"outcome": result.outcome, "failure": result.failure, "distance": None, "end_pose": None}
+            self._journal.record("test_finished", test=test, simulated_seconds=0.0, wall_seconds=0.0, **data)
+            return
+        outcome, distance = result.outcome, None
+        if self.failure is not None:
+            judgement = judge(result, self.failure)
+            outcome, distance = judgement.outcome, judgement.distance
+        motions = {ROBOT: _samples(result.trajectory)}
+        motions |= {name: _samples(motion) for name, motion in result.motions.items()}
+        self._journal.record(
+            "test_finished",
+            motions,
+            test=test,
+            outcome=outcome,
+            failure=result.failure,
+            distance=None if distance is None or not math.isfinite(distance) else distance,
+            end_pose=result.end_pose if all(map(math.isfinite, result.end_pose)) else None,
+            simulated_seconds=result.simulated_seconds,
+            wall_seconds=result.wall_seconds,
+        )
+
+
+def _samples(trajectory: np.ndarray) -> bytes:
+    return np.ascontiguousarray(trajectory, dtype="<f8").tobytes()

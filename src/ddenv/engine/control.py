@@ -1,0 +1,128 @@
+"""What the user asked of a running engine: pause, steps, vetoes, accepts. It reads the run file's commands."""
+
+from __future__ import annotations
+
+import threading
+
+from ddenv.engine.journal import Journal
+from ddenv.runfile.store import Event
+
+
+class Stopped(Exception):
+    """The engine was asked to stop."""
+
+
+class Control:
+    """Commands turned into events and into what the driver may do next.
+
+    `credit` is how many tests may still start before a pause, None for any number. A command that makes no sense any more
+    (a veto of a judged candidate, an accept of nothing) has no effect but is marked as handled. `terminated` is set by a signal.
+    """
+
+    def __init__(self, journal: Journal, terminated: threading.Event) -> None:
+        self._journal = journal
+        self._terminated = terminated
+        self._paused = False
+        self._credit: int | None = None
+        self._pause_after_round = False
+        self._forget_old_stops()
+
+    def _forget_old_stops(self) -> None:
+        """A stop or pause that was meant for an engine that is gone must not hold this one."""
+        for command in self._journal.file.commands(self._journal.state.last_command):
+            if command.kind in ("stop", "pause", "step"):
+                self._handled(command)
+            else:
+                self._obey(command)
+
+    def poll(self) -> None:
+        """Obeys new commands. Raises Stopped."""
+        if self._terminated.is_set():
+            raise Stopped("the engine was terminated")
+        for command in self._journal.file.commands(self._journal.state.last_command):
+            self._obey(command)
+
+    def may_start(self) -> bool:
+        """Whether a test may start now."""
+        return not self._paused and self._credit != 0
+
+    def speculates(self) -> bool:
+        """Whether idle workers may run ahead: not while the user steps."""
+        return self._credit is None
+
+    def started(self) -> None:
+        """A test was started."""
+        if self._credit is not None:
+            self._credit -= 1
+
+    def settled(self) -> None:
+        """No test runs: a step of one test is over."""
+        if self._credit == 0:
+            self._pause()
+
+    def round_finished(self) -> None:
+        """A round, or the baseline, is over."""
+        if self._pause_after_round:
+            self._pause()
+
+    def _obey(self, command: Event) -> None:
+        # Marked first: a stop leaves by an exception, and must not be met again.
+        self._handled(command)
+        obey = getattr(self, f"_obey_{command.kind}", None)
+        if obey is not None:
+            obey(command.data)
+
+    def _handled(self, command: Event) -> None:
+        self._journal.record("command_handled", command=command.id)
+
+    def _obey_pause(self, _: dict) -> None:
+        if not self._paused:
+            self._pause()
+
+    def _obey_resume(self, _: dict) -> None:
+        self._run(credit=None, pause_after_round=False)
+
+    def _obey_step(self, data: dict) -> None:
+        if data.get("unit") == "round":
+            self._run(credit=None, pause_after_round=True)
+        else:
+            self._run(credit=1, pause_after_round=False)
+
+    def _obey_accept_mode(self, data: dict) -> None:
+        if data.get("mode") in ("automatic", "ask"):
+            self._journal.record("accept_mode", mode=data["mode"])
+
+    def _obey_accept(self, data: dict) -> None:
+        self._decide(data, "accept")
+
+    def _obey_reject(self, data: dict) -> None:
+        self._decide(data, "reject")
+
+    def _obey_veto(self, data: dict) -> None:
+        round = self._journal.state.round
+        if round is None or round.done or round.winner is not None or round.number != data.get("round"):
+            return
+        index = data.get("candidate")
+        if isinstance(index, int) and 0 <= index < len(round.candidates) and not round.candidates[index].verdict:
+            self._journal.record("vetoed", round=round.number, candidate=index)
+
+    def _obey_stop(self, _: dict) -> None:
+        raise Stopped("stopped by the user")
+
+    def _decide(self, data: dict, decision: str) -> None:
+        state = self._journal.state
+        if state.waiting_candidate is None:
+            return
+        key = (state.round.number, state.waiting_candidate)
+        if (data.get("round"), data.get("candidate")) == key:
+            self._journal.record("decided", round=key[0], candidate=key[1], decision=decision)
+
+    def _run(self, credit: int | None, pause_after_round: bool) -> None:
+        self._credit, self._pause_after_round = credit, pause_after_round
+        if self._paused:
+            self._paused = False
+            self._journal.record("resumed")
+
+    def _pause(self) -> None:
+        self._paused, self._credit, self._pause_after_round = True, None, False
+        self._journal.record("paused")

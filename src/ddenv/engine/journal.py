@@ -1,0 +1,80 @@
+"""The engine's memory: it writes each event once, and knows every finished test again after a restart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ddenv.runfile.fold import apply
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import Event, RunFile
+
+Keep = frozenset[str]
+
+
+class Journal:
+    """The events of a run, `state` folded from them, and what a resumed engine needs of them.
+
+    `ledger` holds each finished test as (models, run) -> its id; a test in it is never made again. `decisions` are the
+    user's accepts and rejects, `vetoes` the vetoes, by (round, candidate).
+    """
+
+    def __init__(self, file: RunFile) -> None:
+        self.file = file
+        self.state = RunState()
+        self.ledger: dict[tuple[Keep, int], int] = {}
+        self.decisions: dict[tuple[int, int], str] = {}
+        self.vetoes: set[tuple[int, int]] = set()
+        self._keeps: dict[int, Keep] = {}
+        self._seen: set[tuple[str, int | None, int | None]] = set()
+        for event in file.events():
+            self._take(event)
+
+    def record(self, kind: str, motions: dict[str, bytes] | None = None, **data: Any) -> None:
+        """Writes an event."""
+        self._take(self.file.append(kind, data, motions))
+
+    def record_once(self, kind: str, round: int | None = None, candidate: int | None = None, **data: Any) -> None:
+        """Writes an event of a round or a candidate unless it was written before the engine was last stopped."""
+        if self.has(kind, round, candidate):
+            return
+        if candidate is not None:
+            data["candidate"] = candidate
+        self.record(kind, round=round, **data)
+
+    def start_test(self, phase: str, keep: Keep, run: int, round: int | None, candidate: int | None) -> int:
+        """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise."""
+        test = len(self.state.tests) + 1
+        self._keeps[test] = keep
+        seed = self.state.scenario["reduction"]["seed"] + run
+        self.record("test_started", test=test, phase=phase, round=round, candidate=candidate, run=run, seed=seed)
+        return test
+
+    def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
+        """Whether an event of a round or a candidate is written already."""
+        return (kind, round, candidate) in self._seen
+
+    def skipped(self, round: int) -> frozenset[int]:
+        """The candidates of a round that the user vetoed or rejected."""
+        rejected = {key for key, decision in self.decisions.items() if decision == "reject"}
+        return frozenset(candidate for number, candidate in self.vetoes | rejected if number == round)
+
+    def _take(self, event: Event) -> None:
+        self.state = apply(self.state, event)
+        data = event.data
+        round, candidate = data.get("round"), data.get("candidate")
+        self._seen.add((event.kind, round, candidate))
+        if event.kind == "test_started":
+            self._keeps.setdefault(data["test"], self._keep_of(candidate))
+        elif event.kind == "test_finished":
+            test = self.state.tests[data["test"] - 1]
+            self.ledger[self._keeps[test.id], test.run] = test.id
+        elif event.kind == "decided":
+            self.decisions[round, candidate] = data["decision"]
+        elif event.kind == "vetoed":
+            self.vetoes.add((round, candidate))
+
+    def _keep_of(self, candidate: int | None) -> Keep:
+        """The models of a test that was started in the current round, or of a baseline run."""
+        if candidate is None:
+            return frozenset(self.state.elements)
+        return frozenset(self.state.round.candidates[candidate].models)

@@ -1,0 +1,128 @@
+"""Runs the robot outside of a reduction: in a whole scenario, or in any part of a run's world, judged against the run's f."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ddenv.engine.pool import Broken, Pool
+from ddenv.errors import UserError
+from ddenv.launch import read_parts
+from ddenv.robot.oracle import Failure, judge
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is tried. `failure` is f of a run whose baseline is done; without it a failed run is just "failed"."""
+
+    scenario: Scenario
+    world: World
+    robot: Model
+    state: RunState | None = None
+    failure: Failure | None = None
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        return self.world.elements(frozenset(self.scenario.protected))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run to make: the models that are there, the seed, and the model that was left out on purpose, if any."""
+
+    keep: frozenset[str]
+    seed: int
+    without: str | None = None
+
+
+def subject_of_run(file: RunFile) -> Subject:
+    """The world of a run, with its f if the baseline is done."""
+    scenario, world, robot = read_parts(file)
+    state = fold(file.events())
+    failure = None
+    if state.baseline is not None:
+        trajectory = np.array(file.motion(state.baseline.failure_test)).reshape(-1, COLUMNS)
+        spec = scenario.failure
+        failure = Failure(state.baseline.position, trajectory, spec.epsilon, spec.similarity)
+    return Subject(scenario, world, robot, state, failure)
+
+
+def plan(
+    subject: Subject,
+    *,
+    keep: list[str] | None = None,
+    minimal: bool = False,
+    leave_out: list[str] | None = None,
+    leave_each_out: bool = False,
+    seed: int | None = None,
+    repeat: int = 1,
+) -> list[Trial]:
+    """The runs asked for. Seeds are `seed`, `seed + 1`, ... (the scenario's own by default). Raises UserError."""
+    models = _models(subject, keep, minimal)
+    for name in leave_out or []:
+        if name not in models:
+            raise UserError(f"--leave-out: '{name}' is not among the {len(models)} models that are there")
+    models = tuple(name for name in models if name not in (leave_out or []))
+    base = subject.scenario.reduction.seed if seed is None else seed
+    keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
+    if leave_each_out:
+        keeps += [(frozenset(models) - {name}, name) for name in models]
+    return [Trial(there, base + run, without) for there, without in keeps for run in range(repeat)]
+
+
+def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
+    if minimal and subject.state is None:
+        raise UserError("--minimal: needs a run; a scenario has no minimal environment yet")
+    if minimal and keep is not None:
+        raise UserError("--minimal and --keep: give one of them")
+    if keep is not None:
+        for name in keep:
+            if name not in subject.elements:
+                raise UserError(f"--keep: the world has no removable model '{name}'")
+        return tuple(keep)
+    return subject.state.environment if minimal and subject.state else subject.elements
+
+
+def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
+    """Makes the runs in worker processes; yields what came out of each, in order, as plain data."""
+    pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
+    results: dict[int, dict[str, Any]] = {}
+    started = told = 0
+    try:
+        while told < len(trials):
+            while pool.idle and started < len(trials):
+                pool.submit(started, trials[started].keep, trials[started].seed)
+                started += 1
+            for index, result in pool.finished(1.0):
+                results[index] = _told(subject, trials[index], result)
+            while told in results:
+                yield results.pop(told)
+                told += 1
+    finally:
+        pool.close()
+
+
+def _told(subject: Subject, trial: Trial, result: Any) -> dict[str, Any]:
+    told = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
+    if isinstance(result, Broken):
+        return told | {"outcome": result.outcome, "failure": result.failure, "end_pose": None}
+    outcome, distance = result.outcome, None
+    if subject.failure is not None:
+        judgement = judge(result, subject.failure)
+        outcome, distance = judgement.outcome, judgement.distance
+    return told | {
+        "outcome": outcome,
+        "failure": result.failure,
+        "end_pose": [float(value) for value in result.end_pose],
+        "distance": distance,
+        "simulated_seconds": result.simulated_seconds,
+        "wall_seconds": result.wall_seconds,
+    }

@@ -1,0 +1,29 @@
+"""How sure a rate is, and how often to re-run a flaky failure."""
+
+from __future__ import annotations
+
+import math
+
+Z_95 = 1.959963984540054
+
+
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate seen `successes` times in `trials`. Raises ValueError for impossible counts."""
+    if trials < 1 or not 0 <= successes <= trials:
+        raise ValueError(f"{successes} of {trials}")
+    rate, z2 = successes / trials, Z_95**2
+    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = Z_95 / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    return max(0.0, centre - half), min(1.0, centre + half)
+
+
+def miss_chance(rate: float, iterations: int) -> float:
+    """The chance that `1 + iterations` runs all miss a failure that shows at `rate`."""
+    return (1.0 - rate) ** (1 + iterations)
+
+
+def iterations_needed(rate: float, confidence: float = 0.95) -> int:
+    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with `confidence`."""
+    if rate >= 1.0:
+        return 0
+    return max(0, math.ceil(math.log(1.0 - confidence) / math.log(1.0 - rate) - 1e-9) - 1)
