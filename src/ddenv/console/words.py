@@ -27,15 +27,15 @@ def news(kind: str, before: RunState, after: RunState) -> str:
         case "round_started":
             round = after.round
             return (
-                f"round {round.number}: {len(round.environment)} models in {len(round.partitions)} partitions, "
-                f"{len(round.candidates)} candidates"
+                f"round {round.number}: {count(len(round.environment), 'model')} in "
+                f"{count(len(round.partitions), 'partition')}, {count(len(round.candidates), 'candidate')}"
             )
         case "candidate_judged" if after.round is not None:
             changed = [
                 new for old, new in zip(before.round.candidates, after.round.candidates, strict=True) if old != new
             ]
             return "".join(
-                f"  {one.label} ({len(one.models)} models): {one.verdict} after {count(len(one.tests), 'test')}"
+                f"  {one.label} ({count(len(one.models), 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
                 for one in changed
             )
         case "reduced":

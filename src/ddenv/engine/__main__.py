@@ -57,6 +57,7 @@ def _work(file: RunFile, jobs: int, accept_mode: str | None, terminated: threadi
         finally:
             pool.close()
     except Stopped as stop:
+        journal.lose_running()
         journal.record("engine_stopped", reason=str(stop))
         return 1
     except UserError as error:
@@ -72,9 +73,7 @@ def _begin(journal: Journal, scenario: Scenario, world: World, jobs: int, accept
     if not journal.state.elements:
         elements = world.elements(frozenset(scenario.protected))
         journal.record("created", scenario=scenario.model_dump(mode="json"), elements=elements)
-    for test in journal.state.tests:
-        if test.outcome == "running":
-            journal.record("test_lost", test=test.id)
+    journal.lose_running()
     journal.record("engine_started", pid=os.getpid(), jobs=jobs)
     if accept_mode and accept_mode != journal.state.accept_mode:
         journal.record("accept_mode", mode=accept_mode)

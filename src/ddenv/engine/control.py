@@ -104,7 +104,7 @@ class Control:
             return
         index = data.get("candidate")
         if isinstance(index, int) and 0 <= index < len(round.candidates) and not round.candidates[index].verdict:
-            self._journal.record("vetoed", round=round.number, candidate=index)
+            self._journal.record("vetoed", round=round.number, candidate=index, verdict="vetoed")
 
     def _obey_stop(self, _: dict) -> None:
         raise Stopped("stopped by the user")

@@ -41,7 +41,7 @@ class Driver:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
         reason = self._baseline()
         if reason:
-            self._journal.record("finished", minimal=False, reason=reason)
+            self._end(False, reason)
             return
         algorithm = ddenv(
             self._journal.state.elements,
@@ -66,7 +66,12 @@ class Driver:
         reason = "no single model can be removed"
         if untried:
             reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test (vetoed or rejected)"
-        self._journal.record("finished", minimal=not untried, reason=reason)
+        self._end(not untried, reason)
+
+    def _end(self, minimal: bool, reason: str) -> None:
+        # What ran ahead of time is not needed any more.
+        self._journal.lose_running()
+        self._journal.record("finished", minimal=minimal, reason=reason)
 
     def _is_dissimilar(self, keep: Keep) -> bool:
         return standing([keep], self._similar(), self._reduction.iterations).verdicts[0] == "dissimilar"
@@ -119,30 +124,38 @@ class Driver:
             partitions=[self._numbers(partition) for partition in round.partitions],
             candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
         )
+        if self._journal.state.round.number == number:
+            for index in self._refused(round):
+                verdict = self._journal.refused[round.candidates[index].models]
+                self._journal.record_once("vetoed", number, index, verdict=verdict)
 
     def _judge(self, number: int, round: Round) -> int | None:
         """The index of the first similar candidate that was not rejected, or None when all are judged."""
 
         def wanted() -> Wanted:
-            now = self._standing(number, round)
+            now = self._standing(round)
             self._record_verdicts(number, round, now.verdicts)
             return [(round.candidates[index].models, run, index) for index, run in now.wanted]
 
         self._bench.work("round", number, wanted)
-        return self._standing(number, round).winner
+        return self._standing(round).winner
 
-    def _standing(self, number: int, round: Round) -> Standing:
+    def _standing(self, round: Round) -> Standing:
         keeps = [candidate.models for candidate in round.candidates]
-        skipped = self._journal.skipped(number)
-        return standing(keeps, self._similar(), self._reduction.iterations, skipped)
+        return standing(keeps, self._similar(), self._reduction.iterations, self._refused(round))
+
+    def _refused(self, round: Round) -> frozenset[int]:
+        """The candidates that the user vetoed or rejected, in this round or an earlier one."""
+        refused = self._journal.refused
+        return frozenset(index for index, one in enumerate(round.candidates) if one.models in refused)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
         """Tells verdicts in the order of candidates: what was run ahead of time is told when its turn has come."""
-        skipped = self._journal.skipped(number)
+        refused = self._refused(round)
         for index, verdict in enumerate(verdicts):
             if not verdict:
                 return
-            if index not in skipped:
+            if index not in refused:
                 tests = self._tests_of(round.candidates[index].models)
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
                 self._journal.record_once("candidate_judged", number, index, verdict=verdict, tests=tests, known=known)

@@ -15,7 +15,8 @@ class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
     `ledger` holds each finished test as (models, run) -> its id; a test in it is never made again. `decisions` are the
-    user's accepts and rejects, `vetoes` the vetoes, by (round, candidate).
+    user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected: they stay refused
+    in later rounds, whatever is known of them.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -23,7 +24,7 @@ class Journal:
         self.state = RunState()
         self.ledger: dict[tuple[Keep, int], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
-        self.vetoes: set[tuple[int, int]] = set()
+        self.refused: dict[Keep, str] = {}
         self._keeps: dict[int, Keep] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         for event in file.events():
@@ -49,14 +50,15 @@ class Journal:
         self.record("test_started", test=test, phase=phase, round=round, candidate=candidate, run=run, seed=seed)
         return test
 
+    def lose_running(self) -> None:
+        """Writes of the tests that were started and never ended that they are lost."""
+        for test in self.state.tests:
+            if test.outcome == "running":
+                self.record("test_lost", test=test.id)
+
     def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
         """Whether an event of a round or a candidate is written already."""
         return (kind, round, candidate) in self._seen
-
-    def skipped(self, round: int) -> frozenset[int]:
-        """The candidates of a round that the user vetoed or rejected."""
-        rejected = {key for key, decision in self.decisions.items() if decision == "reject"}
-        return frozenset(candidate for number, candidate in self.vetoes | rejected if number == round)
 
     def _take(self, event: Event) -> None:
         self.state = apply(self.state, event)
@@ -70,8 +72,10 @@ class Journal:
             self.ledger[self._keeps[test.id], test.run] = test.id
         elif event.kind == "decided":
             self.decisions[round, candidate] = data["decision"]
+            if data["decision"] == "reject":
+                self.refused[self._keep_of(candidate)] = "rejected"
         elif event.kind == "vetoed":
-            self.vetoes.add((round, candidate))
+            self.refused.setdefault(self._keep_of(candidate), data["verdict"])
 
     def _keep_of(self, candidate: int | None) -> Keep:
         """The models of a test that was started in the current round, or of a baseline run."""

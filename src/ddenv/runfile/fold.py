@@ -16,7 +16,7 @@ The kinds of events, with their data (models are numbers into the run's `element
     round_finished
     paused / resumed
     accept_mode          mode
-    vetoed               candidate
+    vetoed               candidate, verdict: vetoed, or rejected if the same models were rejected in an earlier round
     command_handled      command
     finished             minimal, reason
     engine_stopped       reason
@@ -99,8 +99,8 @@ def _baseline_finished(state: RunState, data: Data, _: float) -> RunState:
         state = _with_test(state, int(test), {"outcome": str(outcome), "distance": distances.get(test)})
     baseline = Baseline(**data | {"position": tuple(map(float, data["position"]))})
     point = Point(len(state.finished_tests), len(state.environment))
-    history = (*state.history, point)
-    return replace(state, baseline=baseline, status="running", evidence_test=baseline.failure_test, history=history)
+    state = replace(state, baseline=baseline, evidence_test=baseline.failure_test, history=(*state.history, point))
+    return state if state.paused else replace(state, status="running")
 
 
 def _round_started(state: RunState, data: Data, _: float) -> RunState:
@@ -161,7 +161,8 @@ def _accept_mode(state: RunState, data: Data, _: float) -> RunState:
 
 
 def _vetoed(state: RunState, data: Data, _: float) -> RunState:
-    return _with_candidate(state, replace(state.round.candidates[data["candidate"]], verdict="vetoed"))
+    verdict = str(data["verdict"])
+    return _with_candidate(state, replace(state.round.candidates[data["candidate"]], verdict=verdict))
 
 
 def _command_handled(state: RunState, data: Data, _: float) -> RunState:

@@ -94,7 +94,9 @@ class RunFile:
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is no ddenv run file")
         if version > SCHEMA_VERSION:
-            raise UserError(f"{path}: was written by a newer ddenv (format {version}); this one reads up to {SCHEMA_VERSION}")
+            raise UserError(
+                f"{path}: was written by a newer ddenv (format {version}); this one reads up to {SCHEMA_VERSION}"
+            )
 
     def __enter__(self) -> RunFile:
         return self
@@ -175,7 +177,9 @@ class RunFile:
 
     def _insert(self, db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
         text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-        return db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text)).lastrowid
+        return db.execute(
+            f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text)
+        ).lastrowid
 
     def _entries(self, table: str, after: int) -> list[Event]:
         rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id", (after,))

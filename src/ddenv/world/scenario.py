@@ -73,7 +73,7 @@ class Sensors(Section):
 class Controller(Section):
     """Go-to-goal driving at a fixed period."""
 
-    period: Positive = Field(0.05, description="time between two commands, s")
+    period: Positive = Field(0.05, description="time between two commands, s; a whole number of time steps")
     speed: Positive = Field(1.0, description="greatest forward speed, m/s")
     acceleration: Positive = Field(1.0, description="greatest growth of the forward speed, m/s^2")
     turn_rate: Positive = Field(1.0, description="greatest commanded turn rate, rad/s")
@@ -107,7 +107,7 @@ class Simulation(Section):
     """How Drake simulates. `wall_timeout` bounds one test in real time."""
 
     time_step: Positive = Field(0.005, le=0.05)
-    contact: Literal["lagged", "sap", "tamsi", "similar"] = "lagged"
+    contact: Literal["lagged", "sap", "similar"] = "lagged"
     wall_timeout: Positive = 120.0
 
 

@@ -1,0 +1,69 @@
+"""`python -m ddenv.scene RUN [--port N]`: serves the 3-D scene of a run until it is ended or its parent goes away.
+
+The first line of output is the URL. Errors of the user are one line on standard error, and exit code 2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import NoReturn
+
+from ddenv.errors import UserError
+from ddenv.runfile.store import RunFile
+from ddenv.scene.player import Player
+from ddenv.scene.server import Server
+from ddenv.scene.stage import Stage
+
+PERIOD = 0.05  # s between two pictures
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UserError(f"{message}; usage: python -m ddenv.scene RUN [--port N]")
+
+
+def main() -> int:
+    parent = os.getppid()
+    try:
+        arguments = _arguments()
+        with RunFile(arguments.run) as run:
+            asyncio.run(_serve(run, arguments.port, parent))
+    except UserError as error:
+        print(f"ddenv.scene: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
+    parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 takes a free one from 7000 up")
+    return parser.parse_args()
+
+
+async def _serve(run: RunFile, port: int, parent: int) -> None:
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        loop.add_signal_handler(name, ended.set)
+    server = Server()
+    stage = Stage(server.send)
+    server.welcome = stage.messages
+    player = Player(run, stage, server.say)
+    player.tick(time.monotonic())
+    print(server.listen(port), flush=True)
+    while not ended.is_set() and os.getppid() == parent:
+        if server.viewers:
+            player.tick(time.monotonic())
+        await asyncio.sleep(PERIOD)
+    await server.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

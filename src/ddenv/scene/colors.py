@@ -1,0 +1,54 @@
+"""Colours of models whose file names none, and of what the scene adds. Red, green, blue in 0..1, then alpha."""
+
+from __future__ import annotations
+
+import math
+
+from ddenv.world.model import Model
+
+Color = tuple[float, float, float, float]
+
+_BY_WORD: tuple[tuple[tuple[str, ...], Color], ...] = (
+    (("asphalt", "road", "street", "platform"), (0.30, 0.31, 0.33, 1.0)),
+    (("wood", "board", "plank", "pallet", "tile", "lumber"), (0.72, 0.53, 0.33, 1.0)),
+    (("grass", "tree", "bush", "plant"), (0.38, 0.55, 0.30, 1.0)),
+    (("brick", "cinder", "concrete", "block", "rock", "stone"), (0.58, 0.57, 0.55, 1.0)),
+    (("ice", "water", "wet"), (0.60, 0.78, 0.88, 1.0)),
+    (("patch", "friction"), (0.36, 0.50, 0.66, 1.0)),
+)
+STILL: Color = (0.62, 0.62, 0.64, 1.0)
+MOVABLE: Color = (0.76, 0.56, 0.34, 1.0)
+
+GROUND: Color = (0.80, 0.81, 0.80, 1.0)
+GRID: Color = (0.66, 0.68, 0.69, 1.0)
+START: Color = (0.16, 0.47, 0.85, 1.0)
+GOAL: Color = (0.10, 0.62, 0.28, 1.0)
+FAILURE: Color = (0.86, 0.12, 0.12, 1.0)
+EVIDENCE: Color = (0.86, 0.22, 0.18, 1.0)
+TRAIL: Color = (0.98, 0.70, 0.05, 1.0)
+REMOVED: Color = (0.45, 0.50, 0.56, 1.0)
+LEFT_OUT: Color = (0.55, 0.25, 0.75, 1.0)
+SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
+
+
+def default_color(model: Model) -> Color:
+    """By a word in the model's name, or else by whether it can move."""
+    name = model.name.lower()
+    for words, color in _BY_WORD:
+        if any(word in name for word in words):
+            return color
+    return STILL if model.static else MOVABLE
+
+
+def varied(color: Color, number: int) -> Color:
+    """`color` a little brighter or darker, so that neighbouring shapes of one colour can be told apart."""
+    # Multiples of the golden ratio are spread evenly and never repeat.
+    factor = 0.92 + 0.16 * math.modf(number * 0.6180339887)[0]
+    red, green, blue = (min(1.0, part * factor) for part in color[:3])
+    return red, green, blue, color[3]
+
+
+def hexadecimal(color: Color) -> int:
+    """0xRRGGBB."""
+    red, green, blue = (round(255 * part) for part in color[:3])
+    return red << 16 | green << 8 | blue

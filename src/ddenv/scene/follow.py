@@ -1,0 +1,117 @@
+"""What the scene shows now: pure functions from the run's state and the tests that run to a `Shot`, and from time to poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.store import Live
+from ddenv.world.pose import Pose
+
+SPEED = 4.0  # a replay is so many times as fast as the robot was
+PAUSE = 2.0  # a replay stands still so long at its end, s
+HOLD = 3.0  # between two tests the last one stays on the screen for so long, s
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """What is shown: a test as it runs ("live"), a finished test again ("replay"), or the robot at its start ("start").
+
+    Of the elements, `models` are in the test shown, `left_out` are kept so far but not in this test, `removed` are gone.
+    """
+
+    kind: str
+    test: int | None
+    models: frozenset[str]
+    left_out: frozenset[str]
+    removed: frozenset[str]
+    title: str
+
+
+def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
+    """What to show, `idle` s after a test was last seen running. Stays with the `previous` test while it runs."""
+    running = [row.test for row in live if _is_running(state, row.test)]
+    if running:
+        stay = previous is not None and previous.kind == "live" and previous.test in running
+        return _of_test(state, "live", state.tests[(previous.test if stay else running[0]) - 1])
+    working = state.status in ("baseline", "running")
+    if working and previous is not None and previous.kind == "live" and idle < HOLD:
+        return previous
+    test = _to_replay(state)
+    if test is None:
+        return _shot(state, "start", None, frozenset(state.environment), "the robot at its start")
+    return _of_test(state, "replay", test)
+
+
+def _is_running(state: RunState, test: int) -> bool:
+    return 0 < test <= len(state.tests) and state.tests[test - 1].outcome == "running"
+
+
+def _to_replay(state: RunState) -> Test | None:
+    if state.waiting_candidate is not None and state.round is not None:
+        tests = state.round.candidates[state.waiting_candidate].tests
+        similar = [state.tests[id - 1] for id in tests if state.tests[id - 1].outcome == "similar"]
+        if similar:
+            return similar[-1]
+    if state.evidence_test is not None and 0 < state.evidence_test <= len(state.tests):
+        return state.tests[state.evidence_test - 1]
+    return state.finished_tests[-1] if state.finished_tests else None
+
+
+def _of_test(state: RunState, kind: str, test: Test) -> Shot:
+    name, models = "baseline", frozenset(state.elements)
+    if test.id == state.evidence_test and kind == "replay":
+        original = state.baseline is not None and test.id == state.baseline.failure_test
+        name = "the failure f" if original else "the failure in what is left"
+        models = frozenset(state.environment)
+    elif test.phase == "round" and state.round is not None and test.round == state.round.number:
+        candidate = state.round.candidates[test.candidate]
+        name, models = f"round {test.round} · {candidate.label}", frozenset(candidate.models)
+    elif test.phase == "round":
+        name, models = f"round {test.round}", frozenset(state.environment)
+    words = [name, f"test {test.id}"]
+    if test.phase == "round" and test.run > 0:
+        words.append(f"re-run {test.run}")
+    words += ["runs now"] if kind == "live" else [test.outcome, f"replay at {SPEED:g}×"]
+    return _shot(state, kind, test.id, models, " · ".join(words))
+
+
+def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], title: str) -> Shot:
+    kept = frozenset(state.environment)
+    return Shot(kind, test, models, kept - models, frozenset(state.elements) - kept - models, title)
+
+
+def replay_time(elapsed: float, length: float) -> float:
+    """Simulated time s to show, `elapsed` s after the replay of a run of `length` s began; it begins again for ever."""
+    length = max(0.0, length)
+    return min(length, elapsed % (length / SPEED + PAUSE) * SPEED)
+
+
+def pose_at(samples: np.ndarray, time: float) -> Pose:
+    """The pose at simulated `time` s, between the two nearest rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
+    after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
+    if len(samples) == 1:
+        return _pose(samples[0, 1:])
+    first, second = samples[after - 1], samples[after]
+    span = second[0] - first[0]
+    part = float(np.clip((time - first[0]) / span, 0.0, 1.0)) if span > 0 else 1.0
+    # A rotation has two quaternions: the one on the same side is the short way round.
+    sign = -1.0 if first[4:] @ second[4:] < 0 else 1.0
+    quaternion = (1 - part) * first[4:] + part * sign * second[4:]
+    return _pose(np.concatenate([(1 - part) * first[1:4] + part * second[1:4], quaternion]))
+
+
+def _pose(values: Sequence[float]) -> Pose:
+    x, y, z, *quaternion = map(float, values)
+    length = math.hypot(*quaternion) or 1.0
+    w, i, j, k = (part / length for part in quaternion)
+    return Pose((x, y, z), (w, i, j, k))
+
+
+def live_pose(row: Live) -> Pose:
+    """Where the robot of a running test is."""
+    return _pose(row.pose)

@@ -1,0 +1,171 @@
+"""Triangles from shapes: pure functions from sizes and poses (m) to arrays.
+
+A corner where faces meet at an edge stands once for each face, since the browser shades by averaging over shared corners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.world.model import Box, Cylinder, Shape, Sphere
+from ddenv.world.pose import Pose
+
+SIDES = 24
+# A drawn trajectory bends at most once in so many m: a robot that stands still leaves no pile of points.
+TUBE_STEP = 0.04
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """`vertices` (N, 3) in m; `faces` (M, 3) are numbers of vertices, counterclockwise seen from outside."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+    def at(self, pose: Pose) -> Mesh:
+        """This mesh, given in the frame `pose`, seen from that frame's parent."""
+        return Mesh(self.vertices @ pose.rotation().T + pose.position, self.faces)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Corners of every face, shape (M, 3, 3)."""
+        return self.vertices[self.faces]
+
+
+EMPTY = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
+
+
+def merge(meshes: Sequence[Mesh]) -> Mesh:
+    """One mesh with the faces of all."""
+    if not meshes:
+        return EMPTY
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.uint32))
+
+
+def _unit_box() -> Mesh:
+    quads = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            u, v = np.roll(np.eye(3), axis + 1, axis=1)[:2] if sign > 0 else np.roll(np.eye(3), axis + 1, axis=1)[1::-1]
+            normal = np.eye(3)[axis] * sign
+            quads.append([0.5 * (normal + a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    faces = [[4 * quad + a, 4 * quad + b, 4 * quad + c] for quad in range(6) for a, b, c in ((0, 1, 2), (0, 2, 3))]
+    return Mesh(np.array(quads).reshape(-1, 3), np.array(faces, dtype=np.uint32))
+
+
+_UNIT_BOX = _unit_box()
+
+
+def box(size: Sequence[float]) -> Mesh:
+    """A box about its frame's origin; `size` along x, y, z."""
+    return Mesh(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
+
+
+def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Mesh:
+    """A cut cone along z about its frame's origin, with the radii `bottom` and `top`; equal radii make a cylinder."""
+    angles = np.arange(sides) * 2 * math.pi / sides
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    low = np.column_stack([circle * bottom, np.full(sides, -length / 2)])
+    high = np.column_stack([circle * top, np.full(sides, length / 2)])
+    here, after = np.arange(sides), np.roll(np.arange(sides), -1)
+    wall = np.concatenate(
+        [np.column_stack([here, after, after + sides]), np.column_stack([here, after + sides, here + sides])]
+    )
+    fan = np.column_stack([np.zeros(sides - 2, dtype=int), np.arange(1, sides - 1), np.arange(2, sides)])
+    parts = [Mesh(np.concatenate([low, high]), wall), Mesh(low, fan[:, ::-1]), Mesh(high, fan)]
+    return merge(parts)
+
+
+def cylinder(radius: float, length: float, sides: int = SIDES) -> Mesh:
+    """Along z, about its frame's origin."""
+    return frustum(radius, radius, length, sides)
+
+
+def sphere(radius: float, sides: int = SIDES) -> Mesh:
+    """About its frame's origin."""
+    rings = sides // 2
+    theta, phi = np.meshgrid(np.linspace(0, math.pi, rings + 1), np.arange(sides) * 2 * math.pi / sides, indexing="ij")
+    points = radius * np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    return Mesh(points.reshape(-1, 3), _sheet(rings + 1, sides))
+
+
+def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Mesh:
+    """A ring of round section that lies in the plane z = 0 around its frame's origin."""
+    around, across = np.meshgrid(np.arange(sides + 1) * 2 * math.pi / sides, np.arange(8) * math.pi / 4, indexing="ij")
+    distance = radius + thickness / 2 * np.cos(across)
+    height = thickness / 2 * np.sin(across)
+    points = np.stack([distance * np.cos(around), distance * np.sin(around), height], axis=-1)
+    return Mesh(points.reshape(-1, 3), _sheet(sides + 1, 8))
+
+
+def tube(points: np.ndarray, radius: float) -> Mesh:
+    """A tube along the path `points` (N, 3), thinned out to one point every `TUBE_STEP`; empty for a path without length."""
+    path = thinned(points, TUBE_STEP)
+    return EMPTY if len(path) < 2 else _pipe(path, radius)
+
+
+def thinned(points: np.ndarray, step: float) -> np.ndarray:
+    """Those of `points` (N, 3) that are at least `step` from the last one taken, and the first."""
+    taken = list(points[:1])
+    for point in points[1:]:
+        if np.linalg.norm(point - taken[-1]) >= step:
+            taken.append(point)
+    return np.array(taken).reshape(-1, 3)
+
+
+def of_shape(shape: Shape) -> Mesh:
+    """The surface of a shape in its own frame. A plane has none: the ground is drawn by itself."""
+    if isinstance(shape, Box):
+        return box(shape.size)
+    if isinstance(shape, Cylinder):
+        return cylinder(shape.radius, shape.length)
+    if isinstance(shape, Sphere):
+        return sphere(shape.radius)
+    return EMPTY
+
+
+def height_at(mesh: Mesh, x: float, y: float) -> float | None:
+    """Height of the highest face above or below the point (x, y), m; None where there is none."""
+    corners = mesh.triangles
+    if not len(corners):
+        return None
+    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    near = ((low <= (x, y)) & (high >= (x, y))).all(axis=1)
+    origin = corners[near, 0]
+    first, second = corners[near, 1] - origin, corners[near, 2] - origin
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    flat = np.abs(area) > 1e-12
+    origin, first, second, area = origin[flat], first[flat], second[flat], area[flat]
+    px, py = x - origin[:, 0], y - origin[:, 1]
+    u, v = (px * second[:, 1] - py * second[:, 0]) / area, (py * first[:, 0] - px * first[:, 1]) / area
+    inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+    heights = (origin[:, 2] + u * first[:, 2] + v * second[:, 2])[inside]
+    return float(heights.max()) if len(heights) else None
+
+
+def _sheet(rows: int, columns: int) -> np.ndarray:
+    """Faces between neighbouring rows of points, each row closed to a loop."""
+    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
+    here, right = row * columns + column, row * columns + (column + 1) % columns
+    below, diagonal = here + columns, right + columns
+    faces = np.stack([np.stack([here, below, diagonal], axis=-1), np.stack([here, diagonal, right], axis=-1)])
+    return faces.reshape(-1, 3).astype(np.uint32)
+
+
+def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Mesh:
+    ahead = np.gradient(path, axis=0)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
+    # A path that is nowhere vertical for long: z serves as the second direction of every section.
+    upright = np.abs(ahead[:, 2:]) > 0.99
+    aside = np.cross(np.where(upright, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), ahead)
+    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)
+    over = np.cross(ahead, aside)
+    angles = -np.arange(sides) * 2 * math.pi / sides
+    section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
+    return Mesh((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), sides))

@@ -1,0 +1,135 @@
+"""Keeps the stage in step with the run file: reads it, decides what to show, moves the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ddenv.launch import read_parts
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.scene import colors
+from ddenv.scene.draw import Scenery, circle, flag, mark
+from ddenv.scene.follow import Shot, live_pose, pose_at, replay_time, shot
+from ddenv.scene.stage import Stage
+from ddenv.scene.view import set_up, view
+from ddenv.world.placement import spawn_pose
+
+READ_EVERY = 0.1  # s between looks into the run file
+LOOK_FOR_ENGINE = 1.0  # s between looks whether an engine is at work
+
+
+class Player:
+    """Shows one run on a stage. `say(name=..., title=..., models=..., time=...)` gets the words that go with the picture."""
+
+    def __init__(self, run: RunFile, stage: Stage, say: Callable[..., None]) -> None:
+        self._run, self._stage, self._say = run, stage, say
+        scenario, world, robot = read_parts(run)
+        self._name = scenario.name
+        self._state = RunState()
+        self._elements = world.elements(frozenset(scenario.protected))
+        self._scenery = Scenery(stage, world, robot, self._elements)
+        self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
+        self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
+        self._shot: Shot | None = None
+        self._began = self._read_at = self._looked_at = self._ran_at = -math.inf
+        self._engine = False
+        self._live: list[Live] = []
+        self._motions: dict[str, np.ndarray] = {}
+        self._trail: list[tuple[float, ...]] = []
+        self._evidence: int | None = None
+        self._set_scene(scenario.robot.spawn, scenario.goal)
+
+    def _set_scene(self, spawn, goal) -> None:
+        start = (spawn.x, spawn.y, self._scenery.height(spawn.x, spawn.y))
+        end = (goal.x, goal.y, self._scenery.height(goal.x, goal.y))
+        set_up(self._stage, view(start, end))
+        circle(self._stage, "start", start, 0.6, colors.START)
+        flag(self._stage, "goal", end, goal.tolerance, colors.GOAL)
+        self._scenery.place_robot(self._start)
+
+    def tick(self, now: float) -> None:
+        """Brings the stage up to the time `now`, s of a clock that never goes back. Raises UserError for a damaged run file."""
+        if now - self._read_at >= READ_EVERY:
+            self._read_at = now
+            self._read(now)
+        self._move(now)
+
+    def _read(self, now: float) -> None:
+        if now - self._looked_at >= LOOK_FOR_ENGINE:
+            self._looked_at = now
+            self._engine = engine_is_alive(self._run.path)
+        # A killed engine leaves its rows behind. Rows are read before events, so that their tests are known.
+        self._live = self._run.live() if self._engine else []
+        self._state = fold(self._run.events(self._state.revision), self._state)
+        following = shot(self._state, self._live, self._shot, now - self._ran_at)
+        if any(row.test == following.test for row in self._live):
+            self._ran_at = now
+        if self._state.evidence_test != self._evidence:
+            self._show_evidence()
+        if following != self._shot:
+            self._cut(following, now)
+
+    def _cut(self, following: Shot, now: float) -> None:
+        before, self._shot = self._shot, following
+        self._scenery.show(following)
+        self._tell("")
+        if before is not None and (before.kind, before.test) == (following.kind, following.test):
+            return
+        self._began, self._motions, self._trail = now, {}, []
+        if following.kind == "replay":
+            self._motions = {name: _rows(samples) for name, samples in self._run.motions(following.test).items()}
+        robot = self._motions.get(ROBOT)
+        shown = following.kind == "replay" and following.test != self._state.evidence_test and robot is not None
+        self._scenery.trail(robot if shown else np.zeros((0, COLUMNS)))
+        if following.kind == "start" or (following.kind == "replay" and robot is None):
+            self._scenery.place_robot(self._start)
+
+    def _move(self, now: float) -> None:
+        if self._shot is None or self._shot.kind == "start":
+            return
+        if self._shot.kind == "live":
+            self._follow_live()
+            return
+        robot = self._motions.get(ROBOT)
+        if robot is None or not len(robot):
+            return
+        time = replay_time(now - self._began, float(robot[-1, 0]))
+        self._scenery.place_robot(pose_at(robot, time))
+        for name, samples in self._motions.items():
+            if name != ROBOT and len(samples):
+                self._scenery.place_model(name, pose_at(samples, time))
+        self._tell(self._clock(time))
+
+    def _follow_live(self) -> None:
+        row = next((row for row in self._live if row.test == self._shot.test), None)
+        if row is None or (self._trail and row.time <= self._trail[-1][0]):
+            return
+        pose = live_pose(row)
+        self._scenery.place_robot(pose)
+        self._trail.append((row.time, *pose.position, *pose.quaternion))
+        self._scenery.trail(np.array(self._trail))
+        self._tell(self._clock(row.time))
+
+    def _tell(self, time: str) -> None:
+        models = f"{len(self._shot.models)} of {len(self._elements)} models"
+        self._say(name=self._name, title=self._shot.title, models=models, time=time)
+
+    def _clock(self, time: float) -> str:
+        return f"{time:.1f} s of {self._timeout:g} s"
+
+    def _show_evidence(self) -> None:
+        self._evidence = self._state.evidence_test
+        samples = None if self._evidence is None else self._run.motion(self._evidence)
+        self._scenery.evidence(None if samples is None else _rows(samples))
+        if self._state.baseline is not None:
+            x, y, z = self._state.baseline.position
+            mark(self._stage, "failure", (x, y, z), self._epsilon, colors.FAILURE)
+
+
+def _rows(samples) -> np.ndarray:
+    return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)

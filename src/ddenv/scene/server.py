@@ -1,0 +1,151 @@
+"""Serves the scene to browsers on this machine: a page, Meshcat's viewer, and one websocket that feeds it.
+
+Meshcat's own server listens on all interfaces, takes drawing commands from any local program, and keeps every property
+ever set. This one listens on the loopback interface only, takes no commands, and lets no page from elsewhere read the scene.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import meshcat
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+
+from ddenv.errors import UserError
+
+LOOPBACK = "127.0.0.1"
+FIRST_PORT, TRIES = 7000, 1000
+_LOCAL_NAMES = ("localhost", LOOPBACK, "::1")
+_VIEWER = Path(meshcat.viewer_assets_path()) / "dist"
+_PAGE = Path(__file__).with_name("page.html")
+# A browser that is gone without a word is noticed after about so long, s.
+_PING = 15
+# So many messages may wait for a slow browser before it misses some of the robot's steps.
+_CROWDED = 100
+
+
+class Server:
+    """`welcome()` gives the messages that a new browser needs first."""
+
+    def __init__(self) -> None:
+        self.viewers: set[_Feed] = set()
+        self.welcome: Callable[[], list[bytes]] = list
+        self.caption = ""
+        routes = [
+            (r"/", _Feed, {"server": self}),
+            (r"/static/(?:index\.html)?", _Page, {"page": _PAGE.read_bytes()}),
+            (r"/static/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
+        ]
+        application = tornado.web.Application(
+            routes,
+            compress_response=True,
+            log_function=lambda _: None,
+            websocket_ping_interval=_PING,
+            websocket_max_message_size=4096,
+        )
+        self._http = tornado.httpserver.HTTPServer(application)
+        for name in ("tornado.general", "tornado.access"):
+            logging.getLogger(name).setLevel(logging.ERROR)
+
+    def listen(self, port: int) -> str:
+        """Starts on `port`, or on the first free one from `FIRST_PORT` up if it is 0; returns the URL. Raises UserError."""
+        if not 0 <= port <= 65535:
+            raise UserError(f"--port: {port} is no port; use 1 to 65535, or 0 for a free one")
+        for number in [port] if port else range(FIRST_PORT, FIRST_PORT + TRIES):
+            try:
+                sockets = tornado.netutil.bind_sockets(number, LOOPBACK)
+            except OSError:
+                continue
+            self._http.add_sockets(sockets)
+            return f"http://{LOOPBACK}:{number}/static/"
+        if port:
+            raise UserError(f"--port: port {port} cannot be used (taken, or not allowed); 0 takes a free one")
+        raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
+
+    def send(self, message: bytes, newest_only: bool = False) -> None:
+        """Passes a drawing message on to every browser."""
+        for viewer in tuple(self.viewers):
+            viewer.pass_on(message, newest_only)
+
+    def say(self, **words: str) -> None:
+        """Changes the caption over the picture."""
+        caption = json.dumps(words)
+        if caption != self.caption:
+            self.caption = caption
+            for viewer in tuple(self.viewers):
+                viewer.pass_on(caption)
+
+    async def close(self) -> None:
+        self._http.stop()
+        for viewer in tuple(self.viewers):
+            viewer.close(1001, "the scene has ended")
+        await self._http.close_all_connections()
+
+
+class _Page(tornado.web.RequestHandler):
+    def initialize(self, page: bytes) -> None:
+        self._page = page
+
+    def get(self) -> None:
+        self.set_header("Cache-Control", "no-store")
+        self.finish(self._page)
+
+
+class _Feed(tornado.websocket.WebSocketHandler):
+    def initialize(self, server: Server) -> None:
+        self._server = server
+        self._on_the_way = 0
+
+    async def get(self, *args: str, **kwargs: str) -> None:
+        if self.request.headers.get("Upgrade", "").lower() != "websocket":
+            self.redirect("/static/")
+            return
+        # Before Tornado's own check, which lets in a page whose name was made to lead here (its host is then the origin).
+        if not self.check_origin(self.request.headers.get("Origin", f"http://{LOOPBACK}")):
+            raise tornado.web.HTTPError(403)
+        await super().get(*args, **kwargs)
+
+    def check_origin(self, origin: str) -> bool:
+        # Any page in the user's browser can reach a loopback port: only our own page, also through a tunnel, may read.
+        try:
+            return urlsplit(origin).hostname in _LOCAL_NAMES
+        except ValueError:
+            return False
+
+    def open(self, *_: str, **__: str) -> None:
+        for message in self._server.welcome():
+            self.pass_on(message)
+        if self._server.caption:
+            self.pass_on(self._server.caption)
+        self._server.viewers.add(self)
+
+    def on_message(self, _: str | bytes) -> None:
+        """Browsers have no say here."""
+
+    def on_close(self) -> None:
+        self._server.viewers.discard(self)
+
+    def pass_on(self, message: bytes | str, newest_only: bool = False) -> None:
+        """Sends `message`; a `newest_only` one is dropped while too many are still on their way."""
+        if newest_only and self._on_the_way > _CROWDED:
+            return
+        try:
+            sent = self.write_message(message, binary=isinstance(message, bytes))
+        except tornado.websocket.WebSocketClosedError:
+            self._server.viewers.discard(self)
+            return
+        self._on_the_way += 1
+        sent.add_done_callback(self._arrived)
+
+    def _arrived(self, sent: asyncio.Future) -> None:
+        self._on_the_way -= 1
+        # Asked for, or asyncio complains of an error that nobody looked at; a broken connection is closed by itself.
+        sent.exception()

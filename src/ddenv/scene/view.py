@@ -1,0 +1,91 @@
+"""Where the camera and the sun stand: the way from start to goal fills the picture, seen aslant from its right side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ddenv.scene import colors
+from ddenv.scene.draw import WORLD
+from ddenv.scene.stage import DRAWN, Stage
+from ddenv.world.pose import Pose, Vector
+
+FIELD_OF_VIEW = 38.0  # vertical, degrees
+ELEVATION = 32.0  # of the camera above the horizon, degrees
+ASIDE = 20.0  # how far the camera is turned from straight across the way towards the start, degrees
+_CAMERA = ("Cameras", "default", "rotated", DRAWN)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """`center` is what the camera looks at; `camera` and `sun` are places relative to it; `radius` is what it must show, m."""
+
+    center: Vector
+    camera: Vector
+    sun: Vector
+    radius: float
+
+
+def view(start: Vector, goal: Vector) -> View:
+    """The view of a robot that goes from `start` to `goal`."""
+    dx, dy = goal[0] - start[0], goal[1] - start[1]
+    radius = max(2.5, 0.5 * math.hypot(dx, dy) + 1.8)
+    along = math.atan2(dy, dx)
+    center = tuple(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
+    camera = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)
+    sun = _polar(3.0 * radius, along - math.radians(165), 50.0)
+    return View(center, camera, sun, radius)
+
+
+def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
+    flat = distance * math.cos(math.radians(elevation))
+    return flat * math.cos(azimuth), flat * math.sin(azimuth), distance * math.sin(math.radians(elevation))
+
+
+def set_up(stage: Stage, view: View) -> None:
+    """Camera, light and background."""
+    # The viewer's camera turns about the scene's origin, so the world is moved there rather than the camera.
+    x, y, z = view.center
+    stage.move(WORLD, Pose((-x, -y, -z)))
+    east, north, up = view.camera
+    # The camera's own axes have y upwards.
+    for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
+        stage.set(_CAMERA, name, value)
+    for name in ("Grid", "Axes"):
+        stage.show((name,), False)
+    for name in ("PointLightNegativeX", "PointLightPositiveX", "FillLight", "SpotLight"):
+        stage.show(("Lights", name), False)
+    stage.set(("Lights", "AmbientLight", DRAWN), "intensity", 0.62)
+    stage.draw_json(("Lights", "Sun"), _sun(view))
+    top, bottom = colors.SKY
+    stage.set(("Background",), "top_color", list(top))
+    stage.set(("Background",), "bottom_color", list(bottom))
+
+
+def _sun(view: View) -> dict:
+    reach = 1.7 * view.radius
+    shadow = {
+        "bias": -0.0004,
+        "normalBias": 0.01,
+        "radius": 2,
+        "mapSize": [2048, 2048],
+        "camera": {
+            "type": "OrthographicCamera",
+            "left": -reach,
+            "right": reach,
+            "top": reach,
+            "bottom": -reach,
+            "near": 0.1,
+            "far": 8 * view.radius,
+        },
+    }
+    x, y, z = view.sun
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]
+    return {
+        "type": "DirectionalLight",
+        "color": 0xFFFAF2,
+        "intensity": 0.62,
+        "matrix": matrix,
+        "castShadow": True,
+        "shadow": shadow,
+    }

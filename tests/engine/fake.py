@@ -1,0 +1,99 @@
+"""A simulator that costs nothing: the one seam where tests stand in for Drake."""
+
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.engine.bench import Bench
+from ddenv.engine.control import Control
+from ddenv.engine.driver import Driver
+from ddenv.engine.journal import Journal
+from ddenv.robot.result import RunResult
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import Live, RunFile, create
+from ddenv.world.load import load_scenario
+from ddenv.world.read import read_world
+from tests.conftest import DATA
+
+Oracle = Callable[[frozenset[str], int], str]
+
+
+def result(outcome: str, seed: int, x: float) -> RunResult:
+    """A run of 2 s that ends at (x, 0, 0)."""
+    trajectory = np.zeros((3, 8))
+    trajectory[:, 0], trajectory[:, 1], trajectory[:, 4] = (0, 1, 2), (0, x / 2, x), 1
+    failure = "timeout" if outcome == "failed" else ""
+    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed)
+
+
+class FakePool:
+    """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other" or "pass".
+
+    Tests finish in an order that `seed` shuffles, as they do on a busy machine.
+    """
+
+    def __init__(self, oracle: Oracle, jobs: int, seed: int = 0) -> None:
+        self.oracle, self.jobs, self.random = oracle, jobs, random.Random(seed)
+        self.running: list[tuple[int, frozenset[str], int]] = []
+        self.made: list[tuple[frozenset[str], int]] = []
+
+    @property
+    def idle(self) -> int:
+        return self.jobs - len(self.running)
+
+    @property
+    def busy(self) -> int:
+        return len(self.running)
+
+    def submit(self, test: int, keep: frozenset[str], seed: int) -> None:
+        assert self.idle
+        self.running.append((test, keep, seed))
+
+    def finished(self, seconds: float) -> list[tuple[int, RunResult]]:
+        if not self.running:
+            return []
+        test, keep, seed = self.running.pop(self.random.randrange(len(self.running)))
+        self.made.append((keep, seed))
+        outcome = self.oracle(keep, seed)
+        ends = {"similar": ("failed", 2.0), "other": ("failed", 9.0), "pass": ("pass", 4.0)}
+        return [(test, result(ends[outcome][0], seed, ends[outcome][1]))]
+
+    def live(self) -> list[Live]:
+        return []
+
+
+def new_run(folder: Path, **reduction) -> Path:
+    """A run file of the small world."""
+    scenario = load_scenario(DATA / "wall.yaml")
+    scenario = scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)})
+    path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
+    documents = {"world": scenario.world.read_bytes(), "robot": scenario.robot.model.read_bytes()}
+    create(path, documents | {"scenario": scenario.model_dump_json().encode()})
+    return path
+
+
+def drive(
+    path: Path, pool: FakePool, accept_mode: str | None = None, prepare: Callable[[RunFile], None] | None = None
+) -> RunState:
+    """Works on a run as the engine program does, in this process."""
+    from ddenv.engine.__main__ import _begin
+    from ddenv.launch import read_parts
+
+    with RunFile(path) as file:
+        scenario, world, _ = read_parts(file)
+        file.own()
+        journal = Journal(file)
+        _begin(journal, scenario, world, pool.jobs, accept_mode)
+        if prepare is not None:
+            prepare(file)
+        control = Control(journal, threading.Event())
+        Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
+        return journal.state
+
+
+ELEMENTS = read_world(DATA / "wall.sdf").elements()

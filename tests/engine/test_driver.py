@@ -1,0 +1,241 @@
+"""The engine's promises, on a simulator that costs nothing."""
+
+import tempfile
+from pathlib import Path
+from zlib import crc32
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddenv.engine.control import Stopped
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.world.scenario import PAIRS
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+
+
+def needs(*names):
+    return lambda keep, seed: "similar" if set(names) <= keep else "pass"
+
+
+def flaky(salt, *names):
+    """Shows f in most runs that have the needed models, sometimes something else, always the same for the same run."""
+
+    def oracle(keep, seed):
+        luck = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
+        if not set(names) <= keep:
+            return "other" if luck < 3 else "pass"
+        return "similar" if luck < 8 else "pass"
+
+    return oracle
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_every_pair_finds_the_needed_models(tmp_path, pair):
+    state = drive(new_run(tmp_path, pair=pair), FakePool(needs("wall", "beam"), 2))
+    assert set(state.environment) == {"wall", "beam"}
+    assert state.minimal
+    assert state.status == "finished"
+
+
+def test_workers_never_change_the_result(tmp_path):
+    for salt in range(5):
+        kept = {
+            drive(new_run(tmp_path), FakePool(flaky(salt, "wall", "ball"), jobs, seed)).environment
+            for jobs in (1, 2, 5)
+            for seed in (1, 2)
+        }
+        assert len(kept) == 1
+
+
+def test_one_worker_makes_no_test_for_nothing(tmp_path):
+    """On one worker, each test made is part of a verdict."""
+    state = drive(new_run(tmp_path), pool := FakePool(flaky(1, "wall"), 1))
+    assert len(pool.made) == len(set(pool.made)) == len(state.tests)
+    with RunFile(path := Path(tmp_path / "run-0.ddenv")) as file:
+        judged = {test for event in file.events() if event.kind == "candidate_judged" for test in event.data["tests"]}
+    assert path.exists()
+    assert judged == {test.id for test in state.tests if test.phase == "round"}
+
+
+def test_seeds_are_common_to_all_candidates(tmp_path):
+    state = drive(new_run(tmp_path, seed=40), FakePool(needs("wall"), 2))
+    assert {test.seed - test.run for test in state.tests} == {40}
+
+
+class Killed(Exception):
+    pass
+
+
+@given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@settings(max_examples=20)
+def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
+    with tempfile.TemporaryDirectory() as folder:
+        oracle = flaky(salt, "wall", "beam")
+        undisturbed = drive(new_run(Path(folder)), FakePool(oracle, jobs))
+        path, made = new_run(Path(folder)), []
+        for moment in moments:
+            pool = FakePool(oracle, jobs, moment)
+            try:
+                drive(path, pool, prepare=lambda file, after=moment: _kill(file, after))
+            except Killed:
+                made += _finished(path)[len(made) :]
+            else:
+                break
+        pool = FakePool(oracle, jobs)
+        state = fold(RunFile(path).events())
+        if state.status != "finished":
+            state = drive(path, pool)
+        assert state.environment == undisturbed.environment
+        assert state.minimal == undisturbed.minimal
+        finished = _finished(path)
+        assert len(finished) == len(set(finished))
+        assert not any(test.outcome == "running" for test in state.tests)
+
+
+def _kill(file, after):
+    """The next `after` events are written; then the engine is gone."""
+    append, count = file.append, [0]
+
+    def limited(*values):
+        count[0] += 1
+        if count[0] > after:
+            raise Killed
+        return append(*values)
+
+    file.append = limited
+
+
+def _finished(path):
+    """Each finished test as (models, run)."""
+    from ddenv.engine.journal import Journal
+
+    with RunFile(path) as file:
+        journal = Journal(file)
+        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
+
+
+def test_a_robot_that_does_not_fail_ends_the_run(tmp_path):
+    state = drive(new_run(tmp_path), FakePool(lambda *_: "pass", 2))
+    assert state.status == "finished"
+    assert not state.minimal
+    assert "reached its goal in all 3 baseline runs" in state.reason
+    assert state.rounds_done == 0
+
+
+def test_the_baseline_tells_the_rate_and_the_chance_to_miss(tmp_path):
+    def oracle(keep, seed):
+        return "pass" if seed == 4 else "other" if seed == 5 else "similar"
+
+    state = drive(new_run(tmp_path, baseline_runs=10, iterations=3), FakePool(oracle, 1))
+    assert (state.baseline.failures, state.baseline.runs) == (8, 10)
+    assert state.baseline.low == pytest.approx(0.4902, abs=1e-4)
+    assert state.baseline.miss_chance == pytest.approx(0.2**4)
+    assert [test.outcome for test in state.tests[:10]].count("other") == 1
+
+
+def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
+    path = new_run(tmp_path)
+    viewer = RunFile(path)
+
+    class Answering(FakePool):
+        """Rejects the first reduction it is asked about, accepts the others."""
+
+        asked: list = []
+
+        def finished(self, seconds):
+            state = fold(viewer.events())
+            if state.waiting_candidate is not None:
+                key = (state.round.number, state.waiting_candidate)
+                if key not in self.asked:
+                    viewer.send("reject" if not self.asked else "accept", round=key[0], candidate=key[1])
+                    self.asked.append(key)
+            return super().finished(seconds)
+
+    pool = Answering(needs("wall"), 1)
+    state = drive(path, pool, accept_mode="ask")
+    assert len(pool.asked) >= 2
+    assert state.environment == ("wall",)
+    with RunFile(path) as file:
+        decided = [event.data["decision"] for event in file.events() if event.kind == "decided"]
+        reduced = [(event.data["round"], event.data["candidate"]) for event in file.events() if event.kind == "reduced"]
+    assert decided[0] == "reject"
+    assert pool.asked[0] not in reduced
+    assert reduced == pool.asked[1:]
+
+
+def test_a_vetoed_candidate_is_not_run_and_the_end_is_not_called_minimal(tmp_path):
+    path = new_run(tmp_path)
+    viewer = RunFile(path)
+
+    class Vetoing(FakePool):
+        """Vetoes every candidate that leaves out the ball."""
+
+        def finished(self, seconds):
+            state = fold(viewer.events())
+            for one in () if state.round is None else state.round.candidates:
+                if "ball" not in one.models and not one.verdict and state.last_command == len(viewer.commands()):
+                    viewer.send("veto", round=state.round.number, candidate=one.index)
+                    return []
+            return super().finished(seconds)
+
+    state = drive(path, Vetoing(needs("wall"), 1))
+    assert set(state.environment) == {"wall", "ball"}
+    assert not state.minimal
+    assert "vetoed or rejected" in state.reason
+
+
+def test_steps_make_one_test_or_one_round_and_then_pause(tmp_path):
+    path = new_run(tmp_path)
+    viewer = RunFile(path)
+    pauses = []
+
+    class Stepping(FakePool):
+        """Pauses at once, then steps three tests, then a round, then stops."""
+
+        def finished(self, seconds):
+            state = fold(viewer.events())
+            if not viewer.commands():
+                viewer.send("pause")
+            elif state.status == "paused" and not self.busy and state.last_command == len(viewer.commands()):
+                pauses.append((len(state.finished_tests), state.rounds_done))
+                if len(pauses) == 5:
+                    viewer.send("stop")
+                else:
+                    viewer.send("step", unit="test" if len(pauses) < 4 else "round")
+            return super().finished(seconds)
+
+    with pytest.raises(Stopped):
+        drive(path, Stepping(needs("wall"), 2))
+    tests = [count for count, _ in pauses]
+    assert [after - before for before, after in zip(tests[:3], tests[1:4], strict=True)] == [1, 1, 1]
+    assert pauses[4][1] == pauses[3][1] + 1
+
+
+def test_an_old_stop_does_not_hold_a_new_engine(tmp_path):
+    path = new_run(tmp_path)
+    with RunFile(path) as viewer:
+        viewer.send("stop")
+        viewer.send("pause")
+    assert drive(path, FakePool(needs("wall"), 2)).minimal
+
+
+def test_commands_without_sense_are_marked_and_ignored(tmp_path):
+    path = new_run(tmp_path)
+    with RunFile(path) as viewer:
+        for kind, data in [
+            ("accept", {}),
+            ("veto", {"round": 9}),
+            ("accept_mode", {"mode": 3}),
+            ("dance", {}),
+            ("step", {"unit": 1}),
+        ]:
+            viewer.send(kind, **data)
+    state = drive(path, FakePool(needs("wall"), 2))
+    assert state.minimal
+    assert state.last_command == 5
+
+
+def test_elements_are_those_of_the_world(tmp_path):
+    assert drive(new_run(tmp_path), FakePool(needs("wall"), 1)).elements == ELEMENTS

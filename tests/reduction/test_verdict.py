@@ -1,0 +1,53 @@
+"""Speculation must never change a verdict."""
+
+import random
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.reduction.verdict import standing
+
+tables = st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=5)
+
+
+def in_order(table, iterations):
+    """What one worker finds: the winner, its run, and the tests it makes."""
+    made = []
+    for candidate, row in enumerate(table):
+        for run in range(1 + iterations):
+            made.append((candidate, run))
+            if row[run]:
+                return candidate, run, made
+    return None, None, made
+
+
+@given(table=tables, iterations=st.integers(0, 3), workers=st.integers(1, 4), seed=st.integers(0, 10**6))
+def test_any_number_of_workers_in_any_order_finds_what_one_worker_finds(table, iterations, workers, seed):
+    rng = random.Random(seed)
+    candidates = list(range(len(table)))
+    winner, evidence, made = in_order(table, iterations)
+    known, running = {}, []
+    for _ in range(1000):
+        now = standing(candidates, known, iterations)
+        if not now.wanted:
+            break
+        running += [test for test in now.wanted if test not in running][: workers - len(running)]
+        done = running.pop(rng.randrange(len(running)))
+        known[done] = table[done[0]][done[1]]
+    assert not now.wanted
+    assert now.winner == winner
+    if winner is not None:
+        assert now.evidence[winner] == evidence
+    assert set(made) <= set(known)
+    if workers == 1:
+        assert list(known) == made
+
+
+@given(table=tables, skipped=st.sets(st.integers(0, 4)))
+def test_skipped_candidates_need_no_test_and_cannot_win(table, skipped):
+    known = {(candidate, run): shown for candidate, row in enumerate(table) for run, shown in enumerate(row)}
+    now = standing(range(len(table)), known, 3, frozenset(skipped))
+    assert now.winner not in skipped
+    assert standing(range(len(table)), {}, 3, frozenset(range(5))).wanted == ()
+    rest = [candidate for candidate in range(len(table)) if candidate not in skipped and any(table[candidate])]
+    assert now.winner == (rest[0] if rest else None)

@@ -1,0 +1,147 @@
+"""The run file: what is in it stays, and what is no run file is told."""
+
+import sqlite3
+from array import array
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.state import partition_letter
+from ddenv.runfile.store import ROBOT, SCHEMA_VERSION, Event, Live, RunFile, create
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "a.ddenv"
+    create(path, {"world": b"<sdf/>"})
+    return path
+
+
+def test_documents_events_commands_and_motions_come_back(path):
+    with RunFile(path) as engine, RunFile(path) as viewer:
+        engine.own()
+        samples = array("d", range(16))
+        event = engine.append("test_finished", {"test": 1, "name": "Häuser"}, {ROBOT: samples.tobytes(), "board": b""})
+        assert viewer.events() == [event]
+        assert viewer.events(after=event.id) == []
+        assert viewer.motion(1) == samples
+        assert viewer.motions(1) == {ROBOT: samples, "board": array("d")}
+        assert viewer.motion(2) is None
+        assert viewer.document("world") == b"<sdf/>"
+        assert viewer.send("veto", round=1, candidate=2) == 1
+        assert [(one.kind, one.data) for one in engine.commands()] == [("veto", {"round": 1, "candidate": 2})]
+        engine.set_live([Live(1, 7, 0.5, (1.0, 2.0))])
+        assert viewer.live() == [Live(1, 7, 0.5, (1.0, 2.0))]
+
+
+def test_a_settled_run_is_one_file(path, tmp_path):
+    with RunFile(path) as file:
+        file.own()
+        file.append("paused", {})
+        file.settle()
+        copy = tmp_path / "copy.ddenv"
+        copy.write_bytes(path.read_bytes())
+    with RunFile(copy) as file:
+        assert [event.kind for event in file.events()] == ["paused"]
+
+
+def test_an_existing_file_is_never_overwritten(path):
+    before = path.read_bytes()
+    with pytest.raises(UserError, match="exists already"):
+        create(path, {})
+    assert path.read_bytes() == before
+
+
+def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        create(tmp_path / "file" / "a.ddenv", {})
+    with pytest.raises(UserError, match="cannot be written"):
+        create(tmp_path / ("n" * 300), {})
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_files_that_are_no_run_files(tmp_path):
+    with pytest.raises(UserError, match="no such run file"):
+        RunFile(tmp_path / "none.ddenv")
+    text = tmp_path / "text.ddenv"
+    text.write_text("hello " * 1000)
+    with pytest.raises(UserError, match="is no ddenv run file"):
+        RunFile(text)
+    other = tmp_path / "other.ddenv"
+    with sqlite3.connect(other) as database:
+        database.execute("CREATE TABLE t (x)")
+    with pytest.raises(UserError, match="is no ddenv run file"):
+        RunFile(other)
+
+
+def test_a_newer_file_is_refused(path):
+    with sqlite3.connect(path) as database:
+        database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+    with pytest.raises(UserError, match="written by a newer ddenv"):
+        RunFile(path)
+
+
+def test_damage_is_told_and_not_thrown(path):
+    with sqlite3.connect(path) as database:
+        database.execute("INSERT INTO event (time, kind, data) VALUES (0, 'paused', 'not json')")
+        database.execute("INSERT INTO motion VALUES (1, '', x'0102')")
+        database.execute("DELETE FROM document")
+    with RunFile(path) as file:
+        for read in (file.events, lambda: file.motion(1), lambda: file.document("world")):
+            with pytest.raises(UserError, match="damaged run file"):
+                read()
+
+
+def test_a_full_disk_is_one_line_and_loses_nothing(path):
+    with RunFile(path) as file:
+        file.own()
+        file.append("paused", {})
+        file._db.execute(f"PRAGMA max_page_count = {file._db.execute('PRAGMA page_count').fetchone()[0]}")
+        with pytest.raises(UserError, match=r"full; what is in it is intact"):
+            file.append("test_finished", {"test": 1, "x": "y" * 100_000}, {ROBOT: bytes(64_000)})
+        assert [event.kind for event in file.events()] == ["paused"]
+        assert file.motions(1) == {}
+
+
+def test_one_engine_a_run(path):
+    assert not engine_is_alive(path)
+    with engine_lock(path):
+        assert engine_is_alive(path)
+        with pytest.raises(UserError, match="another engine works on this run"), engine_lock(path):
+            pass
+    assert not engine_is_alive(path)
+
+
+def test_partition_letters_go_on_after_z():
+    assert [partition_letter(index) for index in (0, 25, 26, 51, 52, 701, 702)] == [
+        "A",
+        "Z",
+        "AA",
+        "AZ",
+        "BA",
+        "ZZ",
+        "AAA",
+    ]
+
+
+kinds = st.sampled_from(
+    ["created", "test_started", "test_finished", "round_started", "reduced", "vetoed", "decided", "x"]
+)
+values = st.recursive(st.none() | st.integers(-3, 5) | st.text(max_size=3), lambda inner: st.lists(inner, max_size=3))
+names = st.sampled_from(
+    ["test", "round", "candidate", "elements", "scenario", "partitions", "environment", "candidates"]
+)
+
+
+@given(entries=st.lists(st.tuples(kinds, st.dictionaries(names, values)), max_size=8))
+def test_events_that_make_no_sense_are_told_in_one_line(entries):
+    events = [Event(index + 1, 0.0, kind, data) for index, (kind, data) in enumerate(entries)]
+    try:
+        fold(events)
+    except UserError as error:
+        assert "damaged run file" in str(error)

@@ -1,0 +1,140 @@
+"""The page in a real browser: a headless Chromium, spoken to through its DevTools protocol, draws it with software GL."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import io
+import json
+import shutil
+import subprocess
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from PIL import Image
+from tornado.websocket import websocket_connect
+
+CHROMIUM = shutil.which("chromium")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
+
+_FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--remote-debugging-port=0",
+)
+
+
+@contextmanager
+def chromium(size: tuple[int, int]):
+    """A browser with an empty profile; gives the port of its protocol."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        words = [CHROMIUM, *_FLAGS, f"--user-data-dir={profile}", f"--window-size={size[0]},{size[1]}", "about:blank"]
+        process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        try:
+            yield _protocol_port(Path(profile) / "DevToolsActivePort")
+        finally:
+            process.terminate()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def _protocol_port(file: Path) -> int:
+    deadline = time.monotonic() + 15
+    while time.monotonic() < deadline:
+        if file.exists() and (lines := file.read_text().splitlines()):
+            return int(lines[0])
+        time.sleep(0.05)
+    raise TimeoutError("chromium did not start")
+
+
+class Page:
+    """One tab. `do` sends a command of the protocol and gives its result."""
+
+    def __init__(self, connection) -> None:
+        self._connection = connection
+        self._count = 0
+
+    @classmethod
+    async def open(cls, port: int) -> Page:
+        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=5) as answer:
+            tabs = json.load(answer)
+        address = next(tab["webSocketDebuggerUrl"] for tab in tabs if tab["type"] == "page")
+        return cls(await websocket_connect(address, max_message_size=100_000_000))
+
+    async def do(self, method: str, **parameters):
+        self._count += 1
+        await self._connection.write_message(json.dumps({"id": self._count, "method": method, "params": parameters}))
+        while True:
+            message = await self._connection.read_message()
+            if message is None:
+                raise ConnectionError("the browser is gone")
+            answer = json.loads(message)
+            if answer.get("id") == self._count:
+                if "error" in answer:
+                    raise RuntimeError(answer["error"])
+                return answer["result"]
+
+    async def value(self, expression: str):
+        """What a JavaScript expression gives, promises awaited."""
+        result = await self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        return result["result"].get("value")
+
+    async def screenshot(self) -> bytes:
+        """The picture, as PNG."""
+        return base64.b64decode((await self.do("Page.captureScreenshot", format="png"))["data"])
+
+
+def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> int:
+    """How many pixels are of about this colour."""
+    return int((np.abs(picture.astype(int) - color).max(axis=2) <= reach).sum())
+
+
+async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
+    writer.baseline()
+    writer.round()
+    writer.reduce()
+    process = start_scene(writer.path)
+    url = process.stdout.readline().strip()
+    with chromium((900, 600)) as port:
+        page = await Page.open(port)
+        await page.do("Page.navigate", url=url)
+        deadline = time.monotonic() + 20
+        ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
+        while not await page.value(ready):
+            assert time.monotonic() < deadline, "the page does not draw"
+            await asyncio.sleep(0.1)
+        assert await page.value("document.title") == "small · ddenv"
+        assert await page.value("document.querySelector('#caption .models').textContent") == "2 of 4 models"
+        assert await page.value("viewer.scene_tree.find(['world', 'models', '003 board']).object.visible") is False
+        assert await page.value("viewer.scene_tree.find(['world', 'removed', '003 board']).object.visible") is True
+        await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
+        picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))
+        process.terminate()
+        process.wait(5)
+        await asyncio.sleep(0.3)
+        assert await page.value("document.getElementById('lost').style.display") == "block"
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 200
+    assert near(picture, (240, 190, 20)) > 100, "the robot's yellow"
+    assert near(picture, (20, 180, 75)) > 100, "the goal's green"
+    assert near(picture, (235, 40, 35)) > 100, "the failure's red"

@@ -1,0 +1,179 @@
+"""The world on the stage: what is sent to browsers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import umsgpack
+
+from ddenv.runfile.fold import fold
+from ddenv.scene.draw import Scenery, outline, paint, path_on_ground, safe_name
+from ddenv.scene.follow import shot
+from ddenv.scene.mesh import box, merge
+from ddenv.scene.player import Player
+from ddenv.scene.stage import Stage
+from ddenv.scene.view import view
+from ddenv.world.bundled import SDF
+from ddenv.world.pose import Pose
+from ddenv.world.read import read_model, read_world
+
+ROBOT = read_model(SDF / "robots" / "husky.sdf")
+
+
+class Screen:
+    """A browser that keeps what it is told, as Meshcat's viewer does."""
+
+    def __init__(self) -> None:
+        self.things: dict[str, dict] = {}
+        self.visible: dict[str, bool] = {}
+        self.poses: dict[str, np.ndarray] = {}
+        self.count = 0
+
+    def take(self, message: bytes, _: bool = False) -> None:
+        self.count += 1
+        command = umsgpack.unpackb(message, ext_handlers={code: lambda ext: ext for code in range(0x11, 0x19)})
+        kind, path = command["type"], command["path"]
+        if kind == "set_object":
+            self.things[path] = command["object"]
+        elif kind == "set_transform":
+            self.poses[path] = np.array(command["matrix"]).reshape(4, 4).T
+        elif kind == "delete":
+            for kept in (self.things, self.visible, self.poses):
+                for key in [key for key in kept if key == path or key.startswith(path + "/")]:
+                    del kept[key]
+        elif command["property"] == "visible":
+            self.visible[path] = command["value"]
+
+    def shown(self, folder: str) -> set[str]:
+        return {path.rsplit("/", 1)[-1] for path, on in self.visible.items() if on and f"/{folder}/" in path}
+
+
+@pytest.fixture
+def screen() -> Screen:
+    return Screen()
+
+
+def test_a_model_is_one_mesh(small_world):
+    assert [len(item.mesh.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
+    assert len(paint(ROBOT)) == 1
+
+
+def test_the_ditch_is_few_and_small_messages(screen):
+    world = read_world(SDF / "worlds" / "ditch.sdf")
+    Scenery(Stage(screen.take), world, ROBOT, world.elements())
+    models = [path for path in screen.things if path.startswith("/world/models/")]
+    assert len(models) == 43
+    assert len(screen.things) < 3 * 43 + 10
+
+
+def test_names_are_safe_in_paths_and_pages():
+    assert safe_name(3, "tile/é <b>1</b>") == "003 tile_é _b_1__b_"
+    assert "/" not in safe_name(0, "/" * 100)
+
+
+def test_outline_is_turned_as_the_model():
+    class Turned:
+        pose = Pose.from_rpy(1, 2, 3, 0, 0, 0.7)
+
+    ends = outline(Turned, box((2, 1, 0.5)).at(Turned.pose))
+    assert ends.shape == (24, 3)
+    lengths = np.linalg.norm(ends[1::2] - ends[::2], axis=1)
+    assert sorted(np.round(lengths, 6)) == [0.5] * 4 + [1] * 4 + [2] * 4
+
+
+def test_a_change_of_environment_only_shows_and_hides(writer, screen, small_world):
+    stage = Stage(screen.take)
+    writer.baseline()
+    state = fold(writer.run.events())
+    scenery = Scenery(stage, small_world, ROBOT, state.elements)
+    scenery.show(shot(state, []))
+    assert len(screen.shown("models")) == 4
+    assert not screen.shown("removed") | screen.shown("left-out")
+    things = dict(screen.things)
+    writer.round()
+    writer.reduce()
+    scenery.show(shot(fold(writer.run.events()), []))
+    assert screen.shown("models") == {"001 left wall", "002 tile_é _b_1__b_"}
+    assert screen.shown("removed") == {"003 board", "004 asphalt"}
+    assert screen.things == things
+
+
+def test_models_that_moved_go_back(writer, screen, small_world):
+    stage = Stage(screen.take)
+    writer.baseline()
+    state = fold(writer.run.events())
+    scenery = Scenery(stage, small_world, ROBOT, state.elements)
+    first = small_world.model("board").links[0].pose
+    scenery.place_model("board", Pose((0.0, 0.0, 1.0)) @ first)
+    assert screen.poses["/world/models/003 board"][:3, 3] == pytest.approx((0, 0, 1))
+    scenery.show(shot(state, []))
+    assert screen.poses["/world/models/003 board"] == pytest.approx(np.eye(4))
+    scenery.place_model("nobody", Pose())
+
+
+def test_heights_of_surfaces(screen, small_world):
+    scenery = Scenery(Stage(screen.take), small_world, ROBOT, small_world.elements())
+    assert scenery.height(6, 0) == pytest.approx(0.5)
+    assert scenery.height(-5, 0) == 0
+
+
+def test_trail_sends_only_its_last_piece_again(screen, small_world):
+    scenery = Scenery(Stage(screen.take), small_world, ROBOT, small_world.elements())
+    rows = np.zeros((100, 8))
+    rows[:, 1], rows[:, 4] = np.arange(100) * 0.1, 1.0
+    scenery.trail(rows[:80])
+    before = dict(screen.things)
+    scenery.trail(rows)
+    changed = {path for path in screen.things if screen.things[path] != before.get(path)}
+    assert changed == {"/world/trail/3", "/world/trail/4"}
+    scenery.trail(rows[:1])
+    assert not any(path.startswith("/world/trail") for path in screen.things)
+
+
+def test_path_on_ground_is_below_a_tilted_robot():
+    upright = np.array([[0, 0, 0, 1, 1, 0, 0, 0.0]])
+    on_its_side = np.array([[0, 0, 0, 1, 0.5**0.5, 0.5**0.5, 0, 0]])
+    assert path_on_ground(upright, -0.5)[0] == pytest.approx((0, 0, 0.55))
+    assert path_on_ground(on_its_side, -0.5)[0] == pytest.approx((0, 0.45, 1))
+
+
+def test_a_late_browser_gets_the_same(writer, screen):
+    writer.baseline()
+    writer.round()
+    writer.reduce()
+    stage = Stage(screen.take)
+    words = {}
+    player = Player(writer.run, stage, lambda **given: words.update(given))
+    for step in range(40):
+        player.tick(10 + 0.1 * step)
+    late = Screen()
+    for message in stage.messages():
+        late.take(message)
+    assert late.things.keys() == screen.things.keys()
+    assert late.visible == screen.visible
+    assert late.poses.keys() == screen.poses.keys()
+    assert words["title"].startswith("the failure in what is left · test 2 · similar")
+    assert words["models"] == "2 of 4 models"
+    assert screen.poses["/world/models/003 board"][:3, 3] != pytest.approx((0, 0, 0))
+
+
+def test_the_stage_does_not_grow(writer, screen):
+    writer.baseline()
+    stage = Stage(screen.take)
+    player = Player(writer.run, stage, lambda **_: None)
+    player.tick(10)
+    count = len(stage.messages())
+    for step in range(200):
+        player.tick(10 + 0.2 * step)
+    assert len(stage.messages()) <= count + 1
+
+
+def test_the_camera_sees_the_robot_go_to_the_right():
+    seen = view((0.0, 0.0, 0.0), (10.0, 0.0, 0.0))
+    assert seen.center == (5, 0, 0)
+    assert seen.camera[1] < 0 < seen.camera[2]
+    assert view((1.0, 1.0, 0.0), (1.0, 1.0, 0.0)).radius > 0
+
+
+def test_all_meshes_of_the_robot_are_finite():
+    assert np.isfinite(merge([item.mesh for item in paint(ROBOT)]).vertices).all()

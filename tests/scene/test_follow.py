@@ -1,0 +1,142 @@
+"""What is shown: pure functions of the run's state, the running tests and the time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import Live
+from ddenv.scene.follow import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot
+
+
+def live(test: int, slot: int = 0) -> Live:
+    return Live(slot, test, 1.0, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+
+
+def state_of(writer):
+    return fold(writer.run.events())
+
+
+def test_before_the_first_run_the_robot_is_at_its_start(writer):
+    found = shot(state_of(writer), [])
+    assert (found.kind, found.test) == ("start", None)
+    assert len(found.models) == 4
+    assert not found.left_out | found.removed
+
+
+def test_a_running_baseline_shows_the_whole_world(writer):
+    writer.run.append("engine_started", {"pid": 1, "jobs": 1})
+    writer.start_test(1)
+    found = shot(state_of(writer), [live(1)])
+    assert (found.kind, found.test, len(found.models)) == ("live", 1, 4)
+    assert found.title == "baseline · test 1 · runs now"
+
+
+def test_the_failure_is_shown_again_when_nothing_runs(writer):
+    writer.baseline()
+    found = shot(state_of(writer), [])
+    assert (found.kind, found.test, len(found.models)) == ("replay", 1, 4)
+
+
+def test_a_running_candidate_shows_its_own_environment(writer):
+    writer.baseline()
+    writer.round()
+    writer.start_test(2, candidate=1, run=1)
+    found = shot(state_of(writer), [live(2)])
+    assert found.models == {"board", "asphalt"}
+    assert found.left_out == {"left wall", "tile/é <b>1</b>"}
+    assert not found.removed
+    assert found.title == "round 1 · part B · test 2 · re-run 1 · runs now"
+
+
+def test_after_a_reduction_the_evidence_is_shown_in_what_is_left(writer):
+    writer.baseline()
+    writer.round()
+    writer.reduce()
+    found = shot(state_of(writer), [])
+    assert (found.kind, found.test) == ("replay", 2)
+    assert found.models == {"left wall", "tile/é <b>1</b>"}
+    assert found.removed == {"board", "asphalt"}
+    assert not found.left_out
+
+
+def test_a_reduction_that_waits_is_shown(writer):
+    writer.baseline()
+    writer.round()
+    writer.start_test(2, candidate=0)
+    writer.finish_test(2, "similar")
+    writer.run.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
+    writer.run.append("waiting", {"candidate": 0})
+    found = shot(state_of(writer), [])
+    assert (found.kind, found.test) == ("replay", 2)
+    assert found.left_out == {"board", "asphalt"}
+
+
+def test_a_test_is_shown_to_its_end(writer):
+    writer.baseline()
+    writer.round()
+    writer.start_test(2, candidate=0)
+    writer.start_test(3, candidate=1)
+    state = state_of(writer)
+    first = shot(state, [live(3)])
+    assert shot(state, [live(2, 0), live(3, 1)], first).test == 3
+    assert shot(state, [live(2, 0)], first).test == 2
+
+
+def test_between_two_tests_the_last_one_stays_for_a_while(writer):
+    writer.baseline()
+    writer.round()
+    writer.start_test(2, candidate=0)
+    running = shot(state_of(writer), [live(2)])
+    writer.finish_test(2, "pass")
+    state = state_of(writer)
+    assert shot(state, [live(2)], running, HOLD / 2) == running
+    assert shot(state, [], running, HOLD + 1).kind == "replay"
+    assert shot(replace(state, status="paused"), [], running, 0.0).kind == "replay"
+
+
+def test_rows_of_unknown_and_finished_tests_are_ignored(writer):
+    writer.baseline()
+    assert shot(state_of(writer), [live(1), live(7), live(0), live(-1)]).kind == "replay"
+
+
+@given(st.floats(0, 1e6), st.floats(0.0, 200))
+def test_replay_time_stays_within_the_run(elapsed, length):
+    assert 0 <= replay_time(elapsed, length) <= length
+
+
+def test_a_replay_pauses_at_its_end_and_begins_again():
+    length = 20.0
+    assert replay_time(1.0, length) == pytest.approx(SPEED)
+    assert replay_time(length / SPEED + PAUSE / 2, length) == length
+    assert replay_time(length / SPEED + PAUSE + 1.0, length) == pytest.approx(SPEED)
+
+
+def turn(yaw: float) -> list[float]:
+    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+
+
+def test_poses_between_rows():
+    rows = np.array([[0.0, 0, 0, 0, *turn(0.0)], [2.0, 4, 0, 0, *(-part for part in turn(1.0))]])
+    assert pose_at(rows, 1.0).position == pytest.approx((2, 0, 0))
+    assert pose_at(rows, 1.0).yaw() == pytest.approx(0.5)
+    assert pose_at(rows, -1.0).position == pytest.approx((0, 0, 0))
+    assert pose_at(rows, 9.0).position == pytest.approx((4, 0, 0))
+    assert pose_at(rows[:1], 1.0).position == (0, 0, 0)
+
+
+@given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.floats(0, 1))
+def test_rotations_stay_of_unit_length(quaternion, part):
+    rows = np.array([[0.0, 0, 0, 0, *turn(0.3)], [1.0, 0, 0, 0, *quaternion]])
+    length = math.hypot(*pose_at(rows, part).quaternion)
+    assert length == pytest.approx(1.0) or length == 0.0
+
+
+def test_live_pose():
+    assert live_pose(Live(0, 1, 0.0, (1.0, 2.0, 3.0, 2.0, 0.0, 0.0, 0.0))).quaternion == (1, 0, 0, 0)

@@ -1,0 +1,120 @@
+"""Triangles of shapes: closed, facing outwards, with the right volume, at the right place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddenv.scene import mesh
+from ddenv.world.model import Box, Cylinder, Plane, Sphere
+from ddenv.world.pose import Pose
+
+size = st.floats(0.01, 50.0)
+place = st.floats(-30.0, 30.0)
+angle = st.floats(-math.pi, math.pi)
+pose = st.builds(Pose.from_rpy, place, place, place, angle, angle, angle)
+
+
+def volume(shape: mesh.Mesh) -> float:
+    """By the divergence theorem: above zero only if the faces close up and face outwards."""
+    a, b, c = np.moveaxis(shape.triangles - shape.vertices.mean(axis=0), 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def area_vector(shape: mesh.Mesh) -> np.ndarray:
+    """The sum of the faces' normals, times area: zero for a closed surface."""
+    a, b, c = np.moveaxis(shape.triangles, 1, 0)
+    return np.cross(b - a, c - a).sum(axis=0) / 2
+
+
+@given(st.tuples(size, size, size), pose)
+def test_box_has_its_volume_and_place(sides, at):
+    shape = mesh.of_shape(Box(sides)).at(at)
+    assert len(shape.faces) == 12
+    assert volume(shape) == pytest.approx(math.prod(sides), rel=1e-6)
+    assert shape.vertices.mean(axis=0) == pytest.approx(at.position, abs=1e-9)
+    back = shape.at(at.inverse()).vertices
+    assert np.abs(back).max(axis=0) == pytest.approx(np.array(sides) / 2, rel=1e-6)
+
+
+def test_box_corners_are_not_shared_between_sides():
+    shape = mesh.box((1, 2, 3))
+    for corners, face in zip(shape.triangles, shape.faces, strict=True):
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        same = [other for other in shape.faces if set(other) & set(face)]
+        for other in same:
+            a, b, c = shape.vertices[other]
+            assert np.cross(np.cross(b - a, c - a), normal) == pytest.approx([0, 0, 0])
+
+
+@given(size, size, pose)
+def test_cylinder_lies_along_z(radius, length, at):
+    shape = mesh.of_shape(Cylinder(radius, length)).at(at)
+    sides = mesh.SIDES
+    polygon = sides / 2 * math.sin(2 * math.pi / sides) * radius**2
+    assert volume(shape) == pytest.approx(polygon * length, rel=1e-6)
+    own = shape.at(at.inverse()).vertices
+    assert np.abs(own[:, 2]).max() == pytest.approx(length / 2, rel=1e-6)
+    assert np.hypot(own[:, 0], own[:, 1]).max() == pytest.approx(radius, rel=1e-6)
+
+
+@given(size, pose)
+def test_sphere_is_almost_round(radius, at):
+    shape = mesh.of_shape(Sphere(radius)).at(at)
+    assert 0.95 < volume(shape) / (4 / 3 * math.pi * radius**3) < 1.0
+    distances = np.linalg.norm(shape.vertices - at.position, axis=1)
+    assert distances == pytest.approx(np.full(len(distances), radius), rel=1e-6)
+
+
+@given(st.lists(st.tuples(size, pose), min_size=1, max_size=5))
+def test_merged_meshes_keep_all_faces(parts):
+    meshes = [mesh.box((side, side, side)).at(at) for side, at in parts]
+    whole = mesh.merge(meshes)
+    assert np.allclose(whole.triangles, np.concatenate([part.triangles for part in meshes]))
+
+
+def test_nothing_merges_to_nothing():
+    assert len(mesh.merge([]).faces) == 0
+    assert len(mesh.of_shape(Plane((1.0, 1.0))).faces) == 0
+
+
+def test_ring_is_closed_and_faces_outwards():
+    shape = mesh.ring(1.0, 0.1)
+    assert 0.8 < volume(shape) / (2 * math.pi**2 * 0.05**2) < 1.0
+    assert area_vector(shape) == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+def test_tube_follows_the_path():
+    points = np.column_stack([np.linspace(0, 2, 101), np.zeros(101), np.ones(101)])
+    shape = mesh.tube(points, 0.02)
+    assert shape.vertices[:, 0].min() == pytest.approx(0.0)
+    assert shape.vertices[:, 0].max() == pytest.approx(2.0, abs=mesh.TUBE_STEP)
+    assert np.hypot(shape.vertices[:, 1], shape.vertices[:, 2] - 1) == pytest.approx(np.full(len(shape.vertices), 0.02))
+    assert volume(shape) > 0
+
+
+@pytest.mark.parametrize("count", [0, 1, 50])
+def test_a_robot_that_stands_still_leaves_no_tube(count):
+    assert len(mesh.tube(np.ones((count, 3)), 0.02).faces) == 0
+
+
+def test_a_vertical_path_has_a_tube():
+    points = np.column_stack([np.zeros(20), np.zeros(20), np.linspace(0, 1, 20)])
+    assert np.isfinite(mesh.tube(points, 0.02).vertices).all()
+
+
+@settings(max_examples=50)
+@given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.floats(-0.5, 0.5))
+def test_height_of_a_slope(x, y, pitch):
+    slope = mesh.box((4, 4, 0.2)).at(Pose.from_rpy(0, 0, 1, 0, pitch, 0))
+    expected = 1 - x * math.tan(pitch) + 0.1 / math.cos(pitch)
+    assert mesh.height_at(slope, x, y) == pytest.approx(expected, abs=1e-6)
+
+
+def test_no_height_beside_the_mesh():
+    assert mesh.height_at(mesh.box((1, 1, 1)), 3, 0) is None
+    assert mesh.height_at(mesh.EMPTY, 0, 0) is None

@@ -1,0 +1,69 @@
+"""Scenarios: what is wrong is told with file, key, value and what is allowed."""
+
+import pytest
+import yaml
+
+from ddenv.errors import UserError
+from ddenv.world.bundled import bundled_names
+from ddenv.world.load import find_scenario, load_scenario
+from tests.conftest import DATA
+
+GOOD = yaml.safe_load((DATA / "wall.yaml").read_text())
+
+
+def load(tmp_path, **changes):
+    path = tmp_path / "s.yaml"
+    path.write_text(yaml.safe_dump(GOOD | changes))
+    return load_scenario(path)
+
+
+def test_every_bundled_scenario_loads():
+    assert "ditch" in bundled_names()
+    for name in bundled_names():
+        scenario = load_scenario(find_scenario(name))
+        assert scenario.world.is_file()
+        assert scenario.robot.model.is_file()
+
+
+def test_file_names_are_relative_to_the_scenario():
+    assert load_scenario(DATA / "wall.yaml").world == DATA / "wall.sdf"
+
+
+WRONG = {
+    "typo": ({"goall": {}}, r"goall: unknown key \(did you mean goal\?\); allowed are"),
+    "inner typo": ({"reduction": {"iteration": 3}}, r"reduction.iteration: unknown key \(did you mean iterations\?\)"),
+    "pair": (
+        {"reduction": {"pair": "model2model/falure-proximal"}},
+        r"did you mean model2model/failure-proximal\?\); use one of",
+    ),
+    "iterations": (
+        {"reduction": {"iterations": -1}},
+        "reduction.iterations: should be greater than or equal to 0, found -1",
+    ),
+    "timeout": ({"failure": {"timeout": 0}}, "failure.timeout: should be greater than 0, found 0"),
+    "infinite": ({"failure": {"timeout": float("inf")}}, "failure.timeout: should be a finite number"),
+    "word": ({"goal": {"x": "far", "y": 0}}, "goal.x: .*found 'far'"),
+    "missing": ({"goal": {"x": 1}}, "goal.y: is missing"),
+    "partitions": ({"reduction": {"n_partitions": 1}}, "n_partitions: should be greater than or equal to 2"),
+}
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG.values(), ids=WRONG.keys())
+def test_a_wrong_value_is_told_with_its_key(tmp_path, changes, words):
+    with pytest.raises(UserError, match=words) as caught:
+        load(tmp_path, **changes)
+    assert str(caught.value).startswith(str(tmp_path / "s.yaml"))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2", "just words", "a: !!python/object:os.system {}", "\x00", "[" * 5000])
+def test_a_file_that_is_no_scenario(tmp_path, text):
+    path = tmp_path / "s.yaml"
+    path.write_text(text)
+    with pytest.raises(UserError, match="s.yaml"):
+        load_scenario(path)
+
+
+def test_an_unknown_name_lists_the_known_ones():
+    with pytest.raises(UserError, match=r"no scenario 'dich' \(did you mean ditch\?\); bundled are"):
+        find_scenario("dich")
