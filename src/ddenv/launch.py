@@ -176,7 +176,12 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
 
 
 def start_scene(run: Path, port: int = 0) -> subprocess.Popen:
-    """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1."""
+    """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
+
+    It ends with the program that started it. An empty first line means that it could not start: its log says why.
+    """
     words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port)]
     with run.with_name(f"{run.name}.scene.log").open("ab") as log:
-        return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True)
+        return subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+        )

@@ -60,7 +60,7 @@ def test_a_wrong_value_is_told_with_its_key(tmp_path, changes, words):
 def test_a_file_that_is_no_scenario(tmp_path, text):
     path = tmp_path / "s.yaml"
     path.write_text(text)
-    with pytest.raises(UserError, match="s.yaml"):
+    with pytest.raises(UserError, match=r"s\.yaml"):
         load_scenario(path)
 
 

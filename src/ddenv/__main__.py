@@ -1,0 +1,5 @@
+"""`python -m ddenv` is `ddenv`."""
+
+from ddenv.cli import main
+
+main()

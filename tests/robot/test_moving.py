@@ -1,0 +1,117 @@
+"""Worlds with models that move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddenv.robot.template import Template
+from ddenv.world.model import World
+
+BOARD = "0.9 0.09 0.04"
+
+
+SECTIONS = {"failure": {"timeout": 4.0}, "goal": {"x": 9, "y": 0}}
+
+
+@pytest.fixture(scope="module")
+def boards_world(world_of, box) -> World:
+    """A board in the robot's way, a pile of two beside it, a crate far away."""
+    return world_of(
+        box("in_the_way", "1.2 0 0.02 0 0 1.57", BOARD, mass=2.0),
+        box("lower", "1 3 0.02 0 0 0", BOARD, mass=2.0),
+        box("upper", "1 3 0.06 0 0 0.6", BOARD, mass=2.0),
+        box("crate", "1.6 -3 0.25 0 0 0", "0.5 0.5 0.5", mass=10.0),
+    )
+
+
+@pytest.fixture(scope="module")
+def boards(boards_world, husky, scenario_of) -> Template:
+    return Template(boards_world, husky, scenario_of(**SECTIONS))
+
+
+ALL = frozenset({"in_the_way", "lower", "upper", "crate"})
+
+
+def position(boards: Template, name: str) -> np.ndarray:
+    plant = boards._built.plant
+    return plant.EvalBodyPoseInWorld(boards._plant_context, boards._built.moving[name].base).translation()
+
+
+def test_boards_at_rest_do_not_creep(boards):
+    boards.run(ALL, seed=1)
+    assert np.linalg.norm(position(boards, "lower") - (1, 3, 0.02)) < 0.01
+    assert np.linalg.norm(position(boards, "upper") - (1, 3, 0.06)) < 0.01
+    assert np.linalg.norm(position(boards, "crate") - (1.6, -3, 0.25)) < 0.01
+
+
+def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(boards):
+    result = boards.run(ALL, seed=1)
+    rows = result.motions["in_the_way"]
+    assert rows[:, 0] == pytest.approx(result.trajectory[:, 0])
+    assert rows[0, 1:4] == pytest.approx([1.2, 0, 0.02])
+    assert np.linalg.norm(rows[-1, 1:4] - rows[0, 1:4]) > 0.001
+    assert "crate" not in result.motions
+
+
+def test_a_removed_board_is_passed_through_and_carries_nothing(boards):
+    result = boards.run(ALL - {"in_the_way", "lower"}, seed=1)
+    assert set(result.motions) == {"upper"}
+    # Nothing carries the upper board any more: it lies on the ground.
+    assert result.motions["upper"][-1, 3] == pytest.approx(0.02, abs=0.003)
+    assert abs(result.trajectory[1:, 3] - 0.1323).max() < 0.01
+
+
+def test_switching_off_a_moving_model_is_as_building_without_it(boards, boards_world, husky, scenario_of):
+    kept = tuple(model for model in boards_world.models if model.name != "in_the_way")
+    smaller = Template(replace(boards_world, models=kept), husky, scenario_of(**SECTIONS))
+    keep = ALL - {"in_the_way"}
+    assert smaller.run(keep, seed=1).trajectory.tobytes() == boards.run(keep, seed=1).trajectory.tobytes()
+
+
+def test_removed_models_come_back(boards):
+    before = boards.run(ALL, seed=1)
+    boards.run(frozenset(), seed=1)
+    after = boards.run(ALL, seed=1)
+    assert after.trajectory.tobytes() == before.trajectory.tobytes()
+    assert after.motions["in_the_way"].tobytes() == before.motions["in_the_way"].tobytes()
+
+
+def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box):
+    inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
+    side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
+    pair = (
+        f"<model name='pair'><pose>0 3 1 0 0 0</pose><link name='a'>{inertia}{side}</link>"
+        f"<link name='b'><pose>0 0 0.2 0 0 0</pose>{inertia}{side}</link>"
+        "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint></model>"
+    )
+    template = Template(world_of(pair), husky, scenario_of(failure={"timeout": 2.0}))
+    rows = template.run(frozenset({"pair"}), seed=1).motions["pair"]
+    assert rows[0, 1:4] == pytest.approx([0, 3, 1])
+    assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)
+    upper = template._built.plant.GetBodyByName("b")
+    assert template._built.plant.EvalBodyPoseInWorld(template._plant_context, upper).translation()[2] == pytest.approx(
+        0.3, abs=0.005
+    )
+    assert "pair" not in template.run(frozenset(), seed=1).motions
+
+
+def test_models_may_have_the_same_names_inside_and_hang_on_the_world(world_of, husky, scenario_of):
+    inertia = "<inertial><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz></inertia></inertial>"
+    side = "<collision name='c'><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>"
+    doors = [
+        f"<model name='{name}'><pose>0 {y} 1 0 0 0</pose><link name='a'>{inertia}<pose>0.3 0 0 0 0 0</pose>{side}</link>"
+        "<joint name='hinge' type='revolute'><pose>-0.3 0 0 0 0 0</pose><parent>world</parent><child>a</child>"
+        "<axis><xyz>0 1 0</xyz></axis></joint></model>"
+        for name, y in (("one", 3), ("two", -3))
+    ]
+    template = Template(world_of(*doors), husky, scenario_of(failure={"timeout": 1.0}))
+    result = template.run(frozenset({"one"}), seed=1)
+    assert set(result.motions) == {"one"}
+    swing = result.motions["one"][:, 1:4] - (0, 3, 1)
+    # It swings about its hinge, 0.3 m away, in its plane.
+    assert np.hypot(swing[:, 0], swing[:, 2]) == pytest.approx(np.full(len(swing), 0.3), abs=1e-6)
+    assert abs(swing[:, 1]).max() < 1e-6
+    assert swing[:, 2].min() < -0.25

@@ -1,0 +1,124 @@
+"""One template, many runs: how they end, and that no run leaves a trace in the next."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.robot.template import Template, lowest
+
+NOTHING = frozenset()
+
+
+def same(a, b) -> bool:
+    return a.outcome == b.outcome and a.failure == b.failure and a.trajectory.tobytes() == b.trajectory.tobytes()
+
+
+def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
+    result = Template(world_of(), husky, scenario_of()).run(NOTHING, seed=1)
+    assert (result.outcome, result.failure) == ("pass", "")
+    x, y, z, *_ = result.end_pose
+    assert np.hypot(x - 3.0, y) <= 0.5
+    # It stands on its wheels: their axes are 0.0328 m above the model's frame, and the tyres sink in by little.
+    assert z == pytest.approx(0.1651 - 0.0328, abs=0.005)
+    assert result.simulated_seconds == result.trajectory[-1, 0]
+    # 2.5 m at up to 1 m/s, with 1 m/s^2 at the start.
+    assert 2.5 < result.simulated_seconds < 4.0
+    assert result.motions == {}
+
+
+def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(world_of, husky, scenario_of):
+    scenario = scenario_of(failure={"timeout": 1.23}, controller={"period": 0.03})
+    trajectory = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory
+    assert trajectory.dtype == np.float64
+    assert trajectory[:, 0] == pytest.approx([*np.arange(13) * 0.1, 1.23])
+    assert trajectory[0, 1:4] == pytest.approx([0, 0, 0.14])
+    assert np.linalg.norm(trajectory[:, 4:], axis=1) == pytest.approx(np.ones(14))
+
+
+def test_turns_round_to_a_goal_behind_it(world_of, husky, scenario_of):
+    result = Template(world_of(), husky, scenario_of(goal={"x": -2.0, "y": 1.0})).run(NOTHING, seed=1)
+    assert result.outcome == "pass"
+
+
+def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
+    spawn = {"x": 1.5, "y": -2.0, "z": 0.14, "yaw": 1.0}
+    scenario = scenario_of(robot={"model": "husky.sdf", "spawn": spawn}, failure={"timeout": 0.1})
+    start = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory[0]
+    assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
+
+
+def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
+    blocked = template.run(frozenset({"wall"}), seed=1)
+    assert (blocked.outcome, blocked.failure) == ("failed", "timeout")
+    assert blocked.simulated_seconds == pytest.approx(10.0)
+    assert blocked.end_pose[0] < 1.1
+    assert template.run(NOTHING, seed=1).outcome == "pass"
+
+
+def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",)))
+    assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))
+    assert template.run(NOTHING, seed=1).failure == "timeout"
+
+
+def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
+    world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), ground=False)
+    result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(frozenset({"table"}), seed=1)
+    assert (result.outcome, result.failure) == ("failed", "fell")
+    assert result.end_pose[2] < lowest(world) - 2.0
+    assert result.simulated_seconds < 10.0
+
+
+def test_unknown_models_are_refused(world_of, husky, scenario_of):
+    with pytest.raises(ValueError, match="no such model: wal"):
+        Template(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
+
+
+def test_progress_is_told_every_row(world_of, husky, scenario_of):
+    told = []
+    template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
+    result = template.run(NOTHING, 1, lambda time_s, pose: told.append((time_s, *pose)))
+    assert np.array(told).tobytes() == result.trajectory.tobytes()
+
+
+def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):
+    template = Template(world_of(), husky, scenario_of())
+    before = template.run(NOTHING, seed=1)
+
+    def poison(time_s: float, _pose: tuple[float, ...]) -> None:
+        if time_s > 0.45:
+            state = template._plant_context.get_mutable_discrete_state_vector()
+            state.SetFromVector(np.full(state.size(), np.nan))
+
+    broken = template.run(NOTHING, 1, poison)
+    assert (broken.outcome, broken.failure) == ("error", "not-finite")
+    assert np.isfinite(broken.trajectory).all()
+    assert same(template.run(NOTHING, seed=1), before)
+
+
+def test_what_breaks_in_progress_is_the_callers(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
+    wall = frozenset({"wall"})
+    before = template.run(wall, seed=1)
+
+    def leave(*_: object) -> None:
+        raise KeyError("gone")
+
+    with pytest.raises(KeyError, match="gone"):
+        template.run(NOTHING, 1, leave)
+    # The wall, which that run had removed, is back.
+    assert same(template.run(wall, seed=1), before)
+
+
+def test_other_seeds_give_other_noise(world_of, husky, scenario_of):
+    template = Template(world_of(), husky, scenario_of())
+    assert not same(template.run(NOTHING, seed=1), template.run(NOTHING, seed=2))
+
+
+def test_a_world_drake_cannot_simulate_is_the_users(world_of, husky, scenario_of, box):
+    heavy = box("ghost", "2 2 0.5 0 0 0", "1 1 1", mass=1.0).replace("<inertial>", "<!--").replace("</inertial>", "-->")
+    with pytest.raises(UserError, match=r"ghost.*no <inertial>"):
+        Template(world_of(heavy), husky, scenario_of())

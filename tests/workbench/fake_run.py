@@ -1,0 +1,235 @@
+"""A run without a robot: writes into a run file what an engine would, step by step."""
+
+from __future__ import annotations
+
+import json
+import math
+from array import array
+from contextlib import ExitStack
+from itertools import pairwise
+from pathlib import Path
+
+from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.store import ROBOT, Live, RunFile, create
+from ddenv.world.read import parse_world
+
+ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
+<collision name="body"><geometry><box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"""
+SIZE = (1.2, 0.8, 0.3)
+
+
+def box(name: str, x: float, y: float, yaw: float = 0.0, size: tuple[float, float, float] = SIZE) -> str:
+    width, depth, height = size
+    return (
+        f'<model name="{name}"><static>true</static><pose>{x} {y} {height / 2} 0 0 {yaw}</pose><link name="link">'
+        f'<collision name="box"><geometry><box><size>{width} {depth} {height}</size></box></geometry></collision>'
+        f"</link></model>"
+    )
+
+
+GROUND = (
+    '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry>'
+    "<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
+)
+
+
+def world_text(names: list[str] | None = None) -> bytes:
+    """A floor, and eleven crates in a curve from the start at (-6, 0) to the goal at (6, 0)."""
+    names = names or [f"crate_{number:02}" for number in range(11)]
+    models = [GROUND, box("floor", 0, 0, size=(15, 8, 0.02))]
+    for number, name in enumerate(names):
+        x = -4.5 + 9 * number / max(1, len(names) - 1)
+        models.append(box(name, x, 2.2 * math.sin(1.3 * number), 0.3 * number))
+    return f'<sdf version="1.9"><world name="w">{"".join(models)}</world></sdf>'.encode()
+
+
+def scenario(protected: tuple[str, ...] = ("floor",), name: str = "crates") -> dict:
+    return {
+        "name": name,
+        "description": "A robot drives through crates and gets stuck on one of them.",
+        "world": "crates.sdf",
+        "robot": {"model": "robot.sdf", "spawn": {"x": -6.0, "y": 0.0, "z": 0.2, "yaw": 0.0}},
+        "goal": {"x": 6.0, "y": 0.0},
+        "reduction": {"pair": "model2model/failure-proximal", "iterations": 3, "baseline_runs": 4},
+        "protected": list(protected),
+    }
+
+
+class FakeRun:
+    """A run file and the events an engine would write. `with run.engine():` holds the lock as an engine does."""
+
+    def __init__(self, path: Path, data: dict | None = None, world: bytes | None = None) -> None:
+        data = data or scenario()
+        self.path, self.data = path, data
+        self.world = world or world_text()
+        documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
+        create(path, documents)
+        self.file = RunFile(path)
+        self.file.own()
+        self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
+        self.tests = 0
+        self.round = 0
+        self._stack = ExitStack()
+
+    def engine(self):
+        return engine_lock(self.path)
+
+    def hold(self) -> None:
+        """An engine is at work until `let_go`."""
+        self._stack.enter_context(self.engine())
+
+    def let_go(self) -> None:
+        self._stack.close()
+
+    def close(self) -> None:
+        self.let_go()
+        self.file.close()
+
+    def write(self, kind: str, **data) -> None:
+        self.file.append(kind, data)
+
+    def created(self) -> FakeRun:
+        self.write("created", scenario=self.data, elements=self.elements)
+        self.write("engine_started", pid=1, jobs=2)
+        return self
+
+    def start(self, candidate: int | None = None, run: int = 0) -> int:
+        """A test starts; in the baseline without a candidate."""
+        self.tests += 1
+        phase = "baseline" if candidate is None else "round"
+        number = None if candidate is None else self.round
+        self.write("test_started", test=self.tests, phase=phase, round=number, candidate=candidate, run=run, seed=run)
+        return self.tests
+
+    def finish(self, test: int, outcome: str, distance: float | None = None, wall: float = 2.0) -> None:
+        pose = [2.0, 0.4, 0.2, 1.0, 0.0, 0.0, 0.0]
+        event = {
+            "test": test,
+            "outcome": outcome,
+            "failure": "",
+            "distance": distance,
+            "end_pose": pose,
+            "simulated_seconds": 45.0,
+            "wall_seconds": wall,
+        }
+        self.file.append("test_finished", event, {ROBOT: path_samples().tobytes()})
+
+    def test(self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0) -> int:
+        number = self.start(candidate, run)
+        self.finish(number, outcome, distance)
+        return number
+
+    def live(self, *tests: tuple[int, float]) -> None:
+        """Tests run now: each (test, part of the way from 0 to 1)."""
+        rows = []
+        for slot, (test, part) in enumerate(tests):
+            t, x, y, z, *quaternion = path_samples()[8 * int(79 * part) :][:8]
+            rows.append(Live(slot, test, t, (x, y, z, *quaternion)))
+        self.file.set_live(rows)
+
+    def baseline(self, failures: int = 3, runs: int = 4) -> FakeRun:
+        tests = [self.test(None, "failed" if run < failures else "pass", run=run) for run in range(runs)]
+        outcomes = {test: "similar" if index < failures else "pass" for index, test in enumerate(tests)}
+        self.write(
+            "baseline_finished",
+            runs=runs,
+            failures=failures,
+            rate=failures / runs,
+            low=0.3,
+            high=0.95,
+            failure_test=tests[0],
+            position=[2.0, 0.4, 0.2],
+            miss_chance=(1 - failures / runs) ** 4,
+            iterations_95=2,
+            outcomes=outcomes,
+            distances=dict.fromkeys(tests[:failures], 0.1),
+        )
+        return self
+
+    def start_round(self, parts: int, environment: list[str] | None = None) -> None:
+        """A round of `parts` partitions of neighbours, each with its complement."""
+        self.round += 1
+        kept = [self.elements.index(name) for name in environment or self.elements]
+        cuts = [round(len(kept) * index / parts) for index in range(parts + 1)]
+        partitions = [kept[a:b] for a, b in pairwise(cuts)]
+        kinds = ("partition", "complement") if parts > 2 else ("partition",)
+        candidates = [[kind, index, 0.4 + 1.7 * index] for index in range(parts) for kind in kinds]
+        self.write(
+            "round_started",
+            round=self.round,
+            n_partitions=parts,
+            environment=kept,
+            partitions=partitions,
+            candidates=candidates,
+        )
+
+    def judge(self, candidate: int, verdict: str, tests: list[int], known: int = 0) -> None:
+        self.write("candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known)
+
+    def dissimilar(self, candidate: int) -> None:
+        tests = [self.test(candidate, "pass" if run % 2 else "other", 2.3, run) for run in range(4)]
+        self.judge(candidate, "dissimilar", tests)
+
+    def similar(self, candidate: int) -> int:
+        test = self.test(candidate, "similar", 0.12)
+        self.judge(candidate, "similar", [test])
+        return test
+
+    def reduce(self, candidate: int, environment: list[str], test: int) -> None:
+        numbers = [self.elements.index(name) for name in environment]
+        self.write("reduced", candidate=candidate, environment=numbers, evidence_test=test)
+        self.write("round_finished")
+
+
+def path_samples() -> array:
+    """The robot's way from the start to where it gets stuck, 80 samples in 45 s."""
+    rows = array("d")
+    for number in range(80):
+        part = number / 79
+        x, y = -6 + 8 * part, 1.2 * math.sin(3 * part) + 0.25 * part
+        yaw = math.atan2(3.6 * math.cos(3 * part) + 0.25, 8)
+        rows.extend((45 * part, x, y, 0.2, math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+    return rows
+
+
+def mid_round(run: FakeRun) -> FakeRun:
+    """Round 2 with one part judged and a re-run under way."""
+    run.created().baseline()
+    run.start_round(2)
+    test = run.similar(0)
+    left = run.elements[:6]
+    run.reduce(0, left, test)
+    run.start_round(3, left)
+    run.dissimilar(0)
+    run.test(1, "pass")
+    first = run.start(1, 1)
+    second = run.start(2, 0)
+    run.live((first, 0.6), (second, 0.25))
+    return run
+
+
+def waiting(run: FakeRun) -> FakeRun:
+    """Round 1: the first part shows f, and waits for the user."""
+    run.created().baseline()
+    run.write("accept_mode", mode="ask")
+    run.start_round(3)
+    run.similar(0)
+    run.write("waiting", candidate=0)
+    return run
+
+
+def finished(run: FakeRun) -> FakeRun:
+    """A run that ended with two models."""
+    run.created().baseline()
+    left = run.elements
+    for keep, parts in ((6, 2), (2, 3)):
+        run.start_round(parts, left)
+        test = run.similar(0)
+        left = left[:keep]
+        run.reduce(0, left, test)
+    run.start_round(2, left)
+    run.dissimilar(0)
+    run.dissimilar(1)
+    run.write("round_finished")
+    run.write("finished", minimal=True, reason="no candidate showed f")
+    return run

@@ -1,0 +1,122 @@
+import math
+
+import numpy as np
+import pytest
+from fake_run import box, world_text
+
+from ddenv.workbench.footprints import convex_hull, footprints
+from ddenv.workbench.raster import EMPTY, View, arrow, braille, fit, heading, masks, owners
+from ddenv.world.read import parse_world
+
+VIEW = View(0.0, 0.0, 0.5, 20, 8)
+
+
+def prints_of(*models: str):
+    text = f'<sdf version="1.9"><world name="w">{"".join(models)}</world></sdf>'.encode()
+    return footprints(parse_world(text, "w.sdf"))
+
+
+def grid_of(*models: str, view: View = VIEW):
+    return owners(masks(prints_of(*models), view), view)
+
+
+def test_a_box_fills_the_pixels_it_covers():
+    grid = grid_of(box("a", 0, 0, size=(2, 1, 1)))
+    rows, columns = np.nonzero(grid == 0)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (7, 8, 8, 11)
+
+
+def test_a_turned_box_covers_the_same_area():
+    grid = grid_of(box("a", 0, 0, yaw=math.pi / 4, size=(4, 4, 1)))
+    assert (grid == 0).sum() * VIEW.scale**2 == pytest.approx(16, rel=0.15)
+
+
+def test_up_is_the_greater_y_and_right_the_greater_x():
+    assert VIEW.cell(4.9, 3.9) == (0, 19)
+    assert VIEW.cell(-4.9, -3.9) == (7, 0)
+    assert VIEW.cell(5.1, 0) is None
+
+
+def test_small_models_lie_on_top_of_large_ones():
+    grid = grid_of(box("small", 0, 0, size=(1, 1, 1)), box("large", 0, 0, size=(6, 6, 1)))
+    assert grid[8, 10] == 1
+    assert grid[3, 5] == 0
+
+
+def test_only_what_is_drawn_owns_a_pixel():
+    filled = masks(prints_of(box("a", 0, 0)), VIEW)
+    assert (owners(filled, VIEW, []) == EMPTY).all()
+
+
+def test_a_model_smaller_than_a_pixel_still_shows():
+    grid = grid_of(box("pebble", 0.3, 0.3, size=(0.02, 0.02, 0.02)))
+    assert (grid == 0).sum() == 1
+
+
+def test_the_ground_is_not_drawn():
+    names = [each.name for each in footprints(parse_world(world_text(), "w.sdf"))]
+    assert "ground_plane" not in names
+    assert names[0] == "floor"
+
+
+@pytest.mark.parametrize(
+    "shape", ["<sphere><radius>1</radius></sphere>", "<cylinder><radius>1</radius><length>3</length></cylinder>"]
+)
+def test_round_shapes_are_round(shape):
+    model = box("a", 0, 0).replace("<box><size>1.2 0.8 0.3</size></box>", shape)
+    (each,) = prints_of(model)
+    assert each.low == pytest.approx((-1, -1), abs=1e-6)
+    assert len(each.polygons[0]) == 12
+
+
+def test_the_hull_is_anticlockwise_and_leaves_out_what_is_inside():
+    hull = convex_hull(np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 1], [1, 0]]))
+    assert len(hull) == 4
+    x, y = hull[:, 0], hull[:, 1]
+    assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0
+
+
+def test_a_path_has_no_gaps():
+    cells = braille(np.array([[-4.9, 0.1], [4.9, 0.1]]), VIEW)
+    assert (cells.any(axis=0)).all()
+    assert (cells > 0).sum() == 20
+
+
+def test_the_first_dot_is_top_left():
+    cells = braille(np.array([[-4.99, 3.99]]), VIEW)
+    assert cells[0, 0] == 0x01
+
+
+@pytest.mark.parametrize("points", [[], [[math.nan, 0.0]], [[1e9, 1e9], [-1e9, 1e9]]])
+def test_what_cannot_be_seen_is_no_path(points):
+    assert not braille(np.array(points, dtype=float).reshape(-1, 2), VIEW).any()
+
+
+def test_a_fit_shows_all_models_and_points_in_proportion():
+    prints = prints_of(box("a", 5, 0), box("b", -5, 1))
+    view = fit(prints, [(0.0, 8.0)], 60, 15)
+    for x, y in [(5.6, 0.4), (-5.6, 0.6), (0.0, 8.0)]:
+        assert view.cell(x, y) is not None
+
+
+def test_a_fit_clips_a_huge_model():
+    prints = prints_of(box("hangar", 0, 0, size=(900, 900, 1)), box("a", 1, 1), box("b", 3, 2))
+    view = fit(prints, [(0.0, 0.0)], 60, 15)
+    assert view.scale * view.columns < 60
+
+
+def test_a_fit_of_nothing_is_ten_metres():
+    assert fit((), (), 20, 10, margin=0).scale == pytest.approx(0.5)
+
+
+def test_zooming_keeps_the_centre_and_has_an_end():
+    assert VIEW.zoomed(2) == View(0, 0, 0.25, 20, 8)
+    assert VIEW.zoomed(1e9).scale > 0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "sign"), [(0, "→"), (45, "↗"), (90, "↑"), (180, "←"), (-90, "↓"), (-45, "↘"), (359, "→")]
+)
+def test_arrows_point_where_the_robot_does(degrees, sign):
+    half = math.radians(degrees) / 2
+    assert arrow(heading((math.cos(half), 0, 0, math.sin(half)))) == sign

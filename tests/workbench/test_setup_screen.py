@@ -1,0 +1,250 @@
+"""The setup screen: what it accepts, what it refuses, and that it writes nothing before all fits."""
+
+from types import SimpleNamespace
+
+import fake_run
+import pytest
+from textual.widgets import Button, Input, OptionList, Select, Static
+
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.screens.dialogs import Help, OpenFile
+from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.screens.setup import SetupScreen
+from ddenv.workbench.widgets.map import WorldMap
+
+
+class Session:
+    def __init__(self, app, pilot):
+        self.app, self.pilot = app, pilot
+
+    @property
+    def screen(self) -> SetupScreen:
+        return next(screen for screen in self.app.screen_stack if isinstance(screen, SetupScreen))
+
+    async def settle(self):
+        # Not every worker: the file tree keeps one for as long as it lives.
+        for group in ("world", "runs", "start"):
+            workers = [worker for worker in self.app.workers if worker.group == group]
+            if workers:
+                await self.app.workers.wait_for_complete(workers)
+        await self.pilot.pause()
+
+    async def press(self, *keys):
+        await self.pilot.press(*keys)
+        await self.settle()
+
+    def fill(self, **texts):
+        for id, text in texts.items():
+            self.screen.query_one(f"#{id}", Input).value = text
+
+    def wrong(self):
+        return self.screen.query_one("#wrong", Static).render().plain
+
+    def value(self, id):
+        return self.screen.query_one(f"#{id}", Input).value
+
+
+class Opened:
+    def __init__(self, size=(120, 36)):
+        self.size = size
+
+    async def __aenter__(self):
+        app = Workbench()
+        self._context = app.run_test(size=self.size)
+        pilot = await self._context.__aenter__()
+        await pilot.pause()
+        session = Session(app, pilot)
+        await session.settle()
+        return session
+
+    async def __aexit__(self, *error):
+        await self._context.__aexit__(*error)
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What engines were started with, instead of starting them."""
+    calls = []
+
+    def start_engine(path, jobs, **options):
+        calls.append((path.name, jobs, options))
+        return SimpleNamespace(poll=lambda: None)
+
+    monkeypatch.setattr("ddenv.launch.start_engine", start_engine)
+    return calls
+
+
+async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
+    async with Opened() as session:
+        assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
+        assert "11 models. A robot drives" in session.screen.query_one("#about", Static).render().plain
+        assert [session.value(id) for id in ("iterations", "timeout", "epsilon", "seed", "jobs")] == [
+            "3",
+            "45",
+            "0.5",
+            "0",
+            "4",
+        ]
+        assert session.value("name") == "crates-1"
+        assert session.screen.query_one("#pair", Select).value == "model2model/failure-proximal"
+        assert not session.screen.query_one("#places").display
+
+
+@pytest.mark.parametrize("key", ["ctrl+s", "f5"])
+async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started, key):
+    async with Opened() as session:
+        session.fill(iterations="5", seed="7", jobs="3")
+        session.screen.query_one("#accept", Select).value = "ask"
+        await session.press(key)
+        assert started == [("crates-1.ddenv", 3, {"accept_mode": "ask"})]
+        assert isinstance(session.app.screen, RunScreen)
+        assert (runs / "crates-1.ddenv").is_file()
+        from ddenv.launch import read_parts
+
+        scenario = read_parts(session.app.screen._poll.file)[0]
+        assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
+
+
+async def test_the_start_button_starts(scenarios, started):
+    async with Opened((80, 24)) as session:
+        session.screen.query_one("#start", Button).press()
+        await session.pilot.pause()
+        await session.settle()
+        assert len(started) == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "words"),
+    [
+        ("iterations", "three", "iterations: expected a whole number, found 'three'"),
+        ("iterations", "-1", "iterations"),
+        ("timeout", "", "timeout s: is missing"),
+        ("timeout", "nan", "timeout"),
+        ("n_partitions", "1", "n_partitions"),
+        ("epsilon", "0", "epsilon"),
+        ("seed", "99999999999", "seed"),
+        ("jobs", "0", "jobs: expected 1 to 256, found 0"),
+        ("name", " ", "run name: is missing"),
+    ],
+)
+async def test_wrong_input_is_told_beside_the_field_and_nothing_is_written(
+    scenarios, runs, started, field, text, words
+):
+    async with Opened() as session:
+        session.fill(**{field: text})
+        await session.press("ctrl+s")
+        assert words in session.wrong()
+        assert session.screen.query_one(f"#{field}", Input).has_class("-wrong")
+        assert session.app.focused.id == field
+        assert started == []
+        assert list(runs.iterdir()) == []
+        session.fill(**{field: "2" if field != "name" else "again"})
+        await session.pilot.pause()
+        await session.press("ctrl+s")
+        assert len(started) == 1
+
+
+async def test_a_taken_name_is_refused(scenarios, run, started):
+    async with Opened() as session:
+        session.fill(name="crates-1")
+        await session.press("ctrl+s")
+        assert "exists already" in session.wrong()
+        assert session.app.focused.id == "name"
+
+
+async def test_a_broken_scenario_is_told_in_the_preview(scenarios, started):
+    (scenarios / "crates.yaml").write_text("name: x\nwrold: y\n")
+    async with Opened() as session:
+        assert "crates.yaml" in session.screen.query_one(WorldMap).notice
+        await session.press("ctrl+s")
+        assert "choose a scenario" in session.wrong()
+
+
+async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
+    async with Opened() as session:
+        await session.press("ctrl+o")
+        assert isinstance(session.app.screen, OpenFile)
+        await session.pilot.press(*"nowhere.sdf", "enter")
+        assert "no such file" in session.app.screen.query_one("#wrong", Static).render().plain
+        session.app.screen.query_one("#path", Input).value = str(scenarios / "crates.sdf")
+        await session.pilot.press("enter")
+        await session.pilot.pause()
+        await session.settle()
+        assert session.screen.query_one("#places").display
+        assert "12 models" in session.screen.query_one("#about", Static).render().plain
+        await session.press("ctrl+s")
+        assert "spawn x m: is missing" in session.wrong()
+        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        await session.pilot.pause()
+        assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
+        session.fill(goal_x="inf")
+        await session.press("ctrl+s")
+        assert "finite" in session.wrong()
+        session.fill(goal_x="6", spawn_z="0.05")
+        await session.press("ctrl+s")
+        assert "stands inside model" in session.wrong()
+        assert list(runs.iterdir()) == []
+        session.fill(spawn_z="0.16")
+        await session.press("ctrl+s")
+        assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic"})]
+
+
+async def test_the_file_dialog_can_be_cancelled_and_filters(scenarios, tmp_path, monkeypatch):
+    monkeypatch.chdir(scenarios)
+    (scenarios / "notes.txt").write_text("x")
+    async with Opened() as session:
+        await session.press("ctrl+o")
+        tree = session.app.screen.query_one("#tree")
+        shown = {path.name for path in tree.filter_paths(scenarios.iterdir())}
+        assert shown == {"crates.yaml", "crates.sdf", "robot.sdf"}
+        await session.pilot.press("escape")
+        assert session.app.screen is session.screen
+
+
+async def test_recent_runs_are_listed_and_opened(scenarios, runs):
+    fake_run.finished(fake_run.FakeRun(runs / "old.ddenv")).close()
+    async with Opened() as session:
+        options = session.screen.query_one("#run-list", OptionList)
+        assert options.option_count == 1
+        options.focus()
+        await session.pilot.press("down", "enter")
+        await session.pilot.pause()
+        assert isinstance(session.app.screen, RunScreen)
+        assert session.app.screen.run == runs / "old.ddenv"
+        await session.app.workers.wait_for_complete()
+
+
+async def test_a_damaged_run_is_not_opened(scenarios, runs):
+    (runs / "bad.ddenv").write_text("no run")
+    async with Opened() as session:
+        session.screen.query_one("#run-list").focus()
+        await session.press("down", "enter")
+        assert "is no ddenv run file" in session.wrong()
+
+
+async def test_help_and_quit(scenarios):
+    async with Opened() as session:
+        await session.press("f1")
+        assert isinstance(session.app.screen, Help)
+        await session.press("escape", "q")
+        assert session.app._exit
+
+
+async def test_letters_can_be_typed_into_fields(scenarios):
+    async with Opened() as session:
+        field = session.screen.query_one("#name", Input)
+        field.focus()
+        field.value = ""
+        await session.press("q", "question_mark")
+        assert field.value == "q?"
+
+
+async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.world.bundled.SCENARIOS", tmp_path / "none")
+    async with Opened() as session:
+        assert "ctrl+o" in session.screen.query_one(WorldMap).notice
+
+
+async def test_too_small(scenarios):
+    async with Opened((40, 10)) as session:
+        assert session.screen.query_one("#small").display

@@ -1,0 +1,159 @@
+"""The panels' text, without an app."""
+
+import fake_run
+import numpy as np
+import pytest
+
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import Point
+from ddenv.workbench.footprints import footprints
+from ddenv.workbench.paint import Canvas
+from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.processes import last_line
+from ddenv.workbench.raster import View, masks, owners
+from ddenv.workbench.recent import recent_runs
+from ddenv.workbench.widgets.candidates import _candidates
+from ddenv.workbench.widgets.chart import steps
+from ddenv.workbench.widgets.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
+from ddenv.workbench.widgets.status import time_left
+from ddenv.workbench.wording import duration, metres, percent, plain, shorten
+from ddenv.world.read import parse_world
+
+
+def snapshot(run, engine="alive") -> Snapshot:
+    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+
+
+@pytest.mark.parametrize(("seconds", "words"), [(0, "0 s"), (59.4, "59 s"), (100, "1 min 40 s"), (7500, "2 h 05 min")])
+def test_durations(seconds, words):
+    assert duration(seconds) == words
+
+
+@pytest.mark.parametrize(
+    ("part", "words"), [(0, "0 %"), (0.001, "<1 %"), (0.5, "50 %"), (0.999, ">99 %"), (1, "100 %")]
+)
+def test_percentages_are_never_rounded_to_certainty(part, words):
+    assert percent(part) == words
+
+
+@pytest.mark.parametrize("value", [None, "x", float("nan"), float("inf")])
+def test_no_distance_is_no_text(value):
+    assert metres(value) == ""
+
+
+def test_names_cannot_steer_the_terminal():
+    assert plain("a\x1b[31m\nb\x07") == "a�[31m b�"
+    assert shorten("abcdef", 4) == "abc…"
+
+
+def looks_of(run, candidate=None):
+    state = fold(run.file.events())
+    prints = footprints(parse_world(run.world, "w.sdf"))
+    chosen = state.round.candidates[candidate] if candidate is not None else None
+    how = looks(prints, kept(state, chosen), (0, 0, 0), (255, 255, 255))
+    return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.labels, strict=True)}
+
+
+def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run):
+    drawn = looks_of(fake_run.mid_round(run))
+    assert drawn["crate_00"] == (KEPT, "A")
+    assert drawn["crate_05"] == (KEPT, "C")
+    assert drawn["crate_10"] == (REMOVED, "")
+    assert drawn["floor"] == (PROTECTED, "#")
+
+
+def test_what_a_candidate_leaves_out_gets_a_small_letter(run):
+    drawn = looks_of(fake_run.mid_round(run), candidate=1)
+    assert drawn["crate_00"] == (LEFT_OUT, "a")
+    assert drawn["crate_02"] == (KEPT, "B")
+
+
+def test_a_large_element_is_a_floor(runs):
+    run = fake_run.FakeRun(runs / "x.ddenv", fake_run.scenario(protected=()))
+    run.created().baseline()
+    run.start_round(2)
+    assert looks_of(run)["floor"] == (FLOOR, "A")
+    run.close()
+
+
+def test_without_colours_the_cells_still_differ(run):
+    state = fold(fake_run.mid_round(run).file.events())
+    prints = footprints(parse_world(run.world, "w.sdf"))
+    view = View(0, 0, 0.25, 64, 18)
+    canvas = Canvas(view.rows, view.columns, (0, 0, 0))
+    how = looks(prints, kept(state, state.round.candidates[1]), (0, 0, 0), (255, 255, 255))
+    fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
+    signs = {chr(char) for char in canvas.chars.flat}
+    assert {"█", "░", "▒", " "} <= signs
+
+
+def test_only_changed_rows_are_drawn_again():
+    before = Canvas(4, 10, (0, 0, 0))
+    after = before.copy()
+    after.put((2, 3), "A")
+    assert after.changed_rows(before) == [2]
+    assert after.changed_rows(None) == [0, 1, 2, 3]
+    assert after.strip(2).text == "   A      "
+
+
+def test_text_ends_at_the_edge_of_the_map():
+    canvas = Canvas(1, 4, (0, 0, 0))
+    canvas.put((0, 3), "AB")
+    assert canvas.strip(0).text == "   A"
+
+
+def test_steps_fall_with_the_environment():
+    text = steps((Point(0, 40), Point(10, 20), Point(20, 5)), 20, 46, 9).plain.splitlines()
+    assert len(text) == 9
+    assert text[0].startswith("40┤█")
+    assert text[-1].strip().startswith("0")
+    assert text[-1].endswith("20 tests")
+    heights = [sum(line[column] != " " for line in text[:-1]) for column in range(4, 45)]
+    assert heights == sorted(heights, reverse=True)
+    assert heights[0] == 8
+    assert heights[-1] == 1
+
+
+@pytest.mark.parametrize("size", [(5, 2), (0, 0), (12, 3)])
+def test_a_chart_without_room_does_no_harm(size):
+    steps((Point(0, 4),), 0, *size)
+
+
+def test_rows_say_how_many_tests_of_how_many(run):
+    rows = _candidates(snapshot(fake_run.mid_round(run)))
+    assert rows["0"]["tests"] == "4/4"
+    assert rows["0"]["verdict"] == "○ dissimilar"
+    assert rows["1"]["tests"] == "1/4"
+    assert rows["1"]["verdict"].startswith("▶ 2")
+    assert rows["3"]["tests"] == ""
+
+
+def test_tests_of_a_dead_engine_do_not_run(run):
+    rows = _candidates(snapshot(fake_run.mid_round(run), "absent"))
+    assert rows["1"]["verdict"] == ""
+
+
+def test_time_left_is_the_most_a_round_can_take(run):
+    fake_run.mid_round(run)
+    # 19 tests at 2 s on 2 workers: 3 open for candidate 2, 4 for each of the four others.
+    assert time_left(snapshot(run)) == "round: ≤ 19 s left"
+    run.write("paused")
+    assert time_left(snapshot(run)) == ""
+
+
+def test_recent_runs_say_how_they_stand(runs):
+    fake_run.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
+    fake_run.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
+    (runs / "c.ddenv").write_text("no run")
+    told = {run.path.stem: run for run in recent_runs(runs)}
+    assert told["a"].words == "2/11 finished"
+    assert told["b"].words == "6/11 engine is gone"
+    assert told["c"].trouble
+    assert recent_runs(runs / "nowhere") == []
+
+
+def test_the_last_line_of_a_log(tmp_path):
+    log = tmp_path / "log"
+    assert last_line(log) == ""
+    log.write_bytes(b"one\ntwo \x1b[0m\n\n")
+    assert last_line(log) == "two �[0m"
