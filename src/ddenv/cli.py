@@ -246,6 +246,6 @@ def main() -> None:
     except KeyboardInterrupt:
         code = 130
     except click.ClickException as error:
-        print(f"ddenv: {error.format_message()}; see 'ddenv --help'", file=sys.stderr)
+        print(f"ddenv: {error.format_message().rstrip('.')}; see 'ddenv --help'", file=sys.stderr)
         code = 2
     sys.exit(code)

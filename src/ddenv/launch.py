@@ -24,6 +24,9 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.write import without, write_file
 
 SUFFIX = ".ddenv"
+# How the engine's own lines in its log begin, among whatever libraries print there; and its first one.
+ENGINE_SAYS = "ddenv engine:"
+ENGINE_STARTED = "started"
 
 
 def runs_folder() -> Path:
@@ -173,6 +176,19 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
         words += [f"--{name.replace('_', '-')}", str(value)]
     with run.with_name(f"{run.name}.log").open("ab") as log:
         return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+
+
+def last_words(run: Path) -> str:
+    """Why the engine that was last started on a run is gone, from its log."""
+    log = run.with_name(f"{run.name}.log")
+    lines = log.read_text(errors="replace").splitlines() if log.exists() else []
+    said = ""
+    for line in lines:
+        if line.startswith(ENGINE_SAYS):
+            said = line.removeprefix(ENGINE_SAYS).strip()
+    if said and said != ENGINE_STARTED:
+        return said
+    return f"{run}: the engine was killed or crashed (see {log}); go on with 'ddenv resume {run}'"
 
 
 def start_scene(run: Path, port: int = 0) -> subprocess.Popen:

@@ -21,17 +21,18 @@ WALL = read_world(DATA / "wall.sdf")
 
 
 def test_a_free_place_is_fine():
-    check_spawn(WALL, HUSKY, Spawn(x=0, y=0, z=0.15))
+    check_spawn(WALL, HUSKY, Spawn(x=0, y=0, z=0.45))
 
 
 @pytest.mark.parametrize(
     ("spawn", "model"),
     [
-        (Spawn(x=2, y=0, z=0.15), "wall"),
-        (Spawn(x=1.5, y=0, z=0.15), "wall"),
+        (Spawn(x=2, y=0, z=0.45), "wall"),
+        (Spawn(x=1.5, y=0, z=0.45), "wall"),
+        (Spawn(x=0, y=0, z=0.15), "deck"),
         (Spawn(x=0, y=-4.4, z=0.15), "post"),
         (Spawn(x=4, y=3.6, z=0.15), "ball"),
-        (Spawn(x=0, y=0, z=-0.5), "ground_plane"),
+        (Spawn(x=-4, y=0, z=-0.5), "ground_plane"),
     ],
 )
 def test_a_spawn_inside_a_model_names_it(spawn, model):
@@ -40,11 +41,11 @@ def test_a_spawn_inside_a_model_names_it(spawn, model):
 
 
 def test_turning_can_make_room():
-    check_spawn(WALL, HUSKY, Spawn(x=1.45, y=0, z=0.15, yaw=math.pi / 2))
+    check_spawn(WALL, HUSKY, Spawn(x=1.45, y=0, z=0.45, yaw=math.pi / 2))
 
 
 def test_above_a_wall_is_free():
-    check_spawn(WALL, HUSKY, Spawn(x=2, y=0, z=1.2))
+    check_spawn(WALL, HUSKY, Spawn(x=2, y=0, z=1.7))
 
 
 turned = st.tuples(*[st.floats(-3, 3)] * 3)

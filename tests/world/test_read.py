@@ -65,7 +65,7 @@ def test_names_may_hold_anything_xml_allows():
 
 def test_protected_models_and_the_ground_are_no_elements():
     read = read_world(DATA / "wall.sdf")
-    assert read.elements(frozenset(["wall"])) == ("far_box", "post", "ball", "beam")
+    assert read.elements(frozenset(["wall"])) == ("deck", "far_box", "post", "ball", "beam")
 
 
 WRONG = {

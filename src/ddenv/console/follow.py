@@ -11,6 +11,7 @@ from typing import TextIO
 
 from ddenv.console.words import headline, news
 from ddenv.errors import UserError
+from ddenv.launch import last_words
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
@@ -50,14 +51,6 @@ def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
     if not state.ended or state.status == "failed":
         raise UserError(state.reason or last_words(path))
     return state
-
-
-def last_words(path: Path) -> str:
-    """Why an engine that is gone could not go on: the last line of its log."""
-    log = path.with_name(f"{path.name}.log")
-    lines = log.read_text(errors="replace").split("\n") if log.exists() else []
-    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return last or f"{path}: the engine ended without a word; go on with 'ddenv resume {path}'"
 
 
 def _interrupt(*_: object) -> None:

@@ -28,4 +28,5 @@ def _line(path: Path) -> str:
         status = "engine not running"
     elif status == "finished":
         status = "minimal" if state.minimal else "finished"
-    return f"{status:<18}  {len(state.environment):>4} of {len(state.elements)} models  {len(state.finished_tests):>5} tests"
+    size = f"{len(state.environment)} of {len(state.elements)} models"
+    return f"{status:<18}  {size:<20}  {len(state.finished_tests)} tests"

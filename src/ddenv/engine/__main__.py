@@ -18,7 +18,7 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
-from ddenv.launch import read_parts
+from ddenv.launch import ENGINE_SAYS, ENGINE_STARTED, read_parts
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.world.model import World
@@ -31,6 +31,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
     options = parser.parse_args()
+    _say(ENGINE_STARTED)
     terminated = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: terminated.set())
@@ -38,8 +39,12 @@ def main() -> int:
         with RunFile(options.run) as file, engine_lock(options.run):
             return _work(file, max(1, options.jobs), options.accept_mode, terminated)
     except UserError as error:
-        print(error, file=sys.stderr)
+        _say(str(error))
         return 2
+
+
+def _say(words: str) -> None:
+    print(ENGINE_SAYS, words, file=sys.stderr, flush=True)
 
 
 def _work(file: RunFile, jobs: int, accept_mode: str | None, terminated: threading.Event) -> int:
