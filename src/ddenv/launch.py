@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -171,7 +172,7 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
 
     Its output goes to a log beside the run file. `options` become `--name value` on its command line.
     """
-    words = [sys.executable, "-m", "ddenv.engine", str(run), "--jobs", str(jobs)]
+    words = [sys.executable, "-m", "ddenv.engine", str(run), "--jobs", str(jobs), "--since", repr(time.time())]
     for name, value in options.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
     with run.with_name(f"{run.name}.log").open("ab") as log:

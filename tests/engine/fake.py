@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -91,7 +92,7 @@ def drive(
         _begin(journal, scenario, world, pool.jobs, accept_mode)
         if prepare is not None:
             prepare(file)
-        control = Control(journal, threading.Event())
+        control = Control(journal, threading.Event(), time.time())
         Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
         return journal.state
 

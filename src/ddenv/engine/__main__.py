@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 
 from ddenv.engine.bench import Bench
@@ -30,6 +31,7 @@ def main() -> int:
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
     terminated = threading.Event()
@@ -37,7 +39,7 @@ def main() -> int:
         signal.signal(number, lambda *_: terminated.set())
     try:
         with RunFile(options.run) as file, engine_lock(options.run):
-            return _work(file, max(1, options.jobs), options.accept_mode, terminated)
+            return _work(file, options, terminated)
     except UserError as error:
         _say(str(error))
         return 2
@@ -47,15 +49,16 @@ def _say(words: str) -> None:
     print(ENGINE_SAYS, words, file=sys.stderr, flush=True)
 
 
-def _work(file: RunFile, jobs: int, accept_mode: str | None, terminated: threading.Event) -> int:
+def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Event) -> int:
+    jobs = max(1, options.jobs)
     scenario, world, robot = read_parts(file)
     file.own()
     journal = Journal(file)
     if journal.state.status == "finished":
         return 0
     try:
-        _begin(journal, scenario, world, jobs, accept_mode)
-        control = Control(journal, terminated)
+        _begin(journal, scenario, world, jobs, options.accept_mode)
+        control = Control(journal, terminated, options.since)
         pool = Pool(scenario, world, robot, jobs)
         try:
             Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 from ddenv.engine.journal import Journal
@@ -16,20 +17,23 @@ class Control:
     """Commands turned into events and into what the driver may do next.
 
     `credit` is how many tests may still start before a pause, None for any number. A command that makes no sense any more
-    (a veto of a judged candidate, an accept of nothing) has no effect but is marked as handled. `terminated` is set by a signal.
+    (a veto of a judged candidate, an accept of nothing) has no effect but is marked as handled. `terminated` is set by a signal,
+    `since` is when this engine was asked to start (Unix time, s).
     """
 
-    def __init__(self, journal: Journal, terminated: threading.Event) -> None:
+    def __init__(self, journal: Journal, terminated: threading.Event, since: float = math.inf) -> None:
         self._journal = journal
         self._terminated = terminated
         self._paused = False
         self._credit: int | None = None
         self._pause_after_round = False
-        self._forget_old_stops()
+        self._forget_old_stops(since)
 
-    def _forget_old_stops(self) -> None:
+    def _forget_old_stops(self, since: float) -> None:
         """A stop or pause that was meant for an engine that is gone must not hold this one."""
         for command in self._journal.file.commands(self._journal.state.last_command):
+            if command.time >= since:
+                return
             if command.kind in ("stop", "pause", "step"):
                 self._handled(command)
             else:

@@ -1,0 +1,38 @@
+"""What one run gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.world.pose import Vector
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run of the robot.
+
+    `outcome` is "pass" (goal reached), "failed" or "error" (the simulation broke). `failure` is empty for a pass, "timeout"
+    or "fell" for a failure, and for an error "not-finite" or the first line of what Drake said.
+    `trajectory` has one row every 0.1 s and one at the end: t (s), x, y, z (m), qw, qx, qy, qz of the robot's first link in
+    the world frame. `motions` holds the same for each dynamic model that moved.
+    """
+
+    outcome: str
+    failure: str
+    trajectory: np.ndarray
+    motions: dict[str, np.ndarray]
+    simulated_seconds: float
+    wall_seconds: float
+    seed: int
+
+    @property
+    def end_pose(self) -> tuple[float, ...]:
+        """x, y, z (m), qw, qx, qy, qz of the robot at the end."""
+        return tuple(float(value) for value in self.trajectory[-1, 1:])
+
+    @property
+    def end_position(self) -> Vector:
+        """x, y, z (m) of the robot at the end."""
+        return self.end_pose[:3]

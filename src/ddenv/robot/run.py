@@ -1,0 +1,133 @@
+"""One run: sense, estimate, command and simulate until the goal is reached or time is up."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from ddenv.robot.drive import Drive
+from ddenv.robot.estimate import Estimate, advance
+from ddenv.robot.navigate import Command, Navigator
+from ddenv.robot.observe import Observer
+from ddenv.robot.plant import Body, Built
+from ddenv.robot.recording import RECORD_PERIOD, Recording
+from ddenv.robot.result import RunResult
+from ddenv.robot.sensors import SensorSuite, Truth
+from ddenv.world.scenario import Scenario
+
+Progress = Callable[[float, tuple[float, ...]], None]
+
+
+class Run:
+    """One run in a context that has been prepared: start poses set, removed models switched off.
+
+    Time is counted in steps of the plant, so that every run senses, commands and records at the same instants to the last
+    bit. `floor` (m) is the height below which the robot has fallen out of the world.
+    """
+
+    def __init__(
+        self,
+        built: Built,
+        context: Context,
+        scenario: Scenario,
+        drive: Drive,
+        floor: float,
+        kept: Sequence[Body],
+        seed: int,
+    ) -> None:
+        self._scenario = scenario
+        self._drive = drive
+        self._floor = floor
+        self._kept = kept
+        self._seed = seed
+        self._step = scenario.simulation.time_step
+        self._control_every = self._steps(scenario.controller.period)
+        self._record_every = self._steps(RECORD_PERIOD)
+        self._last = self._steps(scenario.failure.timeout)
+        self._context = built.plant.GetMyMutableContextFromRoot(context)
+        self._motors = built.plant.get_desired_state_input_port(built.robot.instance)
+        self._observer = Observer(built, drive, self._context)
+        self._simulator = Simulator(built.diagram, context)
+        self._sensors = SensorSuite(scenario.sensors, seed)
+        self._navigator = Navigator(scenario.goal, scenario.controller)
+        self._recording = Recording()
+
+    def execute(self, progress: Progress | None) -> RunResult:
+        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is the caller's."""
+        started = time.perf_counter()
+        outcome, failure, step = self._loop(progress)
+        return RunResult(
+            outcome=outcome,
+            failure=failure,
+            trajectory=self._recording.trajectory(),
+            motions=self._recording.motions(),
+            simulated_seconds=step * self._step,
+            wall_seconds=time.perf_counter() - started,
+            seed=self._seed,
+        )
+
+    def _loop(self, progress: Progress | None) -> tuple[str, str, int]:
+        """Outcome, failure, and the step at which the run ended."""
+        truth = self._observer.truth()
+        # The robot knows where it starts.
+        estimate = Estimate(truth.x, truth.y, truth.heading)
+        step = 0
+        while True:
+            end = self._end(truth, step)
+            if end is not None or step % self._record_every == 0:
+                self._record(step, progress)
+            if end is not None:
+                return (*end, step)
+            if step % self._control_every == 0:
+                if step > 0:
+                    measured = self._sensors.measure(truth)
+                    estimate = advance(estimate, measured, self._scenario.sensors, self._control_every * self._step)
+                self._command(self._navigator.command(estimate))
+            step = self._next(step)
+            problem = self._simulate(step * self._step)
+            if problem:
+                return "error", problem, step
+            truth = self._observer.truth()
+
+    def _end(self, truth: Truth, step: int) -> tuple[str, str] | None:
+        """Outcome and failure of a run that ends here, or None."""
+        goal = self._scenario.goal
+        if math.hypot(goal.x - truth.x, goal.y - truth.y) <= goal.tolerance:
+            return "pass", ""
+        if self._observer.robot()[2] < self._floor:
+            return "failed", "fell"
+        return ("failed", "timeout") if step >= self._last else None
+
+    def _simulate(self, until: float) -> str:
+        """Simulates up to the time `until`; returns what went wrong, or ""."""
+        try:
+            self._simulator.AdvanceTo(until)
+        # Drake raises SystemExit where a condition of its own failed.
+        except (RuntimeError, ValueError, SystemExit) as error:
+            if not self._observer.is_finite() or "nan" in str(error).lower():
+                return "not-finite"
+            return (str(error).strip() or type(error).__name__).splitlines()[0]
+        return "" if self._observer.is_finite() else "not-finite"
+
+    def _command(self, command: Command) -> None:
+        speeds = self._drive.wheel_speeds(command, self._scenario.controller.skid)
+        self._motors.FixValue(self._context, np.concatenate([np.zeros_like(speeds), speeds]))
+
+    def _record(self, step: int, progress: Progress | None) -> None:
+        now, pose = step * self._step, self._observer.robot()
+        self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._kept})
+        if progress is not None:
+            progress(now, pose)
+
+    def _next(self, step: int) -> int:
+        """The next step at which something is due."""
+        due = min(step - step % every + every for every in (self._control_every, self._record_every))
+        return min(due, self._last)
+
+    def _steps(self, seconds: float) -> int:
+        return max(1, round(seconds / self._step))

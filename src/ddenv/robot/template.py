@@ -1,0 +1,103 @@
+"""A world that is built once and run many times, each time without other models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ddenv.errors import UserError
+from ddenv.robot.drive import find_drive
+from ddenv.robot.plant import Built, build, transform
+from ddenv.robot.presence import without
+from ddenv.robot.result import RunResult
+from ddenv.robot.run import Run
+from ddenv.world.model import Box, Cylinder, Model, Plane, Shape, Sphere, World, is_ground
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Scenario
+
+# A robot this far below everything that it could stand on has fallen out of the world, m.
+FALL = 2.0
+
+
+class Template:
+    """The simulator of one scenario. Building it costs seconds; switching models off for a run costs milliseconds.
+
+    All runs share one context. The same `keep` and `seed` give the same result bit for bit, whatever was run before, and the
+    same as a world that never had the removed static models.
+    """
+
+    def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
+        """Raises UserError for a robot that cannot drive, and for a world that Drake cannot simulate."""
+        self._scenario = scenario
+        self._drive = find_drive(robot)
+        self._built = _build(world, robot, scenario)
+        self._names = frozenset(model.name for model in world.models)
+        grounds = frozenset(model.name for model in world.models if is_ground(model))
+        self._always = self._names & frozenset(scenario.protected) | grounds
+        self._floor = lowest(world) - FALL
+        self._context = self._built.diagram.CreateDefaultContext()
+        self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
+        self._place()
+        self._start = self._built.plant.GetPositionsAndVelocities(self._plant_context)
+
+    def run(
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+    ) -> RunResult:
+        """Runs the robot in the world with the models `keep`; protected models and grounds are always there.
+
+        `progress(time, pose)` is told the simulated time (s) and the robot's x, y, z (m), qw, qx, qy, qz at each recorded
+        sample. Raises ValueError for names that the world does not have.
+        """
+        unknown = keep - self._names
+        if unknown:
+            raise ValueError(f"no such model: {min(unknown)}")
+        removed = self._names - keep - self._always
+        kept = [body for name, body in self._built.moving.items() if name not in removed]
+        self._context.SetTime(0.0)
+        self._built.plant.SetPositionsAndVelocities(self._plant_context, self._start)
+        with without(self._built, self._context, removed):
+            run = Run(self._built, self._context, self._scenario, self._drive, self._floor, kept, seed)
+            return run.execute(progress)
+
+    def _place(self) -> None:
+        """Puts everything where it starts; the plant's default context has it all in the world's origin."""
+        plant, spawn = self._built.plant, self._scenario.robot.spawn
+        at = Pose.from_rpy(spawn.x, spawn.y, spawn.z, 0.0, 0.0, spawn.yaw)
+        for body, origin in [(self._built.robot, at), *((body, Pose()) for body in self._built.moving.values())]:
+            for link, pose in zip(body.links, body.poses, strict=True):
+                if link.is_floating_base_body():
+                    plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, link, transform(origin @ pose))
+
+
+def _build(world: World, robot: Model, scenario: Scenario) -> Built:
+    try:
+        built = build(world, robot, scenario.simulation, scenario.controller.motor_gain)
+    except (ValueError, RuntimeError, SystemExit) as error:
+        raise UserError(f"{world.path}: cannot be simulated: {error}") from error
+    if not built.robot.base.is_floating_base_body():
+        raise UserError(
+            f"robot '{robot.name}': its first link must be free to move, not joined to the world or another link"
+        )
+    return built
+
+
+def lowest(world: World) -> float:
+    """A height (m) that no surface of the world lies below."""
+    collisions = [collision for model in world.models for collision in model.collisions]
+    return min((one.pose.position[2] - _reach(one.shape) for one in collisions), default=0.0)
+
+
+def _reach(shape: Shape) -> float:
+    """A distance (m) from a shape's centre that none of its points exceeds; of a plane only its height counts."""
+    match shape:
+        case Box(size):
+            return math.hypot(*size) / 2
+        case Cylinder(radius, length):
+            return math.hypot(radius, length / 2)
+        case Sphere(radius):
+            return radius
+        case Plane():
+            return 0.0
