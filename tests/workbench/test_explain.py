@@ -157,9 +157,10 @@ def test_a_damaged_file_says_so(run):
     run.created().write("nonsense")
     poll = Poll(run.path)
     found = poll.look()
+    assert poll.look() is None
     poll.close()
     assert "unknown kind 'nonsense'" in explain(found).sentences[0]
-    assert poll.look() is None
+    assert found.state.status == "baseline"
 
 
 def test_lines_of_the_algorithm_are_in_order():
@@ -172,3 +173,25 @@ def test_settings_that_make_no_sense_do_no_harm(run, scenario):
     run.write("created", scenario=scenario, elements=run.elements)
     run.write("engine_started", pid=1, jobs=1)
     assert told(run)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        ("waiting", {"candidate": 99}),
+        ("waiting", {"candidate": -1}),
+        ("reduced", {"candidate": 99, "environment": [0], "evidence_test": 1}),
+        ("test_started", {"test": 1}),
+        ("created", {"scenario": 3, "elements": 4}),
+    ],
+)
+def test_events_that_do_not_fit_are_told_and_the_rest_is_shown(run, kind, data):
+    run.created().baseline()
+    run.start_round(2)
+    run.write(kind, **data)
+    poll = Poll(run.path)
+    found = poll.look()
+    poll.close()
+    assert f"({kind})" in found.error
+    assert found.state.round.number == 1
+    explain(found)

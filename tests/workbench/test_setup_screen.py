@@ -113,33 +113,33 @@ async def test_the_start_button_starts(scenarios, started):
         assert len(started) == 1
 
 
-@pytest.mark.parametrize(
-    ("field", "text", "words"),
-    [
-        ("iterations", "three", "iterations: expected a whole number, found 'three'"),
-        ("iterations", "-1", "iterations"),
-        ("timeout", "", "timeout s: is missing"),
-        ("timeout", "nan", "timeout"),
-        ("n_partitions", "1", "n_partitions"),
-        ("epsilon", "0", "epsilon"),
-        ("seed", "99999999999", "seed"),
-        ("jobs", "0", "jobs: expected 1 to 256, found 0"),
-        ("name", " ", "run name: is missing"),
-    ],
+WRONG = (
+    ("iterations", "three", "iterations: expected a whole number, found 'three'"),
+    ("iterations", "-1", "iterations"),
+    ("timeout", "", "timeout s: is missing"),
+    ("timeout", "nan", "timeout"),
+    ("n_partitions", "1", "n_partitions"),
+    ("epsilon", "0", "epsilon"),
+    ("seed", "99999999999", "seed"),
+    ("jobs", "0", "jobs: expected 1 to 256, found 0"),
+    ("name", " ", "run name: is missing"),
 )
-async def test_wrong_input_is_told_beside_the_field_and_nothing_is_written(
-    scenarios, runs, started, field, text, words
-):
+
+
+async def test_wrong_input_is_told_beside_the_field_and_nothing_is_written(scenarios, runs, started):
     async with Opened() as session:
-        session.fill(**{field: text})
-        await session.press("ctrl+s")
-        assert words in session.wrong()
-        assert session.screen.query_one(f"#{field}", Input).has_class("-wrong")
-        assert session.app.focused.id == field
-        assert started == []
-        assert list(runs.iterdir()) == []
-        session.fill(**{field: "2" if field != "name" else "again"})
-        await session.pilot.pause()
+        for field, text, words in WRONG:
+            right = session.value(field)
+            session.fill(**{field: text})
+            await session.press("ctrl+s")
+            assert words in session.wrong()
+            assert session.screen.query_one(f"#{field}", Input).has_class("-wrong")
+            assert session.app.focused.id == field
+            assert started == []
+            assert list(runs.iterdir()) == []
+            session.fill(**{field: right})
+            await session.pilot.pause()
+            assert not session.screen.query_one(f"#{field}", Input).has_class("-wrong")
         await session.press("ctrl+s")
         assert len(started) == 1
 

@@ -84,7 +84,7 @@ def test_without_colours_the_cells_still_differ(run):
     how = looks(prints, kept(state, state.round.candidates[1]), (0, 0, 0), (255, 255, 255))
     fill(canvas, owners(masks(prints, view), view, np.flatnonzero(how.kinds != REMOVED)), how)
     signs = {chr(char) for char in canvas.chars.flat}
-    assert {"█", "░", "▒", " "} <= signs
+    assert {"█", "▓", "▒", " "} <= signs
 
 
 def test_only_changed_rows_are_drawn_again():

@@ -69,6 +69,9 @@ def create(path: Path, documents: dict[str, bytes]) -> None:
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         connection.close()
+        # As any new file: temporary ones are for their owner alone.
+        os.umask(mask := os.umask(0))
+        Path(name).chmod(0o666 & ~mask)
         os.link(name, path)
     except FileExistsError:
         raise UserError(f"{path}: exists already; choose another name, or attach with 'ddenv open {path}'") from None

@@ -1,0 +1,112 @@
+"""Layers of a map as arrays of cells: characters and colours, put on top of each other, then cut into lines of text."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from rich.color import Color
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
+
+RGB = tuple[int, int, int]
+# Eight hues that stay apart for colour-blind eyes as far as eight can; parts beyond H repeat them, their letters do not.
+HUES: tuple[RGB, ...] = (
+    (86, 180, 233),
+    (240, 160, 40),
+    (60, 190, 140),
+    (222, 130, 190),
+    (232, 220, 90),
+    (235, 105, 65),
+    (140, 140, 250),
+    (150, 200, 90),
+)
+
+
+def blend(back: RGB, front: RGB, amount: float) -> RGB:
+    """`amount` 0 gives `back`, 1 gives `front`."""
+    red, green, blue = (round(b + (f - b) * amount) for b, f in zip(back, front, strict=True))
+    return red, green, blue
+
+
+def packed(color: RGB) -> int:
+    """One number for a colour, as the arrays hold it."""
+    return color[0] << 16 | color[1] << 8 | color[2]
+
+
+def readable(back: int) -> int:
+    """Black or white, whichever reads better on a packed colour."""
+    luminance = 0.3 * (back >> 16) + 0.59 * (back >> 8 & 255) + 0.11 * (back & 255)
+    return 0x000000 if luminance > 110 else 0xFFFFFF
+
+
+class Canvas:
+    """`chars` are code points, `fore` and `back` packed colours, all of shape (rows, columns)."""
+
+    def __init__(self, rows: int, columns: int, back: RGB) -> None:
+        self.chars = np.full((rows, columns), ord(" "), dtype="<u4")
+        self.fore = np.full((rows, columns), packed(back), dtype=np.int32)
+        self.back = np.full((rows, columns), packed(back), dtype=np.int32)
+        self.bold = np.zeros((rows, columns), dtype=bool)
+
+    def copy(self) -> Canvas:
+        twin = object.__new__(Canvas)
+        twin.chars, twin.fore = self.chars.copy(), self.fore.copy()
+        twin.back, twin.bold = self.back.copy(), self.bold.copy()
+        return twin
+
+    def put(self, cell: tuple[int, int] | None, text: str, color: int | None = None, back: int | None = None) -> None:
+        """Bold `text` from a cell (row, column) on; without a colour, one that can be read there."""
+        if cell is None:
+            return
+        row, column = cell
+        for offset, char in enumerate(text[: self.chars.shape[1] - column]):
+            place = row, column + offset
+            if back is not None:
+                self.back[place] = back
+            self.chars[place] = ord(char)
+            self.fore[place] = readable(int(self.back[place])) if color is None else color
+            self.bold[place] = True
+
+    def dots(self, bits: np.ndarray, color: int) -> None:
+        """Braille dots over whatever fills their cells."""
+        touched = bits > 0
+        self.chars[touched] = 0x2800 + bits[touched].astype(np.uint32)
+        self.fore[touched] = color
+        self.bold[touched] = False
+
+    def changed_rows(self, other: Canvas | None) -> list[int]:
+        """The rows in which this differs from `other`."""
+        rows = range(self.chars.shape[0])
+        if other is None or other.chars.shape != self.chars.shape:
+            return list(rows)
+        same = (
+            (self.chars == other.chars)
+            & (self.fore == other.fore)
+            & (self.back == other.back)
+            & (self.bold == other.bold)
+        )
+        return [row for row in rows if not same[row].all()]
+
+    def strip(self, row: int) -> Strip:
+        """A row as text, cut where the style changes."""
+        fore, back, bold = self.fore[row], self.back[row], self.bold[row]
+        text = self.chars[row].tobytes().decode("utf-32-le")
+        differs = (np.diff(fore) != 0) | (np.diff(back) != 0) | (bold[1:] != bold[:-1])
+        cuts = [0, *(np.flatnonzero(differs) + 1).tolist(), len(text)]
+        segments = [
+            Segment(text[start:end], _style(int(fore[start]), int(back[start]), bool(bold[start])))
+            for start, end in pairwise(cuts)
+        ]
+        return Strip(segments, len(text))
+
+
+@lru_cache(maxsize=4096)
+def _style(fore: int, back: int, bold: bool) -> Style:
+    return Style(color=_color(fore), bgcolor=_color(back), bold=bold)
+
+
+def _color(value: int) -> Color:
+    return Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)

@@ -1,0 +1,35 @@
+"""What a map needs of a scenario: read away from the screen's thread, since worlds can be large."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ddenv.runfile.store import RunFile
+from ddenv.workbench.footprints import footprints
+from ddenv.workbench.widgets.map import Place
+
+if TYPE_CHECKING:
+    from ddenv.world.model import World
+    from ddenv.world.scenario import Scenario
+
+
+def place_of(world: World, scenario: Scenario | None = None) -> Place:
+    """The models of a world, with the scenario's start and goal if there is one."""
+    protected = frozenset(scenario.protected) if scenario else frozenset()
+    place = Place(footprints(world), elements=frozenset(world.elements(protected)))
+    if scenario is None:
+        return place
+    spawn, goal = scenario.robot.spawn, scenario.goal
+    return replace(place, spawn=(spawn.x, spawn.y, spawn.yaw), goal=(goal.x, goal.y))
+
+
+def place_of_run(path: Path) -> Place:
+    """What a run file was made from. Raises UserError."""
+    # Reading scenarios needs pydantic, which is not needed for the first look at a run.
+    from ddenv.launch import read_parts
+
+    with RunFile(path) as run:
+        scenario, world, _ = read_parts(run)
+    return place_of(world, scenario)

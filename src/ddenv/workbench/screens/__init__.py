@@ -1,0 +1,1 @@
+"""The two screens, and the dialogs that open above them."""

@@ -1,0 +1,1 @@
+"""The panels of the run screen, one a file."""

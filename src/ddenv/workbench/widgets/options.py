@@ -1,0 +1,133 @@
+"""The setup screen's form: the options of a run, with the place for complaints below them."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+from textual import on
+from textual.app import ComposeResult
+from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
+from textual.message import Message
+from textual.widgets import Button, Input, Label, Select, Static
+
+from ddenv.errors import UserError
+from ddenv.workbench import form
+from ddenv.workbench.wording import plain
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+MODES = ("automatic", "ask")
+MARK = "✗ "
+
+
+class OptionsForm(Vertical):
+    """Text fields by the ids of `ddenv.workbench.form`, the pair, the accept mode, and Start."""
+
+    class PlaceEdited(Message):
+        """Spawn or goal were edited."""
+
+    def __init__(self, pairs: tuple[str, ...], *, id: str, classes: str) -> None:
+        super().__init__(id=id, classes=classes)
+        self._pairs = pairs
+        self._name_given = False
+        self.border_title = "Options"
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll(id="fields", can_focus=False):
+            with Horizontal(classes="row"):
+                yield Label("pair", markup=False)
+                yield _select(
+                    "pair", self._pairs, "how the environment is split, and in which order the parts are tried"
+                )
+            with Grid(classes="grid"):
+                for field in form.OPTIONS:
+                    yield from _field(field)
+            with Grid(id="places", classes="grid"):
+                for field in form.PLACES:
+                    yield from _field(field)
+            with Horizontal(classes="row"):
+                yield from _field(form.NAME)
+        with Horizontal(classes="row", id="last"):
+            yield Label("accept", markup=False)
+            yield _select("accept", MODES, "take each reduction automatically, or ask before it")
+            yield Static("", id="gap")
+            yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
+        yield Static("", id="wrong", markup=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#jobs", Input).value = str(os.cpu_count() or 1)
+        self.ask_for_places(False)
+
+    @property
+    def pair(self) -> str:
+        return str(self.query_one("#pair", Select).value)
+
+    @property
+    def accept_mode(self) -> str:
+        return str(self.query_one("#accept", Select).value)
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What stands in the fields, by id."""
+        return {field.id or "": field.value for field in self.query(Input)}
+
+    def place(self, what: str) -> tuple[float, ...]:
+        """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m). Raises FieldError."""
+        fields = tuple(field for field in form.PLACES if field.id.startswith(what))
+        numbers = tuple(form.values(fields, self.texts).values())
+        if not all(math.isfinite(number) for number in numbers):
+            raise form.FieldError(fields[0].id, f"{what}: expected finite numbers")
+        return numbers
+
+    def ask_for_places(self, ask: bool) -> None:
+        """Spawn and goal are asked for where no scenario says them."""
+        self.query_one("#places").display = ask
+
+    def show_settings(self, scenario: Scenario) -> None:
+        """Fills in what the scenario says."""
+        for id, text in form.texts_of(scenario).items():
+            self.query_one(f"#{id}", Input).value = text
+        self.query_one("#pair", Select).value = scenario.reduction.pair
+
+    def suggest_name(self, name: str) -> None:
+        """Fills in a run name, unless the user gave one."""
+        if not self._name_given:
+            field = self.query_one("#name", Input)
+            with field.prevent(Input.Changed):
+                field.value = name
+
+    @on(Input.Changed)
+    def _edited(self, event: Input.Changed) -> None:
+        event.stop()
+        event.input.remove_class("-wrong")
+        if event.input.id == "name":
+            self._name_given = bool(event.value.strip())
+        elif event.input.id and event.input.id.startswith(("spawn", "goal")):
+            self.post_message(self.PlaceEdited())
+
+    def complain(self, error: UserError) -> None:
+        """One line below the fields; the wrong field is marked and gets the cursor."""
+        self.tell(f"{MARK}{error}")
+        field = form.field_of(error)
+        if field is not None:
+            wrong = self.query_one(f"#{field}", Input)
+            wrong.add_class("-wrong")
+            wrong.focus()
+
+    def tell(self, words: str) -> None:
+        self.query_one("#wrong", Static).update(Text(plain(words)))
+
+
+def _field(field: form.Field) -> ComposeResult:
+    yield Label(field.label, markup=False)
+    yield Input(id=field.id, compact=True, tooltip=field.tooltip)
+
+
+def _select(id: str, choices: tuple[str, ...], tooltip: str) -> Select:
+    select = Select([(choice, choice) for choice in choices], id=id, allow_blank=False, compact=True)
+    select.tooltip = tooltip
+    return select

@@ -1,0 +1,77 @@
+"""Numbers and names as the screen words them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+# Every status and verdict has a sign of its own, so that nothing is told by colour alone.
+STATUS = {
+    "created": ("○", "not started"),
+    "starting": ("◌", "engine starts"),
+    "baseline": ("▶", "baseline"),
+    "running": ("▶", "running"),
+    "paused": ("‖", "paused"),
+    "waiting": ("?", "waiting"),
+    "finished": ("■", "finished"),
+    "stopped": ("□", "stopped"),
+    "failed": ("✗", "failed"),
+    "lost": ("✗", "engine is gone"),
+}
+OUTCOME = {
+    "similar": "● similar",
+    "other": "◇ other failure",
+    "pass": "○ pass",
+    "error": "✗ error",
+    "timeout": "◷ timeout",
+    "failed": "◆ failed",
+    "lost": "– lost",
+}
+VERDICT = {
+    "similar": "● similar",
+    "dissimilar": "○ dissimilar",
+    "vetoed": "⊘ vetoed",
+    "rejected": "✗ rejected",
+}
+
+
+def plain(text: Any) -> str:
+    """`text` on one line without control characters: names come from files, and must not steer the terminal."""
+    return "".join(char if char.isprintable() else "�" for char in " ".join(str(text).split()))
+
+
+def shorten(text: str, width: int) -> str:
+    """At most `width` characters, with an ellipsis where something was left out."""
+    return text if len(text) <= width else f"{text[: max(0, width - 1)]}…"
+
+
+def count(number: int, noun: str) -> str:
+    """1 model, 2 models."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def duration(seconds: float) -> str:
+    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
+    whole = max(0, round(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
+
+
+def metres(value: Any, digits: int = 1) -> str:
+    """A distance in m, or nothing where there is none."""
+    if not isinstance(value, (int, float)) or not math.isfinite(value):
+        return ""
+    return f"{value:.{digits}f} m"
+
+
+def percent(part: float) -> str:
+    """A fraction as a whole percentage that is never rounded to certainty."""
+    value = round(100 * part)
+    if value == 0 and part > 0:
+        return "<1 %"
+    if value == 100 and part < 1:
+        return ">99 %"
+    return f"{value} %"
