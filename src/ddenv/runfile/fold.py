@@ -25,6 +25,7 @@ The kinds of events, with their data (models are numbers into the run's `element
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -51,7 +52,7 @@ def apply(state: RunState, event: Event) -> RunState:
         raise UserError(f"damaged run file: event {event.id} is of an unknown kind '{event.kind[:40]}'")
     try:
         state = handler(state, event.data, event.time)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise UserError(f"damaged run file: event {event.id} ({event.kind}) makes no sense here") from None
     return replace(state, revision=event.id, updated_at=event.time)
 
@@ -64,27 +65,42 @@ def _created(state: RunState, data: Data, _: float) -> RunState:
 
 def _engine_started(state: RunState, data: Data, at: float) -> RunState:
     status = "baseline" if state.baseline is None else "running"
+    # An engine that was killed told no end: it worked at least until its last event.
+    spent = 0.0 if state.started_at is None else max(0.0, state.updated_at - state.started_at)
     return replace(
-        state, status=status, reason="", paused=False, waiting_candidate=None, jobs=int(data["jobs"]), started_at=at
+        state,
+        status=status,
+        reason="",
+        paused=False,
+        waiting_candidate=None,
+        jobs=int(data["jobs"]),
+        started_at=at,
+        working_seconds=state.working_seconds + spent,
     )
 
 
 def _test_started(state: RunState, data: Data, _: float) -> RunState:
-    fields = ("phase", "round", "candidate", "run", "seed")
-    test = Test(int(data["test"]), **{name: data[name] for name in fields})
+    round, candidate = data["round"], data["candidate"]
+    test = Test(int(data["test"]), str(data["phase"]), round, candidate, int(data["run"]), int(data["seed"]))
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
     state = replace(state, tests=(*state.tests, test))
-    if state.round is None or test.phase != "round" or test.round != state.round.number:
+    if state.round is None or round != state.round.number:
         return state
-    candidate = state.round.candidates[test.candidate]
-    return _with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
+    tried = _candidate(state, candidate)
+    return _with_candidate(state, replace(tried, tests=(*tried.tests, test.id)))
 
 
 def _test_finished(state: RunState, data: Data, _: float) -> RunState:
-    fields = ("outcome", "failure", "distance", "simulated_seconds", "wall_seconds")
-    pose = data["end_pose"]
-    values = {name: data[name] for name in fields} | {"end_pose": None if pose is None else tuple(map(float, pose))}
+    distance, pose = data["distance"], data["end_pose"]
+    values = {
+        "outcome": str(data["outcome"]),
+        "failure": str(data["failure"]),
+        "distance": None if distance is None else _number(distance),
+        "end_pose": None if pose is None else _vector(pose, 7),
+        "simulated_seconds": _number(data["simulated_seconds"]),
+        "wall_seconds": _number(data["wall_seconds"]),
+    }
     return _with_test(state, int(data["test"]), values)
 
 
@@ -93,11 +109,21 @@ def _test_lost(state: RunState, data: Data, _: float) -> RunState:
 
 
 def _baseline_finished(state: RunState, data: Data, _: float) -> RunState:
-    data = dict(data)
-    outcomes, distances = data.pop("outcomes"), data.pop("distances")
-    for test, outcome in outcomes.items():
-        state = _with_test(state, int(test), {"outcome": str(outcome), "distance": distances.get(test)})
-    baseline = Baseline(**data | {"position": tuple(map(float, data["position"]))})
+    for test, outcome in data["outcomes"].items():
+        distance = data["distances"].get(test)
+        values = {"outcome": str(outcome), "distance": None if distance is None else _number(distance)}
+        state = _with_test(state, int(test), values)
+    baseline = Baseline(
+        runs=int(data["runs"]),
+        failures=int(data["failures"]),
+        rate=_number(data["rate"]),
+        low=_number(data["low"]),
+        high=_number(data["high"]),
+        failure_test=int(data["failure_test"]),
+        position=_vector(data["position"], 3),
+        miss_chance=_number(data["miss_chance"]),
+        iterations_95=int(data["iterations_95"]),
+    )
     point = Point(len(state.finished_tests), len(state.environment))
     state = replace(state, baseline=baseline, evidence_test=baseline.failure_test, history=(*state.history, point))
     return state if state.paused else replace(state, status="running")
@@ -112,19 +138,20 @@ def _round_started(state: RunState, data: Data, _: float) -> RunState:
         if kind == "complement":
             part = frozenset(models)
             models = tuple(name for name in environment if name not in part)
+        distance = None if distance is None else _number(distance)
         candidates.append(Candidate(index, str(kind), int(partition), models, distance))
     number, n_partitions = int(data["round"]), int(data["n_partitions"])
     return replace(state, round=Round(number, n_partitions, environment, partitions, tuple(candidates)))
 
 
 def _candidate_judged(state: RunState, data: Data, _: float) -> RunState:
-    candidate = state.round.candidates[data["candidate"]]
+    candidate = _candidate(state, data["candidate"])
     tests, known = tuple(map(int, data["tests"])), int(data["known"])
     return _with_candidate(state, replace(candidate, verdict=str(data["verdict"]), tests=tests, known=known))
 
 
 def _waiting(state: RunState, data: Data, _: float) -> RunState:
-    return replace(state, status="waiting", waiting_candidate=int(data["candidate"]))
+    return replace(state, status="waiting", waiting_candidate=_candidate(state, data["candidate"]).index)
 
 
 def _decided(state: RunState, data: Data, _: float) -> RunState:
@@ -132,13 +159,13 @@ def _decided(state: RunState, data: Data, _: float) -> RunState:
     state = replace(state, status=status, waiting_candidate=None)
     if data["decision"] == "accept":
         return state
-    return _with_candidate(state, replace(state.round.candidates[data["candidate"]], verdict="rejected"))
+    return _with_candidate(state, replace(_candidate(state, data["candidate"]), verdict="rejected"))
 
 
 def _reduced(state: RunState, data: Data, _: float) -> RunState:
     environment = _names(state, data["environment"])
     history = (*state.history, Point(len(state.finished_tests), len(environment)))
-    won = replace(state.round, winner=int(data["candidate"]))
+    won = replace(state.round, winner=_candidate(state, data["candidate"]).index)
     test = int(data["evidence_test"])
     return replace(state, environment=environment, round=won, history=history, evidence_test=test)
 
@@ -162,7 +189,7 @@ def _accept_mode(state: RunState, data: Data, _: float) -> RunState:
 
 def _vetoed(state: RunState, data: Data, _: float) -> RunState:
     verdict = str(data["verdict"])
-    return _with_candidate(state, replace(state.round.candidates[data["candidate"]], verdict=verdict))
+    return _with_candidate(state, replace(_candidate(state, data["candidate"]), verdict=verdict))
 
 
 def _command_handled(state: RunState, data: Data, _: float) -> RunState:
@@ -208,6 +235,26 @@ def _with_candidate(state: RunState, candidate: Candidate) -> RunState:
     candidates = state.round.candidates
     changed = (*candidates[: candidate.index], candidate, *candidates[candidate.index + 1 :])
     return replace(state, round=replace(state.round, candidates=changed))
+
+
+def _candidate(state: RunState, index: int) -> Candidate:
+    if not 0 <= index < len(state.round.candidates):
+        raise IndexError(index)
+    return state.round.candidates[index]
+
+
+def _number(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(value)
+    return number
+
+
+def _vector(values: Any, length: int) -> tuple[float, ...]:
+    vector = tuple(_number(value) for value in values)
+    if len(vector) != length:
+        raise ValueError(values)
+    return vector
 
 
 def _names(state: RunState, numbers: list[int]) -> tuple[str, ...]:

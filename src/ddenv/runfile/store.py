@@ -23,6 +23,8 @@ from ddenv.errors import UserError
 APPLICATION_ID = 0x64644531
 SCHEMA_VERSION = 1
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
+# How long to wait for another's write: a screen must not stand still, an engine must not give up. s
+VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
 
 _SCHEMA = """
 CREATE TABLE document (name TEXT PRIMARY KEY, content BLOB NOT NULL) WITHOUT ROWID;
@@ -89,7 +91,7 @@ class RunFile:
         if not path.is_file():
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
         try:
-            self._db = sqlite3.connect(path, isolation_level=None, timeout=10.0)
+            self._db = sqlite3.connect(path, isolation_level=None, timeout=VIEWER_WAIT)
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.Error as error:
@@ -112,9 +114,9 @@ class RunFile:
 
     def document(self, name: str) -> bytes:
         row = self._one("SELECT content FROM document WHERE name = ?", (name,))
-        if row is None:
+        if row is None or not isinstance(row[0], bytes):
             raise UserError(f"{self.path}: damaged run file: it has no document '{name}'")
-        return bytes(row[0])
+        return row[0]
 
     def events(self, after: int = 0) -> list[Event]:
         """All events with an id above `after`, in order."""
@@ -132,12 +134,12 @@ class RunFile:
     def motion(self, test: int, model: str = ROBOT) -> array | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
         row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, model))
-        return None if row is None else _floats(bytes(row[0]), self.path)
+        return None if row is None else _floats(row[0], self.path)
 
     def motions(self, test: int) -> dict[str, array]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
         rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (test,))
-        return {model: _floats(bytes(samples), self.path) for model, samples in rows}
+        return {model: _floats(samples, self.path) for model, samples in rows}
 
     def live(self) -> list[Live]:
         """The tests that run now, by worker slot."""
@@ -148,6 +150,7 @@ class RunFile:
 
     def own(self) -> None:
         """Prepares for writing: readers are never blocked, and a killed engine loses no committed event."""
+        self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
         self._db.execute("PRAGMA journal_mode = WAL")
@@ -211,9 +214,9 @@ class RunFile:
             raise UserError(f"{self.path}: cannot be written: {error}; what is in it is intact") from None
 
 
-def _floats(samples: bytes, path: Path) -> array:
+def _floats(samples: object, path: Path) -> array:
     values = array("d")
-    if len(samples) % (8 * COLUMNS):
+    if not isinstance(samples, bytes) or len(samples) % (8 * COLUMNS):
         raise UserError(f"{path}: damaged run file: a trajectory is cut short")
     values.frombytes(samples)
     if sys.byteorder == "big":

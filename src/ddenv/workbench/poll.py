@@ -117,10 +117,7 @@ class Poll:
         """The state after the new events, up to the first one that makes no sense."""
         try:
             for event in self.file.events(after=state.revision):
-                following = apply(state, event)
-                if not _sensible(following):
-                    raise UserError(f"{self.path}: damaged run file: event {event.id} ({event.kind}) does not fit")
-                state = following
+                state = apply(state, event)
         except UserError as error:
             return state, str(error)
         return state, ""
@@ -152,20 +149,6 @@ class Poll:
             return int(state.working_seconds)
         until = now() if engine == "alive" else state.updated_at
         return int(state.working_seconds + max(0.0, until - state.started_at))
-
-
-def _sensible(state: RunState) -> bool:
-    """Whether what the screen counts on holds: numbers are numbers, and candidates that are referred to exist."""
-    current, base = state.round, state.baseline
-    total = len(current.candidates) if current else 0
-    named = (state.waiting_candidate, current.winner if current else None)
-    if not all(index is None or 0 <= index < total for index in named):
-        return False
-    if base is None:
-        return True
-    numbers = (base.runs, base.failures, base.rate, base.low, base.high, base.miss_chance, base.iterations_95)
-    numbers = (*numbers, *base.position)
-    return len(base.position) == 3 and all(isinstance(each, (int, float)) and math.isfinite(each) for each in numbers)
 
 
 def _finite(row: Live) -> bool:
