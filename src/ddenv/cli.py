@@ -82,7 +82,9 @@ def app(context: click.Context) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 def run(scenario, spawn, goal, world, timeout, name, output, jobs, as_json, **options) -> int:
     """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
-    from ddenv.launch import create_run, run_path, start_engine, with_options
+    from ddenv.launch.programs import start_engine
+    from ddenv.launch.runs import create_run, run_path
+    from ddenv.launch.scenarios import with_options
 
     chosen = with_options(_scenario(scenario, spawn, goal, world, timeout), **options)
     path = run_path(chosen.name, name, output)
@@ -97,7 +99,8 @@ def run(scenario, spawn, goal, world, timeout, name, output, jobs, as_json, **op
 @click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 def resume(run: str, jobs: int, as_json: bool) -> int:
     """Goes on with RUN (a name or a file) without a screen; no finished test is made again."""
-    from ddenv.launch import find_run, start_engine
+    from ddenv.launch.programs import start_engine
+    from ddenv.launch.runs import find_run
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
 
@@ -111,7 +114,7 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
 @click.argument("run")
 def open_run(run: str) -> int:
     """Attaches the workbench to RUN (a name or a file)."""
-    from ddenv.launch import find_run
+    from ddenv.launch.runs import find_run
     from ddenv.runfile.store import RunFile
 
     path = find_run(run)
@@ -125,7 +128,7 @@ def open_run(run: str) -> int:
 def runs() -> int:
     """Lists the runs."""
     from ddenv.console.runs import run_lines
-    from ddenv.launch import runs_folder
+    from ddenv.launch.runs import runs_folder
 
     lines = run_lines(runs_folder())
     print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
@@ -166,7 +169,7 @@ def test(subject, spawn, goal, world, timeout, keep, jobs, as_json, leave_out, *
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     """Writes the world that RUN has left."""
-    from ddenv.launch import export_world, find_run
+    from ddenv.launch.runs import export_world, find_run
 
     if sdf is None:
         raise UserError("nothing to export: give --sdf FILE")
@@ -177,7 +180,7 @@ def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
 
 def _scenario(name, spawn, goal, world, timeout):
     """The scenario that a command line asks for."""
-    from ddenv.launch import scenario_for_world, with_options
+    from ddenv.launch.scenarios import scenario_for_world, with_options
     from ddenv.world.load import find_scenario, load_scenario
 
     if Path(name).suffix.lower() in (".sdf", ".world"):
@@ -190,7 +193,8 @@ def _scenario(name, spawn, goal, world, timeout):
 def _subject(name, spawn, goal, world, timeout):
     """What `ddenv test` tries: a run where there is one of that name, else a scenario."""
     from ddenv.engine.trial import Subject, subject_of_run
-    from ddenv.launch import find_run, load_parts
+    from ddenv.launch.runs import find_run
+    from ddenv.launch.scenarios import load_parts
     from ddenv.runfile.store import RunFile
 
     path = find_run(name)
@@ -206,7 +210,7 @@ def _subject(name, spawn, goal, world, timeout):
 def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
     from ddenv.console.follow import Interrupted, follow
     from ddenv.console.summary import lines, summary
-    from ddenv.launch import export_world
+    from ddenv.launch.runs import export_world
 
     code = 0
     try:

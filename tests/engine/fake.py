@@ -14,9 +14,10 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
+from ddenv.launch.runs import create_run
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import Live, RunFile, create
+from ddenv.runfile.store import Live, RunFile
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
 from tests.conftest import DATA
@@ -73,8 +74,7 @@ def new_run(folder: Path, **reduction) -> Path:
     scenario = load_scenario(DATA / "wall.yaml")
     scenario = scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)})
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
-    documents = {"world": scenario.world.read_bytes(), "robot": scenario.robot.model.read_bytes()}
-    create(path, documents | {"scenario": scenario.model_dump_json().encode()})
+    create_run(scenario, path)
     return path
 
 
@@ -83,13 +83,13 @@ def drive(
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
-    from ddenv.launch import read_parts
+    from ddenv.launch.runs import read_parts
 
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)
         file.own()
         journal = Journal(file)
-        _begin(journal, scenario, world, pool.jobs, accept_mode)
+        _begin(journal, pool.jobs, accept_mode)
         if prepare is not None:
             prepare(file)
         control = Control(journal, threading.Event(), time.time())

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.launch import create_run, scenario_for_world
+from ddenv.launch.runs import create_run
+from ddenv.launch.scenarios import scenario_for_world
 from ddenv.runfile.store import RunFile
 from ddenv.world.read import parse_world
 

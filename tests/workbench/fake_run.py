@@ -63,10 +63,10 @@ class FakeRun:
         self.path, self.data = path, data
         self.world = world or world_text()
         documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
-        create(path, documents)
+        self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
+        create(path, documents, {"scenario": data, "elements": self.elements})
         self.file = RunFile(path)
         self.file.own()
-        self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
         self.tests = 0
         self.round = 0
         self._stack = ExitStack()

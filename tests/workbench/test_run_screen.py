@@ -264,7 +264,7 @@ async def test_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
         started.append((path, jobs, options))
         return SimpleNamespace(poll=lambda: None)
 
-    monkeypatch.setattr("ddenv.launch.start_engine", start_engine)
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
     fake_run.mid_round(run)
     async with Attached(run) as session:
         assert "engine is gone" in session.text("#status")
@@ -282,7 +282,7 @@ async def test_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
 
 
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
-    monkeypatch.setattr("ddenv.launch.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
     fake_run.mid_round(run)
     run.path.with_name("crates-1.ddenv.log").write_text("starting\nno module named x\n")
     async with Attached(run) as session:
@@ -307,7 +307,7 @@ def scene_program(code):
 
 async def test_m_shows_where_the_scene_is(run, monkeypatch):
     program = f"import time; print({URL!r}, flush=True); time.sleep(60)"
-    monkeypatch.setattr("ddenv.launch.start_scene", scene_program(program))
+    monkeypatch.setattr("ddenv.launch.programs.start_scene", scene_program(program))
     monkeypatch.setattr("getpass.getuser", lambda: "ada")
     monkeypatch.setattr("socket.gethostname", lambda: "lab")
     fake_run.finished(run)
@@ -335,7 +335,7 @@ async def test_m_shows_where_the_scene_is(run, monkeypatch):
 
 
 async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
-    monkeypatch.setattr("ddenv.launch.start_scene", scene_program("pass"))
+    monkeypatch.setattr("ddenv.launch.programs.start_scene", scene_program("pass"))
     run.path.with_name("crates-1.ddenv.scene.log").write_text("no port is free\n")
     fake_run.finished(run)
     async with Attached(run) as session:
@@ -349,7 +349,7 @@ async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
 
 async def test_the_scene_ends_with_the_workbench(run, monkeypatch):
     monkeypatch.setattr(
-        "ddenv.launch.start_scene", scene_program(f"import time; print({URL!r}, flush=True); time.sleep(60)")
+        "ddenv.launch.programs.start_scene", scene_program(f"import time; print({URL!r}, flush=True); time.sleep(60)")
     )
     fake_run.finished(run)
     async with Attached(run) as session:

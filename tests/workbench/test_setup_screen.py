@@ -70,7 +70,7 @@ def started(monkeypatch):
         calls.append((path.name, jobs, options))
         return SimpleNamespace(poll=lambda: None)
 
-    monkeypatch.setattr("ddenv.launch.start_engine", start_engine)
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
     return calls
 
 
@@ -99,7 +99,7 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started,
         assert started == [("crates-1.ddenv", 3, {"accept_mode": "ask"})]
         assert isinstance(session.app.screen, RunScreen)
         assert (runs / "crates-1.ddenv").is_file()
-        from ddenv.launch import read_parts
+        from ddenv.launch.runs import read_parts
 
         scenario = read_parts(session.app.screen._poll.file)[0]
         assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)

@@ -11,7 +11,7 @@ from typing import TextIO
 
 from ddenv.console.words import headline, news
 from ddenv.errors import UserError
-from ddenv.launch import last_words
+from ddenv.launch.programs import last_words
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState

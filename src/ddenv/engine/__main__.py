@@ -19,11 +19,10 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
-from ddenv.launch import ENGINE_SAYS, ENGINE_STARTED, read_parts
+from ddenv.launch.programs import ENGINE_SAYS, ENGINE_STARTED
+from ddenv.launch.runs import read_parts
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
-from ddenv.world.model import World
-from ddenv.world.scenario import Scenario
 
 
 def main() -> int:
@@ -57,7 +56,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     if journal.state.status == "finished":
         return 0
     try:
-        _begin(journal, scenario, world, jobs, options.accept_mode)
+        _begin(journal, jobs, options.accept_mode)
         control = Control(journal, terminated, options.since)
         pool = Pool(scenario, world, robot, jobs)
         try:
@@ -77,10 +76,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     return 0
 
 
-def _begin(journal: Journal, scenario: Scenario, world: World, jobs: int, accept_mode: str | None) -> None:
-    if not journal.state.elements:
-        elements = world.elements(frozenset(scenario.protected))
-        journal.record("created", scenario=scenario.model_dump(mode="json"), elements=elements)
+def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     journal.lose_running()
     journal.record("engine_started", pid=os.getpid(), jobs=jobs)
     if accept_mode and accept_mode != journal.state.accept_mode:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
-from ddenv.launch import read_parts
+from ddenv.launch.runs import read_parts
 from ddenv.robot.oracle import Failure, judge
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState

@@ -56,8 +56,11 @@ class Live:
     pose: tuple[float, ...]
 
 
-def create(path: Path, documents: dict[str, bytes]) -> None:
-    """Makes a new run file, whole or not at all. Raises UserError if it exists or cannot be written."""
+def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> None:
+    """Makes a new run file, whole or not at all, with `created` as its first event.
+
+    Raises UserError if it exists or cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -68,6 +71,8 @@ def create(path: Path, documents: dict[str, bytes]) -> None:
         connection = sqlite3.connect(name, isolation_level=None)
         connection.executescript(_SCHEMA)
         connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
+        first = (time.time(), "created", json.dumps(created, allow_nan=False))
+        connection.execute("INSERT INTO event (time, kind, data) VALUES (?, ?, ?)", first)
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         connection.close()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ddenv.launch import read_parts
+from ddenv.launch.runs import read_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState

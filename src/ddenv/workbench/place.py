@@ -28,7 +28,7 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 def place_of_run(path: Path) -> Place:
     """What a run file was made from. Raises UserError."""
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
-    from ddenv.launch import read_parts
+    from ddenv.launch.runs import read_parts
 
     with RunFile(path) as run:
         scenario, world, _ = read_parts(run)

@@ -22,7 +22,7 @@ class Engine:
 
     def start(self, jobs: int, accept_mode: str) -> None:
         """Raises UserError if it cannot be started."""
-        from ddenv.launch import start_engine
+        from ddenv.launch.programs import start_engine
 
         try:
             self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode)
@@ -63,7 +63,7 @@ class Scene:
 
     def start(self) -> None:
         """Starts the program; `wait` for its URL then."""
-        from ddenv.launch import start_scene
+        from ddenv.launch.programs import start_scene
 
         self.url = self.trouble = ""
         try:

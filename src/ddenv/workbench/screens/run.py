@@ -262,7 +262,7 @@ def attach_name(run: Path) -> str:
     """What to type for this run: its name if it lies in the runs folder, else its path, quoted for a shell."""
     import shlex
 
-    from ddenv.launch import find_run
+    from ddenv.launch.runs import find_run
 
     name = run.stem if find_run(run.stem) == run else str(run)
     return shlex.quote(plain(name))

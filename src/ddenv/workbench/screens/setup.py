@@ -118,7 +118,7 @@ class SetupScreen(Screen[None]):
 
     @work(thread=True, group="runs", exclusive=True)
     def _list_runs(self) -> None:
-        from ddenv.launch import runs_folder
+        from ddenv.launch.runs import runs_folder
 
         runs = recent_runs(runs_folder())
         self.app.call_from_thread(self._show_runs, runs)
@@ -185,7 +185,7 @@ class SetupScreen(Screen[None]):
     def _preview(self, chosen: Chosen | None, place: Place, wrong: str) -> None:
         if not self.is_attached:
             return
-        from ddenv.launch import free_run_path
+        from ddenv.launch.runs import free_run_path
 
         self._chosen = chosen
         self.query_one(WorldMap).set_place(place, wrong)
@@ -246,7 +246,8 @@ class SetupScreen(Screen[None]):
 
     def _asked_for(self) -> tuple[Scenario, int, Path]:
         """What the form says. Raises UserError."""
-        from ddenv.launch import find_run, scenario_for_world, with_options
+        from ddenv.launch.runs import find_run
+        from ddenv.launch.scenarios import scenario_for_world, with_options
 
         if self._chosen is None:
             raise UserError("choose a scenario or a world that can be read first")
@@ -264,7 +265,7 @@ class SetupScreen(Screen[None]):
 
     @work(thread=True, group="start", exclusive=True)
     def _create(self, scenario: Scenario, jobs: int, path: Path, mode: str) -> None:
-        from ddenv.launch import create_run
+        from ddenv.launch.runs import create_run
 
         engine = Engine(path)
         try:

@@ -1,0 +1,50 @@
+"""Starts the programs that work beside a view: the engine, and the 3-D scene."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+# How the engine's own lines in its log begin, among whatever libraries print there; and its first one.
+ENGINE_SAYS = "ddenv engine:"
+ENGINE_STARTED = "started"
+
+
+def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
+    """Starts the engine on a run as a program in its own session, so that it outlives this terminal.
+
+    Its output goes to a log beside the run file. `options` become `--name value` on its command line.
+    """
+    words = [sys.executable, "-m", "ddenv.engine", str(run), "--jobs", str(jobs), "--since", repr(time.time())]
+    for name, value in options.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    with run.with_name(f"{run.name}.log").open("ab") as log:
+        return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+
+
+def last_words(run: Path) -> str:
+    """Why the engine that was last started on a run is gone, from its log."""
+    log = run.with_name(f"{run.name}.log")
+    lines = log.read_text(errors="replace").splitlines() if log.exists() else []
+    said = ""
+    for line in lines:
+        if line.startswith(ENGINE_SAYS):
+            said = line.removeprefix(ENGINE_SAYS).strip()
+    if said and said != ENGINE_STARTED:
+        return said
+    return f"{run}: the engine was killed or crashed (see {log}); go on with 'ddenv resume {run}'"
+
+
+def start_scene(run: Path, port: int = 0) -> subprocess.Popen:
+    """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
+
+    It ends with the program that started it. An empty first line means that it could not start: its log says why.
+    """
+    words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port)]
+    with run.with_name(f"{run.name}.scene.log").open("ab") as log:
+        return subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+        )

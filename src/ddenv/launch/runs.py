@@ -1,0 +1,100 @@
+"""Run files by name: where they are, how one is made from a scenario, and what it was made from."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import platformdirs
+import yaml
+
+from ddenv.errors import UserError
+from ddenv.launch.scenarios import load_parts
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile, create
+from ddenv.world.model import Model, World
+from ddenv.world.read import parse_model, parse_world, read_bytes
+from ddenv.world.scenario import Scenario
+from ddenv.world.write import without, write_file
+
+SUFFIX = ".ddenv"
+
+
+def runs_folder() -> Path:
+    """Where runs are kept unless a path is given: `$DDENV_HOME/runs`, or the user's data folder."""
+    home = os.environ.get("DDENV_HOME")
+    return (Path(home) if home else Path(platformdirs.user_data_dir("ddenv", appauthor=False))) / "runs"
+
+
+def find_run(name: str) -> Path:
+    """The run file called `name`, a path or a name in the runs folder."""
+    path = Path(name)
+    if path.exists() or path.suffix == SUFFIX or len(path.parts) > 1:
+        return path
+    return runs_folder() / f"{name}{SUFFIX}"
+
+
+def free_run_path(scenario_name: str) -> Path:
+    """The first free name-1, name-2, ... in the runs folder."""
+    stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
+    number = 1
+    while (path := runs_folder() / f"{stem}-{number}{SUFFIX}").exists():
+        number += 1
+    return path
+
+
+def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
+    """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
+    if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
+        raise UserError(f"--name: '{name}' cannot be a file's name; use letters, digits, - and _")
+    if output is None or output.suffix in (".sdf", ".world"):
+        if output is not None and not output.parent.is_dir():
+            raise UserError(f"--output: there is no folder {output.parent}")
+        return free_run_path(scenario_name) if name is None else runs_folder() / f"{name}{SUFFIX}"
+    if output.is_dir():
+        return output / f"{name or scenario_name}{SUFFIX}"
+    if output.suffix != SUFFIX:
+        raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
+    return output
+
+
+def create_run(scenario: Scenario, path: Path) -> None:
+    """Writes a new run file that holds all a reduction needs. Raises UserError, with nothing written."""
+    world, _ = load_parts(scenario)
+    documents = {
+        "scenario": scenario.model_dump_json().encode(),
+        "world": world.text,
+        "robot": read_bytes(scenario.robot.model),
+    }
+    elements = world.elements(frozenset(scenario.protected))
+    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+
+
+def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
+    """What a run file was made from: its scenario, its world and its robot."""
+    try:
+        scenario = Scenario.model_validate_json(run.document("scenario"))
+    except ValueError:
+        raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
+    world = parse_world(run.document("world"), scenario.world)
+    robot = parse_model(run.document("robot"), scenario.robot.model)
+    return scenario, world, robot
+
+
+def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> list[Path]:
+    """Writes the environment that a run has left as an SDF world, and a scenario for it; returns what was written."""
+    with RunFile(run) as file:
+        scenario, world, _ = read_parts(file)
+        robot = file.document("robot")
+        state = fold(file.events())
+    if not state.elements:
+        raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
+    write_file(sdf, without(world, frozenset(state.elements) - frozenset(state.environment)))
+    if scenario_file is None:
+        return [sdf]
+    model = scenario_file.with_suffix(".robot.sdf")
+    write_file(model, robot)
+    data = scenario.model_dump(mode="json")
+    data["world"], data["robot"]["model"] = str(sdf.resolve()), str(model.resolve())
+    write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+    return [sdf, model, scenario_file]
