@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ddenv import __version__
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 
 JOBS = os.cpu_count() or 1
 
@@ -107,7 +107,8 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
     path = find_run(run)
     with RunFile(path), engine_lock(path):
         pass
-    return _follow(path, start_engine(path, jobs), as_json, None)
+    # Nobody is there to ask.
+    return _follow(path, start_engine(path, jobs, accept_mode="automatic"), as_json, None)
 
 
 @app.command("open")
@@ -157,7 +158,7 @@ def test(subject, spawn, goal, world, timeout, keep, jobs, as_json, leave_out, *
     for result in run_trials(what, trials, jobs):
         told.append(result)
         if not as_json:
-            print(_trial_line(result), flush=True)
+            print(printable(_trial_line(result)), flush=True)
     if as_json:
         print(json.dumps({"runs": told}))
     return 0
@@ -186,6 +187,8 @@ def _scenario(name, spawn, goal, world, timeout):
     if Path(name).suffix.lower() in (".sdf", ".world"):
         if spawn is None or goal is None:
             raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
+        if world is not None:
+            raise UserError(f"--world: goes with a scenario; {name} is a world already")
         return with_options(scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal), timeout=timeout)
     return with_options(load_scenario(find_scenario(name)), timeout=timeout, spawn=spawn, goal=goal, world=world)
 
@@ -198,7 +201,7 @@ def _subject(name, spawn, goal, world, timeout):
     from ddenv.runfile.store import RunFile
 
     path = find_run(name)
-    if path.suffix == ".ddenv" and (path.exists() or name.endswith(".ddenv")):
+    if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
         if any(option is not None for option in (spawn, goal, world, timeout)):
             raise UserError("--spawn, --goal, --world and --timeout go with a scenario; a run keeps its own")
         with RunFile(path) as file:
@@ -218,9 +221,9 @@ def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
         code = 0 if state.minimal else 1
     except Interrupted as interrupted:
         state, code = interrupted.state, 130
+    print(json.dumps(summary(state, path)) if as_json else "\n".join(lines(state, path)), flush=True)
     if sdf is not None and state.baseline is not None:
         export_world(path, sdf, None)
-    print(json.dumps(summary(state, path)) if as_json else "\n".join(lines(state, path)))
     if code == 130:
         print(f"interrupted; go on with: ddenv resume {path}", file=sys.stderr)
     return code

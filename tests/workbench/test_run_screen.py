@@ -284,11 +284,13 @@ async def test_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
     monkeypatch.setattr("ddenv.launch.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
     fake_run.mid_round(run)
-    run.path.with_name("crates-1.ddenv.log").write_text("starting\nno module named x\n")
+    run.path.with_name("crates-1.ddenv.log").write_text(
+        "ddenv engine: started\nModuleNotFoundError: No module named 'x'\n"
+    )
     async with Attached(run) as session:
         await session.press("r")
         await session.look()
-        assert "The engine ended with code 3: no module named x" in session.text("#happening")
+        assert "crashed: ModuleNotFoundError: No module named 'x'" in session.text("#happening")
 
 
 async def test_a_finished_run_is_not_resumed(run):

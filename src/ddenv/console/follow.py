@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.console.words import headline, news
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 from ddenv.launch.programs import last_words
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
@@ -35,7 +35,9 @@ def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
     signal.signal(signal.SIGTERM, _interrupt)
     view = _Line(out) if out.isatty() else _Plain(out)
     with RunFile(path) as file:
-        state = RunState()
+        state = fold(file.events())
+        before = state.revision
+        view.now(state)
         try:
             while engine.poll() is None:
                 state = _update(file, state, view)
@@ -48,8 +50,12 @@ def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
             raise Interrupted(state) from None
         state = _update(file, state, view)
     view.close()
-    if not state.ended or state.status == "failed":
-        raise UserError(state.reason or last_words(path))
+    # An engine that said nothing at all did not start, unless there was nothing left to do.
+    silent = state.revision == before and engine.returncode != 0
+    if silent or not state.ended:
+        raise UserError(last_words(path))
+    if state.status == "failed":
+        raise UserError(state.reason)
     return state
 
 
@@ -58,7 +64,10 @@ def _interrupt(*_: object) -> None:
 
 
 def _stop(file: RunFile, engine: subprocess.Popen) -> None:
-    file.send("stop")
+    try:
+        file.send("stop")
+    except UserError:
+        engine.terminate()
     deadline = time.monotonic() + STOP_WAIT
     while engine.poll() is None and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -83,7 +92,7 @@ class _Plain:
     def happened(self, kind: str, before: RunState, after: RunState) -> None:
         line = news(kind, before, after)
         if line:
-            print(line, file=self._out, flush=True)
+            print(printable(line), file=self._out, flush=True)
 
     def now(self, state: RunState) -> None:
         pass
@@ -98,10 +107,10 @@ class _Line(_Plain):
     def happened(self, kind: str, before: RunState, after: RunState) -> None:
         line = news(kind, before, after)
         if line:
-            print(f"\r\x1b[K{line}", file=self._out, flush=True)
+            print(f"\r\x1b[K{printable(line)}", file=self._out, flush=True)
 
     def now(self, state: RunState) -> None:
-        print(f"\r\x1b[K{headline(state)}", end="", file=self._out, flush=True)
+        print(f"\r\x1b[K{printable(headline(state))}", end="", file=self._out, flush=True)
 
     def close(self) -> None:
         print("\r\x1b[K", end="", file=self._out, flush=True)

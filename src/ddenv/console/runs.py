@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
@@ -12,9 +12,16 @@ from ddenv.runfile.store import RunFile
 
 def run_lines(folder: Path) -> list[str]:
     """One line a run, newest first: name, status, models left, tests. A damaged file says so in its line."""
-    paths = sorted(folder.glob("*.ddenv"), key=lambda path: path.stat().st_mtime, reverse=True)
+    paths = sorted((path for path in folder.glob("*.ddenv") if path.is_file()), key=_changed, reverse=True)
     width = max((len(path.stem) for path in paths), default=0)
-    return [f"{path.stem:<{width}}  {_line(path)}" for path in paths]
+    return [printable(f"{path.stem:<{width}}  {_line(path)}") for path in paths]
+
+
+def _changed(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:
+        return 0.0
 
 
 def _line(path: Path) -> str:

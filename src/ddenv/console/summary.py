@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.console.words import count
+from ddenv.errors import printable
 from ddenv.runfile.state import RunState
 
 
@@ -35,9 +36,10 @@ def lines(state: RunState, path: Path) -> list[str]:
         return [f"run file: {path}"]
     what = "minimal environment" if state.minimal else "environment so far"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
-    return [
+    told = [
         f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {', '.join(state.environment)}",
         f"{len(state.finished_tests)} tests ({tests}; {state.deflake_runs} re-runs) in {state.rounds_done} rounds, "
         f"{state.working_seconds:.0f} s",
         f"run file: {path}",
     ]
+    return [printable(line) for line in told]

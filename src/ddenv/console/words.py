@@ -38,6 +38,13 @@ def news(kind: str, before: RunState, after: RunState) -> str:
                 f"  {one.label} ({count(len(one.models), 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
                 for one in changed
             )
+        case "waiting":
+            waiting = after.round.candidates[after.waiting_candidate]
+            return f"  {waiting.label} shows f and waits for accept or reject: attach with 'ddenv open'"
+        case "paused":
+            return "paused from a workbench; it resumes from there too: attach with 'ddenv open'"
+        case "resumed":
+            return "resumed"
         case "reduced":
             return f"  reduced to {count(len(after.environment), 'model')} after {len(after.finished_tests)} tests"
         case "finished" | "engine_stopped" | "engine_failed":

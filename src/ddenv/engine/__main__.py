@@ -70,6 +70,12 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     except UserError as error:
         journal.record("engine_failed", reason=str(error))
         raise
+    except Exception as error:
+        # A mistake of ours: the traceback goes to the log, and whoever watches is told.
+        journal.record(
+            "engine_failed", reason=f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
+        )
+        raise
     finally:
         file.set_live([])
         file.settle()

@@ -65,7 +65,8 @@ class Driver:
         untried = [] if len(kept) == 1 else [name for name in kept if not self._is_dissimilar(kept - {name})]
         reason = "no single model can be removed"
         if untried:
-            reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test (vetoed or rejected)"
+            why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
+            reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"
         self._end(not untried, reason)
 
     def _end(self, minimal: bool, reason: str) -> None:
@@ -198,7 +199,7 @@ class Driver:
         self._evidence = Evidence(self._positions, self._trajectory(test), position, self._reduction.seed)
 
     def _trajectory(self, test: int) -> np.ndarray:
-        return np.array(self._journal.file.motion(test)).reshape(-1, COLUMNS)
+        return np.array(self._journal.file.trajectory(test)).reshape(-1, COLUMNS)
 
     def _similar(self) -> dict[tuple[Keep, int], bool]:
         tests = self._journal.state.tests

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 import multiprocessing
 from concurrent.futures import FIRST_COMPLETED, Future, TimeoutError, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 
 from pebble import ProcessExpired, ProcessPool
 
 from ddenv.engine import worker
+from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
+
+# How often workers may die between two finished tests before the world is given up.
+MOST_BREAKS = 3
 
 
 @dataclass(frozen=True)
@@ -24,21 +29,37 @@ class Broken:
     failure: str
 
 
+@dataclass(frozen=True)
+class Job:
+    """A test in flight, in its worker slot."""
+
+    test: int
+    keep: frozenset[str]
+    seed: int
+    slot: int
+
+
 class Pool:
     """`jobs` workers on one scenario; its `simulation.wall_timeout` bounds one test in real time."""
 
     def __init__(self, scenario: Scenario, world: World, robot: Model, jobs: int) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._progress = context.RawArray("d", jobs * COLUMNS)
-        self._pool = ProcessPool(
-            max_workers=jobs,
-            context=context,
-            initializer=worker.prepare,
-            initargs=(scenario, world, robot, self._progress),
-        )
+        self._jobs = jobs
+        self._context = multiprocessing.get_context("spawn")
+        self._progress = self._context.RawArray("d", jobs * COLUMNS)
+        self._parts = (scenario, world, robot)
         self._wall_timeout = scenario.simulation.wall_timeout
         self._free = list(range(jobs))
-        self._running: dict[Future, tuple[int, int]] = {}
+        self._running: dict[Future, Job] = {}
+        self._breaks = 0
+        self._pool = self._workers()
+
+    def _workers(self) -> ProcessPool:
+        return ProcessPool(
+            max_workers=self._jobs,
+            context=self._context,
+            initializer=worker.prepare,
+            initargs=(*self._parts, self._progress),
+        )
 
     @property
     def idle(self) -> int:
@@ -51,19 +72,45 @@ class Pool:
 
     def submit(self, test: int, keep: frozenset[str], seed: int) -> None:
         """Starts a test on an idle worker."""
-        slot = self._free.pop(0)
-        self._progress[slot * COLUMNS] = math.nan
-        future = self._pool.schedule(worker.run_test, args=(keep, seed, slot), timeout=self._wall_timeout)
-        self._running[future] = (test, slot)
+        job = Job(test, keep, seed, self._free.pop(0))
+        try:
+            self._schedule(job)
+        except RuntimeError:
+            # A worker died while it had nothing to do.
+            self._start_again([job])
+
+    def _schedule(self, job: Job) -> None:
+        self._progress[job.slot * COLUMNS] = math.nan
+        work = (job.keep, job.seed, job.slot)
+        self._running[self._pool.schedule(worker.run_test, args=work, timeout=self._wall_timeout)] = job
+
+    def _start_again(self, jobs: list[Job]) -> None:
+        """New workers for the tests in flight. Raises UserError if they die again and again before they finish a test."""
+        self._breaks += 1
+        if self._breaks > MOST_BREAKS:
+            raise UserError(
+                "the simulator's processes die before they run a test: is there enough memory for the world?"
+            )
+        self.close()
+        self._pool = self._workers()
+        jobs = [*self._running.values(), *jobs]
+        self._running.clear()
+        for job in jobs:
+            self._schedule(job)
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         """Tests that have ended, waiting at most `seconds` for one. Raises UserError if the world cannot be simulated."""
         done, _ = wait(self._running, timeout=seconds, return_when=FIRST_COMPLETED)
         results = []
-        for future in sorted(done, key=lambda one: self._running[one]):
-            test, slot = self._running.pop(future)
-            self._free.append(slot)
-            results.append((test, self._result(future)))
+        try:
+            for future in sorted(done, key=lambda one: self._running[one].test):
+                result = self._result(future)
+                job = self._running.pop(future)
+                self._free.append(job.slot)
+                self._breaks = 0
+                results.append((job.test, result))
+        except BrokenProcessPool:
+            self._start_again([])
         return results
 
     def _result(self, future: Future) -> RunResult | Broken:
@@ -77,10 +124,10 @@ class Pool:
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""
         rows = []
-        for test, slot in self._running.values():
-            values = self._progress[slot * COLUMNS : (slot + 1) * COLUMNS]
+        for job in self._running.values():
+            values = self._progress[job.slot * COLUMNS : (job.slot + 1) * COLUMNS]
             if all(map(math.isfinite, values)):
-                rows.append(Live(slot, test, values[0], tuple(values[1:])))
+                rows.append(Live(job.slot, job.test, values[0], tuple(values[1:])))
         return rows
 
     def close(self) -> None:

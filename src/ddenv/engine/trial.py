@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +50,7 @@ def subject_of_run(file: RunFile) -> Subject:
     state = fold(file.events())
     failure = None
     if state.baseline is not None:
-        trajectory = np.array(file.motion(state.baseline.failure_test)).reshape(-1, COLUMNS)
+        trajectory = np.array(file.trajectory(state.baseline.failure_test)).reshape(-1, COLUMNS)
         spec = scenario.failure
         failure = Failure(state.baseline.position, trajectory, spec.epsilon, spec.similarity)
     return Subject(scenario, world, robot, state, failure)
@@ -113,7 +114,8 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
 def _told(subject: Subject, trial: Trial, result: Any) -> dict[str, Any]:
     told = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
     if isinstance(result, Broken):
-        return told | {"outcome": result.outcome, "failure": result.failure, "end_pose": None}
+        nothing = dict.fromkeys(("end_pose", "distance", "simulated_seconds", "wall_seconds"))
+        return told | nothing | {"outcome": result.outcome, "failure": result.failure}
     outcome, distance = result.outcome, None
     if subject.failure is not None:
         judgement = judge(result, subject.failure)
@@ -121,8 +123,8 @@ def _told(subject: Subject, trial: Trial, result: Any) -> dict[str, Any]:
     return told | {
         "outcome": outcome,
         "failure": result.failure,
-        "end_pose": [float(value) for value in result.end_pose],
-        "distance": distance,
+        "end_pose": [float(value) for value in result.end_pose] if all(map(math.isfinite, result.end_pose)) else None,
+        "distance": distance if distance is None or math.isfinite(distance) else None,
         "simulated_seconds": result.simulated_seconds,
         "wall_seconds": result.wall_seconds,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -11,6 +12,8 @@ from typing import Any
 # How the engine's own lines in its log begin, among whatever libraries print there; and its first one.
 ENGINE_SAYS = "ddenv engine:"
 ENGINE_STARTED = "started"
+# The last line of a traceback.
+PYTHON_SAYS = re.compile(r"[\w.]*(Error|Exception)(:|$)")
 
 
 def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
@@ -28,14 +31,15 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
 def last_words(run: Path) -> str:
     """Why the engine that was last started on a run is gone, from its log."""
     log = run.with_name(f"{run.name}.log")
-    lines = log.read_text(errors="replace").splitlines() if log.exists() else []
-    said = ""
-    for line in lines:
+    said = crashed = ""
+    for line in log.read_text(errors="replace").splitlines() if log.exists() else []:
         if line.startswith(ENGINE_SAYS):
-            said = line.removeprefix(ENGINE_SAYS).strip()
+            said, crashed = line.removeprefix(ENGINE_SAYS).strip(), ""
+        elif PYTHON_SAYS.match(line):
+            crashed = f": {line.strip()}"
     if said and said != ENGINE_STARTED:
         return said
-    return f"{run}: the engine was killed or crashed (see {log}); go on with 'ddenv resume {run}'"
+    return f"{run}: the engine was killed or crashed{crashed} (see {log}); go on with 'ddenv resume {run}'"
 
 
 def start_scene(run: Path, port: int = 0) -> subprocess.Popen:

@@ -29,16 +29,20 @@ def runs_folder() -> Path:
 def find_run(name: str) -> Path:
     """The run file called `name`, a path or a name in the runs folder."""
     path = Path(name)
-    if path.exists() or path.suffix == SUFFIX or len(path.parts) > 1:
+    if path.is_file() or len(path.parts) > 1:
         return path
-    return runs_folder() / f"{name}{SUFFIX}"
+    return runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
 
 
 def free_run_path(scenario_name: str) -> Path:
     """The first free name-1, name-2, ... in the runs folder."""
+    return _free(runs_folder(), scenario_name)
+
+
+def _free(folder: Path, scenario_name: str) -> Path:
     stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
     number = 1
-    while (path := runs_folder() / f"{stem}-{number}{SUFFIX}").exists():
+    while (path := folder / f"{stem}-{number}{SUFFIX}").exists():
         number += 1
     return path
 
@@ -47,12 +51,13 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
     if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
         raise UserError(f"--name: '{name}' cannot be a file's name; use letters, digits, - and _")
+    name = None if name is None else name.removesuffix(SUFFIX)
     if output is None or output.suffix in (".sdf", ".world"):
         if output is not None and not output.parent.is_dir():
             raise UserError(f"--output: there is no folder {output.parent}")
         return free_run_path(scenario_name) if name is None else runs_folder() / f"{name}{SUFFIX}"
     if output.is_dir():
-        return output / f"{name or scenario_name}{SUFFIX}"
+        return _free(output, scenario_name) if name is None else output / f"{name}{SUFFIX}"
     if output.suffix != SUFFIX:
         raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
     return output
@@ -78,6 +83,8 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
     world = parse_world(run.document("world"), scenario.world)
     robot = parse_model(run.document("robot"), scenario.robot.model)
+    if fold(run.events()[:1]).elements != world.elements(frozenset(scenario.protected)):
+        raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
 
 

@@ -22,8 +22,8 @@ def without(built: Built, context: Context, removed: frozenset[str]) -> Iterator
     filters = built.scene_graph.collision_filter_manager(built.scene_graph.GetMyMutableContextFromRoot(context))
     static, moving = _geometry(built, removed)
     everything_moving = _set([built.robot.geometry, *(body.geometry for body in built.moving.values())])
-    # Nothing filters static from moving geometry but this, so that allowing it again is exact; and it is ten times as fast as
-    # a transient filter, which copies all pairs of the world.
+    # Nothing filters static from moving geometry but this, so that allowing it again is exact. A transient filter would copy
+    # all pairs of the world: 170 ms instead of 6 in a world of 1300 boxes.
     filters.Apply(CollisionFilterDeclaration().ExcludeBetween(static, everything_moving))
     try:
         with _without_moving(filters, moving, everything_moving, _set(built.static.values())):

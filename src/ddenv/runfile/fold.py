@@ -35,6 +35,7 @@ from ddenv.runfile.state import Baseline, Candidate, Point, Round, RunState, Tes
 from ddenv.runfile.store import Event
 
 Data = dict[str, Any]
+Names = tuple[str, ...]
 
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
@@ -49,10 +50,10 @@ def apply(state: RunState, event: Event) -> RunState:
     """The state after one more event. Raises UserError for an event that makes no sense here."""
     handler = _HANDLERS.get(event.kind)
     if handler is None:
-        raise UserError(f"damaged run file: event {event.id} is of an unknown kind '{event.kind[:40]}'")
+        raise UserError(f"damaged run file: event {event.id} is of an unknown kind {event.kind[:40]!a}")
     try:
         state = handler(state, event.data, event.time)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
         raise UserError(f"damaged run file: event {event.id} ({event.kind}) makes no sense here") from None
     return replace(state, revision=event.id, updated_at=event.time)
 
@@ -85,8 +86,10 @@ def _test_started(state: RunState, data: Data, _: float) -> RunState:
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
     state = replace(state, tests=(*state.tests, test))
-    if state.round is None or round != state.round.number:
+    if round is None:
         return state
+    if round != state.round.number:
+        raise ValueError(round)
     tried = _candidate(state, candidate)
     return _with_candidate(state, replace(tried, tests=(*tried.tests, test.id)))
 
@@ -132,6 +135,7 @@ def _baseline_finished(state: RunState, data: Data, _: float) -> RunState:
 def _round_started(state: RunState, data: Data, _: float) -> RunState:
     environment = _names(state, data["environment"])
     partitions = tuple(_names(state, part) for part in data["partitions"])
+    _check_partitions(environment, partitions, data["candidates"])
     candidates = []
     for index, (kind, partition, distance) in enumerate(data["candidates"]):
         models = partitions[partition]
@@ -142,6 +146,17 @@ def _round_started(state: RunState, data: Data, _: float) -> RunState:
         candidates.append(Candidate(index, str(kind), int(partition), models, distance))
     number, n_partitions = int(data["round"]), int(data["n_partitions"])
     return replace(state, round=Round(number, n_partitions, environment, partitions, tuple(candidates)))
+
+
+def _check_partitions(environment: Names, partitions: tuple[Names, ...], candidates: list) -> None:
+    """Partitions are disjoint and within the environment, and each makes at most two candidates: there are not many."""
+    models = [name for partition in partitions for name in partition]
+    if len(set(models)) != len(models) or not set(models) <= set(environment) or not all(partitions):
+        raise ValueError("partitions")
+    if len({(kind, partition) for kind, partition, _ in candidates}) != len(candidates):
+        raise ValueError("candidates")
+    if not all(kind in ("partition", "complement") and 0 <= part < len(partitions) for kind, part, _ in candidates):
+        raise ValueError("candidates")
 
 
 def _candidate_judged(state: RunState, data: Data, _: float) -> RunState:

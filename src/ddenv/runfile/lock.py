@@ -18,7 +18,12 @@ def _lock_path(run: Path) -> Path:
 @contextmanager
 def engine_lock(run: Path):
     """Holds the run's lock. Raises UserError while another engine has it."""
-    handle = os.open(_lock_path(run), os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        handle = os.open(_lock_path(run), os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise UserError(
+            f"{run}: no engine can work here: {error.strerror}; copy the run to a folder of yours"
+        ) from None
     try:
         # A viewer that looks whether an engine is at work holds the lock for an instant.
         deadline = time.monotonic() + 1.0
@@ -34,7 +39,7 @@ def engine_lock(run: Path):
 def engine_is_alive(run: Path) -> bool:
     """Whether an engine works on the run now."""
     try:
-        handle = os.open(_lock_path(run), os.O_RDWR)
+        handle = os.open(_lock_path(run), os.O_RDONLY)
     except OSError:
         return False
     try:

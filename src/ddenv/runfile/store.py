@@ -7,6 +7,7 @@ are text, event data is JSON, trajectories are little-endian float64 rows.
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
 import sys
@@ -33,6 +34,7 @@ CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, 
 CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
 """
+_TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
 ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
 
 
@@ -96,9 +98,12 @@ class RunFile:
         if not path.is_file():
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
         try:
-            self._db = sqlite3.connect(path, isolation_level=None, timeout=VIEWER_WAIT)
+            self._db = sqlite3.connect(_address(path), uri=True, isolation_level=None, timeout=VIEWER_WAIT)
+            self._db.execute("PRAGMA trusted_schema = OFF")
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        except sqlite3.OperationalError as error:
+            raise UserError(f"{path}: cannot be read: {error}") from None
         except sqlite3.Error as error:
             raise UserError(f"{path}: is no ddenv run file ({error})") from None
         if application != APPLICATION_ID:
@@ -107,6 +112,9 @@ class RunFile:
             raise UserError(
                 f"{path}: was written by a newer ddenv (format {version}); this one reads up to {SCHEMA_VERSION}"
             )
+        # A view or a trigger in the place of a table could compute without end.
+        if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
+            raise UserError(f"{path}: damaged run file: its tables are not ours")
 
     def __enter__(self) -> RunFile:
         return self
@@ -141,6 +149,13 @@ class RunFile:
         row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, model))
         return None if row is None else _floats(row[0], self.path)
 
+    def trajectory(self, test: int) -> array:
+        """Samples of the robot in a test that must have some, flat rows of `COLUMNS` floats."""
+        samples = self.motion(test)
+        if not samples or not all(map(math.isfinite, samples)):
+            raise UserError(f"{self.path}: damaged run file: test {test} has no trajectory")
+        return samples
+
     def motions(self, test: int) -> dict[str, array]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
         rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (test,))
@@ -149,7 +164,10 @@ class RunFile:
     def live(self) -> list[Live]:
         """The tests that run now, by worker slot."""
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
-        return [Live(slot, test, at, tuple(json.loads(pose))) for slot, test, at, pose in rows]
+        try:
+            return [Live(int(slot), int(test), float(at), tuple(json.loads(pose))) for slot, test, at, pose in rows]
+        except (ValueError, TypeError, RecursionError):
+            raise UserError(f"{self.path}: damaged run file: a running test's pose makes no sense") from None
 
     # What follows is for the engine alone.
 
@@ -195,9 +213,12 @@ class RunFile:
     def _entries(self, table: str, after: int) -> list[Event]:
         rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id", (after,))
         try:
-            return [Event(id, at, kind, json.loads(data)) for id, at, kind, data in rows]
-        except ValueError:
+            entries = [Event(id, float(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
+        except (ValueError, TypeError, RecursionError):
             raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is not JSON") from None
+        if not all(isinstance(entry.data, dict) for entry in entries):
+            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is no JSON object")
+        return entries
 
     def _one(self, query: str, values: tuple = ()) -> tuple | None:
         rows = self._all(query, values)
@@ -206,7 +227,7 @@ class RunFile:
     def _all(self, query: str, values: tuple = ()) -> list[tuple]:
         try:
             return self._db.execute(query, values).fetchall()
-        except sqlite3.Error as error:
+        except (sqlite3.Error, OverflowError) as error:
             raise UserError(f"{self.path}: damaged run file: {error}") from None
 
     @contextmanager
@@ -217,6 +238,13 @@ class RunFile:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
             raise UserError(f"{self.path}: cannot be written: {error}; what is in it is intact") from None
+
+
+def _address(path: Path) -> str:
+    """Where SQLite finds the file; read only where nothing can be written and nothing is left to fold back."""
+    address = path.resolve().as_uri()
+    settled = not path.with_name(f"{path.name}-wal").exists()
+    return f"{address}?immutable=1" if settled and not os.access(path.parent, os.W_OK) else address
 
 
 def _floats(samples: object, path: Path) -> array:

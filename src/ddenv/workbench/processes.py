@@ -8,6 +8,8 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.workbench.wording import plain
 
+# Exit codes of an engine that has finished or was stopped.
+GOOD_ENDS = (0, 1)
 # Of a log only its end is read, bytes.
 TAIL = 4000
 
@@ -40,12 +42,11 @@ class Engine:
 
     @property
     def trouble(self) -> str:
-        """Why it ended with an error, or nothing."""
+        """Why it ended otherwise than by itself or because it was asked to, or nothing."""
+        from ddenv.launch.programs import last_words
+
         code = None if self._process is None else self._process.poll()
-        if not code:
-            return ""
-        log = self.run.with_name(f"{self.run.name}.log")
-        return f"The engine ended with code {code}: {last_line(log) or f'see {log}'}"
+        return "" if code in (None, *GOOD_ENDS) else f"The engine ended: {plain(last_words(self.run))}"
 
 
 class Scene:

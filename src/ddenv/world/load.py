@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import reprlib
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def load_scenario(path: Path) -> Scenario:
     content = read_bytes(path)
     try:
         data = yaml.safe_load(content)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         mark = getattr(error, "problem_mark", None)
         line = "" if mark is None else f":{mark.line + 1}"
         problem = getattr(error, "problem", None) or "not text"
@@ -86,5 +87,6 @@ def _nearest(word: str, known: list[str]) -> str:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    # A short YAML file can hold a value that is endless when written out.
+    text = reprlib.repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -74,6 +74,8 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except FileNotFoundError:
         raise UserError(f"{path}: no such file") from None
+    except ValueError:
+        raise UserError(f"{path}: cannot be a file's name") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
 

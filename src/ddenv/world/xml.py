@@ -61,6 +61,8 @@ def parse(text: bytes, path: Path) -> Element:
     """The root element of `text`. Raises UserError with file and line for anything that is not plain, safe XML."""
     if not text.strip():
         raise UserError(f"{path}: the file is empty; expected an SDF file")
+    if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
+        raise UserError(f"{path}: is UTF-16 or UTF-32; save it as UTF-8")
     builder = _Builder(text)
     parser = DefusedXMLParser(target=builder, forbid_dtd=False, forbid_entities=True, forbid_external=True)
     builder.expat = parser.parser
@@ -73,6 +75,8 @@ def parse(text: bytes, path: Path) -> Element:
     except DefusedXmlException:
         line = builder.expat.CurrentLineNumber
         raise UserError(f"{path}:{line}: XML entities are refused (they can read other files); remove them") from None
+    except (LookupError, ValueError) as error:
+        raise UserError(f"{path}: cannot be decoded: {error}; save it as UTF-8") from None
 
 
 def xpath(element: Element) -> str:
