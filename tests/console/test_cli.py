@@ -201,6 +201,10 @@ MISTAKES = {
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
+    "world twice": (
+        ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],
+        "--world: goes with a scenario",
+    ),
     "output": (["run", WALL, "--output", "x.txt"], "neither a folder nor"),
 }
 
@@ -209,6 +213,39 @@ MISTAKES = {
 def test_a_mistake_gets_one_line_and_leaves_nothing(home, words, told):
     _is_one_line(ddenv(*words, cwd=home), told)
     assert list(home.rglob("*")) == []
+
+
+def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):
+    import sqlite3
+
+    run = home / "broken.ddenv"
+    assert ddenv("run", WALL, "--output", run, "--jobs", 1).returncode == 0
+    with sqlite3.connect(run) as database:
+        database.execute("UPDATE document SET content = x'7b7d' WHERE name = 'scenario'")
+    _is_one_line(ddenv("resume", run), "its scenario is not valid")
+    _is_one_line(ddenv("test", run), "its scenario is not valid")
+
+
+def test_without_a_screen_nobody_is_asked(home):
+    run = home / "asked.ddenv"
+    from ddenv.launch.runs import create_run
+    from ddenv.world.load import load_scenario
+
+    create_run(load_scenario(DATA / "wall.yaml"), run)
+    with RunFile(run) as viewer:
+        viewer.send("accept_mode", mode="ask")
+    done = ddenv("resume", run, "--json")
+    assert json.loads(done.stdout)["minimal"]
+
+
+def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
+    data = yaml.safe_load((DATA / "wall.yaml").read_text())
+    data["name"], data["world"] = "../esc", str(DATA / "wall.sdf")
+    data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
+    (home / "s.yaml").write_text(yaml.safe_dump(data))
+    (home / "in").mkdir()
+    summary = json.loads(ddenv("run", home / "s.yaml", "--output", home / "in", "--json").stdout)
+    assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
 
 
 def test_a_malformed_world_is_told_with_its_line(home):

@@ -145,3 +145,78 @@ def test_events_that_make_no_sense_are_told_in_one_line(entries):
         fold(events)
     except UserError as error:
         assert "damaged run file" in str(error)
+
+
+def _sql(path, *statements):
+    database = sqlite3.connect(path)
+    for statement in statements:
+        database.execute(statement)
+    database.commit()
+    database.close()
+
+
+def test_a_view_in_the_place_of_a_table_is_refused(path):
+    numbers = "WITH RECURSIVE n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n)"
+    endless = f"{numbers} SELECT id, 0 AS time, '' AS kind, '' AS data FROM n"
+    _sql(path, "DROP TABLE event", f"CREATE VIEW event AS {endless}")
+    with pytest.raises(UserError, match="its tables are not ours"):
+        RunFile(path)
+
+
+def test_a_trigger_is_refused(path):
+    _sql(path, "CREATE TRIGGER t AFTER INSERT ON command BEGIN DELETE FROM event; END")
+    with pytest.raises(UserError, match="its tables are not ours"):
+        RunFile(path)
+
+
+@pytest.mark.parametrize("data", ["[" * 100_000, "[]", "3", "{", "null"], ids=["deep", "list", "number", "cut", "null"])
+def test_entries_that_are_no_objects_are_told(path, data):
+    _sql(path, f"INSERT INTO event (time, kind, data) VALUES (0, 'paused', '{data}')")
+    with RunFile(path) as file, pytest.raises(UserError, match="damaged run file"):
+        file.events()
+
+
+@pytest.mark.parametrize("pose", ["xx", "3", "[" * 100_000])
+def test_a_running_test_without_a_pose_is_told(path, pose):
+    _sql(path, f"INSERT INTO live VALUES (0, 1, 0.5, '{pose}')")
+    with RunFile(path) as file, pytest.raises(UserError, match="damaged run file"):
+        file.live()
+
+
+def test_a_small_file_cannot_fill_the_memory():
+    elements = [str(number) for number in range(1000)]
+    events = [
+        Event(1, 0.0, "created", {"scenario": {}, "elements": elements}),
+        Event(
+            2,
+            0.0,
+            "round_started",
+            {
+                "round": 1,
+                "n_partitions": 2,
+                "environment": list(range(1000)),
+                "partitions": [[0]],
+                "candidates": [["complement", 0, None]] * 100_000,
+            },
+        ),
+    ]
+    with pytest.raises(UserError, match="makes no sense"):
+        fold(events)
+
+
+def test_what_steers_a_terminal_is_not_passed_on():
+    with pytest.raises(UserError) as caught:
+        fold([Event(1, 0.0, "\x1b]2;x\x07", {})])
+    assert "\x1b" not in str(caught.value)
+    assert str(UserError("a\x1b[2Jb\nc\ud800")).isprintable()
+
+
+def test_a_run_in_a_folder_that_cannot_be_written_is_read(path, monkeypatch):
+    with RunFile(path) as file:
+        file.own()
+        file.settle()
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with RunFile(path) as file:
+        assert [event.kind for event in file.events()] == ["created"]
+        with pytest.raises(UserError, match="cannot be written"):
+            file.send("pause")

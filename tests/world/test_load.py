@@ -56,7 +56,10 @@ def test_a_wrong_value_is_told_with_its_key(tmp_path, changes, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2", "just words", "a: !!python/object:os.system {}", "\x00", "[" * 5000])
+@pytest.mark.parametrize(
+    "text",
+    ["", "[1, 2", "just words", "a: !!python/object:os.system {}", "\x00", "[" * 5000, "name: 2024-13-45", "name: 0x_"],
+)
 def test_a_file_that_is_no_scenario(tmp_path, text):
     path = tmp_path / "s.yaml"
     path.write_text(text)
@@ -67,3 +70,11 @@ def test_a_file_that_is_no_scenario(tmp_path, text):
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(UserError, match=r"no scenario 'dich' \(did you mean ditch\?\); bundled are"):
         find_scenario("dich")
+
+
+def test_a_value_that_is_endless_when_written_out_is_cut(tmp_path):
+    levels = "\n".join(f"l{n}: &l{n} [{', '.join([f'*l{n - 1}'] * 10)}]" for n in range(1, 12))
+    path = tmp_path / "s.yaml"
+    path.write_text(f"l0: &l0 [x]\n{levels}\nname: *l11\n")
+    with pytest.raises(UserError, match=r"s\.yaml"):
+        load_scenario(path)

@@ -74,6 +74,9 @@ WRONG = {
     "not sdf": (b"<html/>", "here.sdf:1: /html: expected <sdf>"),
     "no world": (b"<sdf><model name='m'/></sdf>", "expected one <world>"),
     "entity bomb": (b'<!DOCTYPE l [<!ENTITY a "x"><!ENTITY b "&a;&a;">]>\n<sdf>&b;</sdf>', "entities are refused"),
+    "unknown encoding": (b"<?xml version='1.0' encoding='foo'?><sdf/>", "here.sdf"),
+    "other encoding": (b"<?xml version='1.0' encoding='shift_jis'?><sdf/>", "here.sdf"),
+    "utf-16": ("<sdf/>".encode("utf-16"), "save it as UTF-8"),
     "external entity": (b'<!DOCTYPE l [<!ENTITY a SYSTEM "file:///etc/passwd">]><sdf>&a;</sdf>', "refused"),
 }
 

@@ -30,11 +30,11 @@ class Control:
         self._forget_old_stops(since)
 
     def _forget_old_stops(self, since: float) -> None:
-        """A stop or pause that was meant for an engine that is gone must not hold this one."""
+        """What was meant for the ways of an engine that is gone must not hold this one; what it was told of candidates counts."""
         for command in self._journal.file.commands(self._journal.state.last_command):
             if command.time >= since:
                 return
-            if command.kind in ("stop", "pause", "step"):
+            if command.kind in ("stop", "pause", "step", "accept_mode"):
                 self._handled(command)
             else:
                 self._obey(command)

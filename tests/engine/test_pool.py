@@ -1,0 +1,104 @@
+"""Workers on the real robot: they may die at any time."""
+
+import math
+import os
+import signal
+import time
+
+import pytest
+
+from ddenv.engine.pool import Broken, Pool
+from ddenv.errors import UserError
+from ddenv.launch.scenarios import load_parts
+from ddenv.world.load import load_scenario
+from tests.conftest import DATA
+
+EVERYTHING = frozenset({"deck", "wall"})
+
+
+def parts(**simulation):
+    scenario = load_scenario(DATA / "wall.yaml")
+    changed = scenario.simulation.model_copy(update=simulation)
+    scenario = scenario.model_copy(update={"simulation": changed})
+    return scenario, *load_parts(scenario)
+
+
+@pytest.fixture
+def pool():
+    pool = Pool(*parts(), 2)
+    yield pool
+    pool.close()
+
+
+def result(pool):
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        for one in pool.finished(0.2):
+            return one
+    raise AssertionError("no test ended")
+
+
+def workers(pool):
+    return [int(pid) for pid in pool._pool._pool_manager.worker_manager.workers]
+
+
+def test_an_idle_worker_that_dies_is_replaced(pool):
+    pool.submit(1, EVERYTHING, 0)
+    assert result(pool)[1].outcome == "failed"
+    for pid in workers(pool):
+        os.kill(pid, signal.SIGKILL)
+    time.sleep(0.5)
+    pool.submit(2, EVERYTHING, 0)
+    assert result(pool)[1].outcome == "failed"
+
+
+def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(pool):
+    pool.submit(1, EVERYTHING, 0)
+    deadline = time.monotonic() + 60
+    while not pool.live():
+        assert time.monotonic() < deadline
+    for pid in workers(pool):
+        os.kill(pid, signal.SIGKILL)
+    test, broken = result(pool)
+    if isinstance(broken, Broken):
+        assert (test, broken.outcome) == (1, "error")
+        assert "process died" in broken.failure
+    pool.submit(2, EVERYTHING, 0)
+    test, after = result(pool)
+    assert (test, after.outcome) == (2, "failed")
+
+
+def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works():
+    pool = Pool(*parts(wall_timeout=0.001), 1)
+    try:
+        pool.submit(1, EVERYTHING, 0)
+        test, late = result(pool)
+        assert (test, late.outcome) == (1, "timeout")
+        assert "wall clock" in late.failure
+        pool.submit(2, EVERYTHING, 0)
+        assert result(pool)[0] == 2
+        assert pool.idle == 1
+    finally:
+        pool.close()
+
+
+def test_progress_is_seen_while_a_test_runs(pool):
+    pool.submit(7, EVERYTHING, 0)
+    seen = []
+    while not (ended := pool.finished(0.005)):
+        seen += pool.live()
+    assert ended[0][0] == 7
+    assert all(live.test == 7 and math.isfinite(live.time) for live in seen)
+    assert pool.live() == []
+
+
+def test_a_world_that_cannot_be_simulated_is_told():
+    scenario, world, robot = parts()
+    legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.span, robot.line)
+    pool = Pool(scenario, world, legless, 1)
+    try:
+        pool.submit(1, EVERYTHING, 0)
+        with pytest.raises(UserError, match="wheels on both sides"):
+            result(pool)
+    finally:
+        pool.close()
