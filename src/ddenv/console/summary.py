@@ -9,6 +9,9 @@ from ddenv.console.words import count
 from ddenv.errors import printable
 from ddenv.runfile.state import RunState
 
+# More names than this are not read by anyone in a line.
+MOST_NAMES = 12
+
 
 def summary(state: RunState, path: Path) -> dict[str, Any]:
     """The object that `--json` prints. Durations are in s."""
@@ -37,9 +40,16 @@ def lines(state: RunState, path: Path) -> list[str]:
     what = "minimal environment" if state.minimal else "environment so far"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     told = [
-        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {', '.join(state.environment)}",
-        f"{len(state.finished_tests)} tests ({tests}; {state.deflake_runs} re-runs) in {state.rounds_done} rounds, "
+        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names(state)}",
+        f"{len(state.finished_tests)} tests ({tests}; {state.deflake_runs} re-runs) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         f"run file: {path}",
     ]
     return [printable(line) for line in told]
+
+
+def names(state: RunState) -> str:
+    """The models that are left, the first ones if there are many."""
+    kept = state.environment
+    more = f" and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
+    return ", ".join(kept[:MOST_NAMES]) + more

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -11,7 +10,8 @@ import numpy as np
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool
-from ddenv.robot.oracle import Failure, judge
+from ddenv.engine.told import told
+from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import ROBOT
 
@@ -41,7 +41,7 @@ class Bench:
         """Makes tests until none is wanted.
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is asked again whenever something happened. Raises Stopped, and UserError if nothing can be simulated.
+        them; it is asked again at every look around. Raises Stopped, and UserError if nothing can be simulated.
         """
         while tests := wanted():
             self._start([test for test in tests if test[:2] not in self._started], phase, round)
@@ -79,27 +79,11 @@ class Bench:
         self._live_shown = bool(live)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
-        if isinstance(result, Broken):
-            data = {"outcome": result.outcome, "failure": result.failure, "distance": None, "end_pose": None}
-            self._journal.record("test_finished", test=test, simulated_seconds=0.0, wall_seconds=0.0, **data)
-            return
-        outcome, distance = result.outcome, None
-        if self.failure is not None:
-            judgement = judge(result, self.failure)
-            outcome, distance = judgement.outcome, judgement.distance
-        motions = {ROBOT: _samples(result.trajectory)}
-        motions |= {name: _samples(motion) for name, motion in result.motions.items()}
-        self._journal.record(
-            "test_finished",
-            motions,
-            test=test,
-            outcome=outcome,
-            failure=result.failure,
-            distance=None if distance is None or not math.isfinite(distance) else distance,
-            end_pose=result.end_pose if all(map(math.isfinite, result.end_pose)) else None,
-            simulated_seconds=result.simulated_seconds,
-            wall_seconds=result.wall_seconds,
-        )
+        motions = {}
+        if isinstance(result, RunResult):
+            motions = {ROBOT: _samples(result.trajectory)}
+            motions |= {name: _samples(motion) for name, motion in result.motions.items()}
+        self._journal.record("test_finished", motions, test=test, **told(result, self.failure))
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

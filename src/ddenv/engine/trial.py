@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Pool
+from ddenv.engine.told import told
 from ddenv.errors import UserError
 from ddenv.launch.runs import read_parts
-from ddenv.robot.oracle import Failure, judge
+from ddenv.robot.oracle import Failure
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, RunFile
@@ -96,35 +96,18 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     """Makes the runs in worker processes; yields what came out of each, in order, as plain data."""
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
-    started = told = 0
+    started = shown = 0
     try:
-        while told < len(trials):
+        while shown < len(trials):
             while pool.idle and started < len(trials):
                 pool.submit(started, trials[started].keep, trials[started].seed)
                 started += 1
             for index, result in pool.finished(1.0):
-                results[index] = _told(subject, trials[index], result)
-            while told in results:
-                yield results.pop(told)
-                told += 1
+                trial = trials[index]
+                asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
+                results[index] = asked | told(result, subject.failure)
+            while shown in results:
+                yield results.pop(shown)
+                shown += 1
     finally:
         pool.close()
-
-
-def _told(subject: Subject, trial: Trial, result: Any) -> dict[str, Any]:
-    told = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
-    if isinstance(result, Broken):
-        nothing = dict.fromkeys(("end_pose", "distance", "simulated_seconds", "wall_seconds"))
-        return told | nothing | {"outcome": result.outcome, "failure": result.failure}
-    outcome, distance = result.outcome, None
-    if subject.failure is not None:
-        judgement = judge(result, subject.failure)
-        outcome, distance = judgement.outcome, judgement.distance
-    return told | {
-        "outcome": outcome,
-        "failure": result.failure,
-        "end_pose": [float(value) for value in result.end_pose] if all(map(math.isfinite, result.end_pose)) else None,
-        "distance": distance if distance is None or math.isfinite(distance) else None,
-        "simulated_seconds": result.simulated_seconds,
-        "wall_seconds": result.wall_seconds,
-    }

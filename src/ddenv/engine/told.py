@@ -1,0 +1,33 @@
+"""What came out of a test as plain data, for the run file and for `--json`: every number in it is finite."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ddenv.engine.pool import Broken
+from ddenv.robot.oracle import Failure, judge
+from ddenv.robot.result import RunResult
+
+
+def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
+    """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
+
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None.
+    """
+    if isinstance(result, Broken):
+        nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
+        return {"outcome": result.outcome, "failure": result.failure, **nothing}
+    outcome, distance = result.outcome, None
+    if failure is not None:
+        judgement = judge(result, failure)
+        outcome, distance = judgement.outcome, judgement.distance
+    pose = [float(value) for value in result.end_pose]
+    return {
+        "outcome": outcome,
+        "failure": result.failure,
+        "distance": None if distance is None or not math.isfinite(distance) else distance,
+        "end_pose": pose if all(map(math.isfinite, pose)) else None,
+        "simulated_seconds": result.simulated_seconds,
+        "wall_seconds": result.wall_seconds,
+    }
