@@ -94,7 +94,7 @@ def test_progress_is_seen_while_a_test_runs(pool):
 
 def test_a_world_that_cannot_be_simulated_is_told():
     scenario, world, robot = parts()
-    legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.span, robot.line)
+    legless = robot.__class__(robot.name, robot.pose, robot.static, robot.links, (), robot.spans, robot.line)
     pool = Pool(scenario, world, legless, 1)
     try:
         pool.submit(1, EVERYTHING, 0)

@@ -23,8 +23,8 @@ def test_what_stays_reads_as_before(removed):
     assert [model.name for model in again.models] == [model.name for model in WALL.models if model.name not in removed]
     for model in again.models:
         assert model.links == WALL.model(model.name).links
-        start, end = model.span
-        old_start, old_end = WALL.model(model.name).span
+        start, end = model.spans[0]
+        old_start, old_end = WALL.model(model.name).spans[0]
         assert text[start:end] == WALL.text[old_start:old_end]
 
 
@@ -32,7 +32,7 @@ def test_what_stays_reads_as_before(removed):
 def test_only_whole_lines_go(removed):
     """Every byte that is left was there, in the same order, and each model took just its own lines with it."""
     text = without(DITCH, frozenset(removed))
-    spans = [DITCH.model(name).span for name in removed]
+    spans = [DITCH.model(name).spans[0] for name in removed]
     gone = {number for start, end in spans for number in range(_line(start), _line(end) + 1)}
     lines = DITCH.text.split(b"\n")
     assert text == b"\n".join(line for number, line in enumerate(lines) if number not in gone)

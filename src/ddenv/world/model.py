@@ -5,8 +5,12 @@ Every pose is absolute (in the world frame), lengths are in m, masses in kg, ang
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
+
+import numpy as np
 
 from ddenv.world.pose import Pose, Vector
 
@@ -36,12 +40,39 @@ class Plane:
     size: tuple[float, float]
 
 
-Shape = Box | Cylinder | Sphere | Plane
+@dataclass(frozen=True, slots=True)
+class Capsule:
+    """A cylinder of `length` along its frame's z axis, with half a ball of the same radius on each end."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ellipsoid:
+    """`radii` along its frame's axes."""
+
+    radii: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) numbers of vertices, counterclockwise seen from outside.
+
+    Of a collision it is convex. Two meshes are equal if they came from the same file in the same way (`origin`).
+    """
+
+    origin: str
+    vertices: np.ndarray = field(compare=False, repr=False)
+    faces: np.ndarray = field(compare=False, repr=False)
+
+
+Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
 
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """`mu` is the Coulomb friction coefficient of this surface (SDF's `ode/mu`)."""
+    """`mu` is the Coulomb friction coefficient of this surface: the smaller of SDF's `ode/mu` and `ode/mu2`."""
 
     name: str
     shape: Shape
@@ -85,7 +116,9 @@ class Link:
 class Joint:
     """A joint between two links of one model; `pose` is the joint frame, `axis` a unit vector in the world frame.
 
-    `kind` is SDF's type: fixed, revolute or continuous. `effort` (N m) and `velocity` (rad/s) are infinite where unlimited.
+    `kind` is SDF's type: fixed, revolute, continuous, prismatic, ball or universal (which turns about `axis` and then about
+    `axis2`, at right angles to it). Limits are counted from the pose in which the links are: rad, or m for a prismatic one.
+    `effort` (N m or N) and `velocity` (rad/s or m/s) are infinite where unlimited. The parent may be "world".
     """
 
     name: str
@@ -99,19 +132,26 @@ class Joint:
     effort: float
     velocity: float
     damping: float
+    axis2: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """One `<model>`; `span` is where its text stands in the file (start and end byte), `line` its first line."""
+    """A model of the world, with the links and joints of those nested in it (named `inner::link`).
+
+    `name` is unique: a second model of the same name in the file is called `name #2`. `spans` are the parts of the file's text
+    that go with it (start and end byte): its own element first, then what `<state>` says of it. `line` is its first line.
+    """
 
     name: str
     pose: Pose
     static: bool
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    span: tuple[int, int]
+    spans: tuple[tuple[int, int], ...]
     line: int
+    gravity: bool = True
+    self_collide: bool = False
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -119,15 +159,37 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True)
+class Note:
+    """Something that was not taken as the file has it: `kind` tells whether it was replaced or ignored.
+
+    `model` is whose it is (empty: the world's), `place` is file, line and XPath, `what` the element, and `why` the reason, with
+    what took its place.
+    """
+
+    kind: Literal["replaced", "ignored"]
+    model: str
+    place: str
+    what: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class World:
-    """An SDF world. `text` is the file as it was read; `models` are in the file's order; `gravity` is in m/s^2."""
+    """An SDF world. `text` is the file as it was read; `models` are in the file's order; `gravity` is in m/s^2.
+
+    `anchors` names models that others are placed relative to: without them the file could not be read any more. `resources`
+    holds what was read of other files (`ddenv.world.sdf.resources`), so that `text` can be read again without them.
+    """
 
     path: Path
     name: str
     text: bytes
     gravity: Vector
     models: tuple[Model, ...]
-    notes: tuple[str, ...] = ()
+    version: str = ""
+    notes: tuple[Note, ...] = ()
+    anchors: frozenset[str] = frozenset()
+    resources: Mapping[str, bytes] = field(default_factory=dict, repr=False)
 
     def model(self, name: str) -> Model:
         for model in self.models:
@@ -137,7 +199,8 @@ class World:
 
     def elements(self, protected: frozenset[str] = frozenset()) -> tuple[str, ...]:
         """Names of the models that a reduction may remove, in the file's order."""
-        return tuple(model.name for model in self.models if model.name not in protected and not is_ground(model))
+        stay = protected | self.anchors
+        return tuple(model.name for model in self.models if model.name not in stay and not is_ground(model))
 
 
 def is_ground(model: Model) -> bool:

@@ -10,10 +10,10 @@ import math
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.world.geometry import read_color, read_friction, read_inertia, read_shape
+from ddenv.world.sdf.geometry import read_color, read_friction, read_inertia, read_shape
 from ddenv.world.model import Collision, Joint, Link, Model, Visual, World
 from ddenv.world.pose import Pose
-from ddenv.world.xml import Element, complain, number, numbers, parse, truth
+from ddenv.world.sdf.xml import Element, complain, number, numbers, parse, truth
 
 MAX_BYTES = 200_000_000
 GRAVITY = (0.0, 0.0, -9.81)
@@ -128,7 +128,7 @@ def _model(element: Element, path: Path) -> Model:
     _unique(element.findall("link"), path)
     joints = tuple(_joint(joint, pose, links, path) for joint in element.findall("joint"))
     static = truth(element, "static", path, False)
-    return Model(name, pose, static, links, joints, (element.start, element.end), element.line)
+    return Model(name, pose, static, links, joints, ((element.start, element.end),), element.line)
 
 
 def _link(element: Element, model_pose: Pose, path: Path) -> Link:

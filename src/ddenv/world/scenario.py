@@ -22,6 +22,9 @@ PAIRS = tuple(
     f"{partitioning}/{prioritization}" for partitioning in PARTITIONINGS for prioritization in PRIORITIZATIONS
 )
 Pair = Literal[PAIRS]  # type: ignore[valid-type]
+# What a world may have without being refused for it, if the user says so.
+Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
+IGNORABLE: tuple[str, ...] = Ignorable.__args__
 
 
 class Section(BaseModel):
@@ -37,6 +40,18 @@ class Spawn(Section):
     y: Finite
     z: Finite
     yaw: Finite = 0.0
+
+
+class Reading(Section):
+    """How the world's file is understood where it names other files.
+
+    `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
+    cannot be found there, such as `cylinder:0.3,1.0`. `ignore` names kinds of elements to leave out instead of refusing the file.
+    """
+
+    model_path: tuple[Path, ...] = ()
+    stand_ins: dict[str, str] = {}
+    ignore: tuple[Ignorable, ...] = ()
 
 
 class Robot(Section):
@@ -117,6 +132,7 @@ class Scenario(Section):
     name: str = Field(min_length=1, max_length=80)
     description: str = ""
     world: Path
+    reading: Reading = Reading()
     robot: Robot
     goal: Goal
     sensors: Sensors = Sensors()

@@ -18,7 +18,7 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     unknown = removed - {model.name for model in world.models}
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
-    spans = sorted(model.span for model in world.models if model.name in removed)
+    spans = sorted(span for model in world.models if model.name in removed for span in model.spans)
     kept, at = [], 0
     for start, end in spans:
         kept.append(_LINE_START.sub(b"", world.text[at:start]) if _ends_line(world.text, end) else world.text[at:start])

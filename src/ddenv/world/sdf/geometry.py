@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ddenv.world.model import Box, Cylinder, Inertia, Plane, Shape, Sphere
 from ddenv.world.pose import Pose
-from ddenv.world.xml import Element, complain, number, numbers
+from ddenv.world.sdf.xml import Element, complain, number, numbers
 
 SHAPES = ("box", "cylinder", "sphere", "plane")
 # SDF's default for <mu>, and what simulators use where a surface names none.

@@ -1,0 +1,53 @@
+"""How large shapes are: the boxes around them, along the axes of the world, m."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
+from ddenv.world.pose import Pose
+
+Bounds = tuple[np.ndarray, np.ndarray]
+
+
+def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
+    """Lowest and highest corner, each shape (3,), of what `shape` fills at `pose`. A plane has a place, but no size."""
+    center, rotation = np.array(pose.position), pose.rotation()
+    if isinstance(shape, Mesh):
+        points = shape.vertices @ rotation.T + center
+        return points.min(axis=0), points.max(axis=0)
+    half = _half(shape, rotation)
+    return center - half, center + half
+
+
+def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
+    """Half of the box around a shape that is the same on both sides of its centre."""
+    up = np.abs(rotation[:, 2])
+    match shape:
+        case Box(size):
+            return np.abs(rotation) @ np.array(size) / 2
+        case Cylinder(radius, length):
+            return radius * np.sqrt(np.maximum(0.0, 1 - up**2)) + up * length / 2
+        case Capsule(radius, length):
+            return radius + up * length / 2
+        case Ellipsoid(radii):
+            return np.sqrt((rotation * radii) ** 2 @ np.ones(3))
+        case Sphere(radius):
+            return np.full(3, radius)
+        case Plane():
+            return np.zeros(3)
+    raise TypeError(type(shape).__name__)
+
+
+def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
+    """The box around all `collisions` that are no planes; None where there are none."""
+    boxes = [shape_bounds(one.shape, one.pose) for one in collisions if not isinstance(one.shape, Plane)]
+    if not boxes:
+        return None
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def model_bounds(model: Model) -> Bounds | None:
+    """The box around a model's collisions; None for a ground or a model that nothing can touch."""
+    return bounds(model.collisions)
