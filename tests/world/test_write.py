@@ -47,11 +47,11 @@ def test_nothing_removed_changes_no_byte():
 
 
 def test_models_on_one_line_leave_the_rest_of_it():
-    text = b"<sdf><world name='w'><model name='a'><link name='l'/></model> <model name='b'><link name='l'/></model></world></sdf>"
+    text = b"<sdf version='1.9'><world name='w'><model name='a'><link name='l'/></model> <model name='b'><link name='l'/></model></world></sdf>"
     world = parse_world(text, DATA)
     assert (
         without(world, frozenset("a"))
-        == b"<sdf><world name='w'> <model name='b'><link name='l'/></model></world></sdf>"
+        == b"<sdf version='1.9'><world name='w'> <model name='b'><link name='l'/></model></world></sdf>"
     )
 
 

@@ -18,6 +18,7 @@ from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.verdict import Standing, standing
 from ddenv.robot.oracle import Failure
 from ddenv.runfile.store import COLUMNS
+from ddenv.world.extent import center
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 
@@ -33,7 +34,7 @@ class Driver:
         self._bench = bench
         self._control = control
         self._evidence: Evidence | None = None
-        positions = {model.name: model.pose.position for model in world.models}
+        positions = {model.name: center(model) for model in world.models}
         self._positions = {name: positions[name] for name in journal.state.elements}
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import platformdirs
@@ -15,9 +16,12 @@ from ddenv.runfile.store import RunFile, create
 from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world, read_bytes
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.resources import Stored
 from ddenv.world.write import without, write_file
 
 SUFFIX = ".ddenv"
+# How the names of documents begin that were read of other files.
+RESOURCE = "resource "
 
 
 def runs_folder() -> Path:
@@ -63,16 +67,21 @@ def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     return output
 
 
-def create_run(scenario: Scenario, path: Path) -> None:
-    """Writes a new run file that holds all a reduction needs. Raises UserError, with nothing written."""
-    world, _ = load_parts(scenario)
-    documents = {
+def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | None = None) -> World:
+    """Writes a new run file that holds all a reduction needs; returns its world. Raises UserError, with nothing written.
+
+    `tell` is called with a line before something that takes longer.
+    """
+    world, _ = load_parts(scenario, tell)
+    documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
+    documents |= {
         "scenario": scenario.model_dump_json().encode(),
         "world": world.text,
         "robot": read_bytes(scenario.robot.model),
     }
     elements = world.elements(frozenset(scenario.protected))
     create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+    return world
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
@@ -81,8 +90,10 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
         scenario = Scenario.model_validate_json(run.document("scenario"))
     except ValueError:
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
-    world = parse_world(run.document("world"), scenario.world)
-    robot = parse_model(run.document("robot"), scenario.robot.model)
+    # Whatever a run file says, nothing else on this machine is opened for it.
+    stored = Stored(run.documents(RESOURCE))
+    world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
+    robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
     if fold(run.events()[:1]).elements != world.elements(frozenset(scenario.protected)):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
@@ -103,5 +114,8 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> list[Path]
     write_file(model, robot)
     data = scenario.model_dump(mode="json")
     data["world"], data["robot"]["model"] = str(sdf.resolve()), str(model.resolve())
+    if world.resources:
+        # What the world and the robot name relative to themselves is still where they were.
+        data["reading"]["model_path"] += [str(scenario.world.parent), str(scenario.robot.model.parent)]
     write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
     return [sdf, model, scenario_file]

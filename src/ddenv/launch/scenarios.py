@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -10,8 +11,26 @@ from ddenv.world.bundled import SDF
 from ddenv.world.load import validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
-from ddenv.world.read import read_model, read_world
-from ddenv.world.scenario import Scenario
+from ddenv.world.read import disk_of, parse_model, read_bytes, read_world
+from ddenv.world.scenario import PLAIN, Reading, Scenario
+from ddenv.world.sdf.standin import parse_option
+
+
+def reading_of(
+    reading: Reading = PLAIN,
+    *,
+    model_path: Sequence[Path] = (),
+    stand_in: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+) -> Reading:
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`) and ignored kinds of elements. Raises UserError."""
+    for folder in model_path:
+        if not folder.is_dir():
+            raise UserError(f"--model-path: there is no folder {folder}")
+    folders = (*(folder.resolve() for folder in model_path), *reading.model_path)
+    stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
+    ignored = dict.fromkeys((*reading.ignore, *ignore))
+    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored))
 
 
 def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
@@ -40,6 +59,7 @@ def with_options(
     spawn: Sequence[float] | None = None,
     goal: Sequence[float] | None = None,
     world: Path | None = None,
+    reading: Reading | None = None,
 ) -> Scenario:
     """`scenario` with some of its settings replaced. Raises UserError.
 
@@ -56,12 +76,21 @@ def with_options(
         data["goal"].update(zip(("x", "y"), goal, strict=True))
     if world is not None:
         data["world"] = str(world.resolve())
+    if reading is not None:
+        data["reading"] = reading.model_dump(mode="json")
     return validate(data, "options")
 
 
-def load_parts(scenario: Scenario) -> tuple[World, Model]:
-    """The world and the robot of a scenario, checked against each other. Raises UserError."""
-    world, robot = read_world(scenario.world), read_model(scenario.robot.model)
+def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) -> tuple[World, Model]:
+    """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
+
+    `tell` is called with a line before something that takes longer. Raises UserError.
+    """
+    reading, robot_file = scenario.reading, scenario.robot.model
+    world = read_world(scenario.world, reading, tell)
+    around_robot = disk_of(robot_file, reading, tell)
+    robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
+    world = replace(world, resources={**world.resources, **around_robot.taken})
     known = {model.name for model in world.models}
     for name in scenario.protected:
         if name not in known:

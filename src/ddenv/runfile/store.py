@@ -131,6 +131,11 @@ class RunFile:
             raise UserError(f"{self.path}: damaged run file: it has no document '{name}'")
         return row[0]
 
+    def documents(self, prefix: str) -> dict[str, bytes]:
+        """All documents whose names begin with `prefix`, by the rest of their names."""
+        rows = self._all("SELECT name, content FROM document WHERE substr(name, 1, ?) = ?", (len(prefix), prefix))
+        return {name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)}
+
     def events(self, after: int = 0) -> list[Event]:
         """All events with an id above `after`, in order."""
         return self._entries("event", after)

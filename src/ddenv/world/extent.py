@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, Vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -46,6 +46,15 @@ def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
         return None
     lows, highs = zip(*boxes, strict=True)
     return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def center(model: Model) -> Vector:
+    """The middle of what a model fills, m: its own frame may be far from it. A model that fills nothing is where its frame is."""
+    box = model_bounds(model)
+    if box is None:
+        return model.pose.position
+    x, y, z = ((box[0] + box[1]) / 2).tolist()
+    return x, y, z
 
 
 def model_bounds(model: Model) -> Bounds | None:

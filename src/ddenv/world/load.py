@@ -46,7 +46,9 @@ def load_scenario(path: Path) -> Scenario:
     scenario = validate(data, str(path))
     folder = path.resolve().parent
     robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
-    return scenario.model_copy(update={"world": folder / scenario.world, "robot": robot})
+    model_path = tuple(folder / each for each in scenario.reading.model_path)
+    reading = scenario.reading.model_copy(update={"model_path": model_path})
+    return scenario.model_copy(update={"world": folder / scenario.world, "robot": robot, "reading": reading})
 
 
 def validate(data: dict[str, Any], where: str) -> Scenario:

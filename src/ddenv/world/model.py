@@ -163,7 +163,7 @@ class Note:
     """Something that was not taken as the file has it: `kind` tells whether it was replaced or ignored.
 
     `model` is whose it is (empty: the world's), `place` is file, line and XPath, `what` the element, and `why` the reason, with
-    what took its place.
+    what took its place. `detail` is what differs between models of which the same is said.
     """
 
     kind: Literal["replaced", "ignored"]
@@ -171,6 +171,7 @@ class Note:
     place: str
     what: str
     why: str
+    detail: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,9 @@ class Reading(Section):
     ignore: tuple[Ignorable, ...] = ()
 
 
+PLAIN = Reading()
+
+
 class Robot(Section):
     """`model` is an SDF file, relative to the scenario's folder."""
 
@@ -132,7 +135,7 @@ class Scenario(Section):
     name: str = Field(min_length=1, max_length=80)
     description: str = ""
     world: Path
-    reading: Reading = Reading()
+    reading: Reading = PLAIN
     robot: Robot
     goal: Goal
     sensors: Sensors = Sensors()

@@ -1,88 +1,187 @@
-"""What a link is made of: shapes, friction, colour and inertia of one SDF element."""
+"""The shape in a `<geometry>`."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass, replace
 
-from ddenv.world.model import Box, Cylinder, Inertia, Plane, Shape, Sphere
-from ddenv.world.pose import Pose
-from ddenv.world.sdf.xml import Element, complain, number, numbers
+import numpy as np
 
-SHAPES = ("box", "cylinder", "sphere", "plane")
-# SDF's default for <mu>, and what simulators use where a surface names none.
-DEFAULT_MU = 1.0
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
+from ddenv.world.pose import Pose, Vector
+from ddenv.world.sdf.context import Context, refuse
+from ddenv.world.sdf.polyline import read_polyline
+from ddenv.world.sdf.resources import Missing, Unusable
+from ddenv.world.sdf.standin import HOW
+from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
+
+SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "mesh", "polyline")
+LARGEST = 1e6  # m
+ONE: Vector = (1.0, 1.0, 1.0)
+HERE = Pose()
 
 
-def read_shape(parent: Element, path: Path) -> Shape:
-    """The shape of a `<collision>` or `<visual>`; sizes must be above zero."""
+@dataclass(frozen=True)
+class Placed:
+    """A shape and where it is in the frame of its `<collision>` or `<visual>`."""
+
+    shape: Shape
+    offset: Pose = HERE
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A mesh that cannot be had, and why; `sibling` names what the user lets stand in for it."""
+
+    element: Element
+    uri: str
+    reason: str
+    sibling: str = ""
+
+
+def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
+    """The shape of a `<collision>` or `<visual>`; None where there is none to have. Raises UserError.
+
+    Sizes are multiplied by `scale`, along the shape's own axes.
+    """
     geometry = parent.find("geometry")
     if geometry is None or not len(geometry):
-        raise complain(parent, path, "has no <geometry>")
-    element = geometry[0]
-    if element.tag not in SHAPES:
-        raise complain(element, path, f"<{element.tag}> is not supported yet; use one of {', '.join(SHAPES)}")
-    if element.tag == "box":
-        return Box(_sizes(element, "size", path, 3))
-    if element.tag == "cylinder":
-        return Cylinder(_sizes(element, "radius", path, 1)[0], _sizes(element, "length", path, 1)[0])
-    if element.tag == "sphere":
-        return Sphere(_sizes(element, "radius", path, 1)[0])
-    return _plane(element, path)
+        raise complain(parent, "has no <geometry>")
+    element = next((child for child in geometry if child.tag in SHAPES), geometry[0])
+    match element.tag:
+        case "mesh":
+            return _mesh(element, parent, context, scale)
+        case "polyline":
+            return Placed(_scaled(read_polyline(geometry, context), scale))
+        case "plane":
+            return _plane(element)
+        case "empty":
+            return None
+        case "heightmap" | "image":
+            return _left_out(element, parent, context)
+    return Placed(_primitive(element, scale))
 
 
-def _plane(element: Element, path: Path) -> Plane:
+def _primitive(element: Element, scale: Vector) -> Shape:
+    match element.tag:
+        case "box":
+            return Box(_times(_sizes(element, "size", 3), scale))
+        case "cylinder":
+            return Cylinder(_radius(element, scale), _length(element, scale))
+        case "sphere":
+            return Sphere(_sizes(element, "radius", 1)[0] * max(scale))
+        case "capsule":
+            return Capsule(_radius(element, scale), _length(element, scale))
+        case "ellipsoid":
+            return Ellipsoid(_times(_sizes(element, "radii", 3), scale))
+    raise complain(element, f"<{element.tag}> is no shape that is known; use one of {', '.join(SHAPES)}")
+
+
+def _left_out(element: Element, parent: Element, context: Context) -> None:
+    if parent.tag == "visual":
+        context.note("ignored", element, f"a {element.tag} is not drawn")
+    elif context.ignores(element.tag):
+        context.note("ignored", element, "left out as asked: nothing collides with it")
+    else:
+        raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
+
+
+def _plane(element: Element) -> Placed:
+    size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", 2)
     normal = element.find("normal")
-    if normal is not None and numbers(normal, path, 3)[:2] != (0.0, 0.0):
-        raise complain(normal, path, "only planes with a vertical normal are supported; turn the model with its <pose>")
-    size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", path, 2)
-    return Plane(size)
+    if normal is None:
+        return Placed(Plane(size))
+    direction = np.array(numbers(normal, 3))
+    length = float(np.linalg.norm(direction))
+    if not 1e-9 < length < 1e9:
+        raise complain(normal, "a normal needs a length above zero")
+    return Placed(Plane(size), _turn_up_to(direction / length))
 
 
-def _sizes(parent: Element, tag: str, path: Path, count: int) -> tuple[float, ...]:
+def _turn_up_to(direction: np.ndarray) -> Pose:
+    """The turn that takes the z axis to a unit vector the short way."""
+    x, y, z = (float(part) for part in direction)
+    if z < -1 + 1e-12:
+        return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
+    w = np.sqrt((1 + z) / 2)
+    return Pose((0.0, 0.0, 0.0), (float(w), float(-y / (2 * w)), float(x / (2 * w)), 0.0))
+
+
+def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:
+    uri = text_of(element.find("uri"))
+    if not uri:
+        raise complain(element, "has no <uri>")
+    factor = element.find("scale")
+    own = ONE if factor is None else numbers(factor, 3)
+    if min(map(abs, own)) < 1e-9 or max(map(abs, own)) > LARGEST:
+        raise complain(factor, f"a scale must not be zero, found '{text_of(factor)}'")
+    given = context.stand_in(uri)
+    if given is not None:
+        text, stand_in = given
+        if stand_in.shape is None:
+            return Lost(element, uri, f"the {stand_in.sibling} stands in for it", stand_in.sibling)
+        context.note("replaced", element, f"'{uri}' by the stand-in {text}")
+        return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.center, scale)))
+    submesh = element.find("submesh")
+    name = "" if submesh is None else text_of(submesh.find("name"))
+    center = submesh is not None and truth(submesh, "center", False)
+    convex = parent.tag == "collision"
+    try:
+        mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
+    except (Missing, Unusable) as error:
+        return Lost(element, uri, str(error))
+    return Placed(_scaled(mesh, _times(own, scale)))
+
+
+def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
+    """What can be done about a collision mesh that cannot be had; `siblings` are the kinds of other shapes in its link."""
+    package = "/".join(lost.uri.split("/")[:3]) if "://" in lost.uri else lost.uri
+    also = "".join(f", or '{lost.uri}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
+    return (
+        f"mesh '{lost.uri[:200]}' cannot be had: {lost.reason}; name its folder with --model-path, or a shape with --stand-in "
+        f"'{package}=cylinder:radius,length' ({HOW.split(', visual')[0]}){also}, or leave it out with --ignore mesh"
+    )
+
+
+def _scaled(shape: Shape, scale: Vector) -> Shape:
+    if scale == ONE:
+        return shape
+    match shape:
+        case Box(size):
+            return Box(_times(size, scale))
+        case Cylinder(radius, length) | Capsule(radius, length):
+            return replace(shape, radius=radius * max(scale[:2]), length=length * scale[2])
+        case Sphere(radius):
+            return Sphere(radius * max(scale))
+        case Ellipsoid(radii):
+            return Ellipsoid(_times(radii, scale))
+        case Mesh(origin, vertices, faces):
+            # A mirrored surface is turned inside out unless its faces are turned over.
+            turned = faces[:, ::-1] if np.prod(scale) < 0 else faces
+            return Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
+    return shape
+
+
+def _times(vector: Vector, scale: Vector) -> Vector:
+    if scale == ONE:
+        return vector
+    return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
+
+
+def _radius(element: Element, scale: Vector) -> float:
+    return _sizes(element, "radius", 1)[0] * max(scale[:2])
+
+
+def _length(element: Element, scale: Vector) -> float:
+    return _sizes(element, "length", 1)[0] * scale[2]
+
+
+def _sizes(parent: Element, tag: str, count: int) -> tuple[float, ...]:
     element = parent.find(tag)
     if element is None:
-        raise complain(parent, path, f"has no <{tag}>")
-    values = numbers(element, path, count)
-    if min(values) <= 0:
-        raise complain(element, path, f"sizes must be above zero, found '{(element.text or '').strip()}'")
+        raise complain(parent, f"has no <{tag}>")
+    values = numbers(element, count)
+    if min(values) <= 0 or max(values) > LARGEST:
+        raise complain(
+            element, f"sizes must be above zero (and at most {LARGEST:g} m), found '{text_of(element)[:60]}'"
+        )
     return values
-
-
-def read_friction(collision: Element, path: Path) -> float:
-    """The Coulomb coefficient: SDF's `surface/friction/ode/mu`."""
-    ode = collision.find("surface/friction/ode")
-    mu = DEFAULT_MU if ode is None else number(ode, "mu", path, DEFAULT_MU)
-    if mu < 0:
-        raise complain(ode.find("mu"), path, f"friction must not be negative, found {mu:g}")
-    return mu
-
-
-def read_color(visual: Element, path: Path) -> tuple[float, float, float, float] | None:
-    """The diffuse colour, or else the ambient one."""
-    for tag in ("material/diffuse", "material/ambient"):
-        element = visual.find(tag)
-        if element is not None:
-            count = 4 if len((element.text or "").split()) == 4 else 3
-            values = tuple(min(max(value, 0.0), 1.0) for value in numbers(element, path, count))
-            return (*values, 1.0)[:4]
-    return None
-
-
-def read_inertia(link: Element, link_pose: Pose, path: Path) -> Inertia | None:
-    """The `<inertial>` of a link in the world frame, or None where there is none."""
-    element = link.find("inertial")
-    if element is None:
-        return None
-    mass = number(element, "mass", path, 1.0)
-    if mass <= 0:
-        raise complain(element, path, f"<mass> must be above zero, found {mass:g}")
-    tensor = element.find("inertia")
-
-    def part(tag: str, default: float) -> float:
-        return default if tensor is None else number(tensor, tag, path, default)
-
-    place = element.find("pose")
-    pose = Pose() if place is None else Pose.from_rpy(*numbers(place, path, 6))
-    moments = (part("ixx", 1.0), part("iyy", 1.0), part("izz", 1.0))
-    products = (part("ixy", 0.0), part("ixz", 0.0), part("iyz", 0.0))
-    return Inertia(mass, link_pose @ pose, moments, products)

@@ -1,8 +1,9 @@
-"""XML that remembers where it stands: elements with their line, bytes and path, so that every complaint can point."""
+"""XML that remembers where it stands: elements with their file, line and bytes, so that every complaint can point."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,10 +12,17 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from ddenv.errors import UserError
 
+# Deeper than any world that a program wrote; what reads it calls itself once for each level.
+DEEPEST = 100
+_TAG_END = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
+
 
 class Element(ElementTree.Element):
-    """An XML element with its first `line`, its byte `start` and `end` in the file, and its `parent`."""
+    """An XML element with its file (`source`), its first `line`, its byte `start` and `end` in it, and its `parent`."""
 
+    __slots__ = ("end", "line", "parent", "source", "start")
+
+    source: Path
     line: int
     start: int
     end: int
@@ -24,37 +32,29 @@ class Element(ElementTree.Element):
 class _Builder(ElementTree.TreeBuilder):
     """Builds `Element`s; `expat` tells where in the file each of them is."""
 
-    def __init__(self, text: bytes) -> None:
+    def __init__(self, text: bytes, source: Path) -> None:
         super().__init__(element_factory=Element)
         self.text = text
+        self.source = source
         self.open: list[Element] = []
         self.expat = None
 
     def start(self, tag, attributes):
         element = super().start(tag, attributes)
+        element.source = self.source
         element.line = self.expat.CurrentLineNumber
         element.start = self.expat.CurrentByteIndex
         element.parent = self.open[-1] if self.open else None
         self.open.append(element)
+        if len(self.open) > DEEPEST:
+            raise UserError(f"{self.source}:{element.line}: elements are nested more than {DEEPEST} deep")
         return element
 
     def end(self, tag):
         # For `<a/>` expat reports the end at the element's own start: either way the next `>` outside quotes closes it.
-        self.open.pop().end = _after_tag(self.text, self.expat.CurrentByteIndex)
+        found = _TAG_END.match(self.text, self.expat.CurrentByteIndex)
+        self.open.pop().end = found.end() if found else len(self.text)
         return super().end(tag)
-
-
-def _after_tag(text: bytes, start: int) -> int:
-    quote = None
-    for index in range(start, len(text)):
-        char = text[index]
-        if quote is not None:
-            quote = None if char == quote else quote
-        elif char in b"\"'":
-            quote = char
-        elif char == ord(">"):
-            return index + 1
-    return len(text)
 
 
 def parse(text: bytes, path: Path) -> Element:
@@ -62,8 +62,8 @@ def parse(text: bytes, path: Path) -> Element:
     if not text.strip():
         raise UserError(f"{path}: the file is empty; expected an SDF file")
     if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
-        raise UserError(f"{path}: is UTF-16 or UTF-32; save it as UTF-8")
-    builder = _Builder(text)
+        raise UserError(f"{path}: is UTF-16 or UTF-32, or no text at all; save it as UTF-8")
+    builder = _Builder(text, path)
     parser = DefusedXMLParser(target=builder, forbid_dtd=False, forbid_entities=True, forbid_external=True)
     builder.expat = parser.parser
     try:
@@ -85,37 +85,59 @@ def xpath(element: Element) -> str:
     node: Element | None = element
     while node is not None:
         name = node.get("name")
-        steps.append(node.tag if name is None or node.tag == "world" else f"{node.tag}[@name='{name}']")
+        steps.append(node.tag if name is None or node.tag == "world" else f"{node.tag}[@name='{name[:80]}']")
         node = node.parent
     return "/" + "/".join(reversed(steps))
 
 
-def complain(element: Element, path: Path, message: str) -> UserError:
+def place(element: Element) -> str:
+    """File, line and XPath of `element`."""
+    return f"{element.source}:{element.line}: {xpath(element)}"
+
+
+def complain(element: Element, message: str) -> UserError:
     """A UserError that says where: file, line and XPath."""
-    return UserError(f"{path}:{element.line}: {xpath(element)}: {message}")
+    return UserError(f"{place(element)}: {message}")
 
 
-def numbers(element: Element, path: Path, count: int) -> tuple[float, ...]:
-    """The `count` finite numbers that are the text of `element`."""
-    words = (element.text or "").split()
+def text_of(element: Element | None) -> str:
+    """The text of `element` without the blanks around it; empty where there is no element."""
+    return "" if element is None else (element.text or "").strip()
+
+
+def name_of(element: Element) -> str:
+    """The name attribute. Raises UserError where there is none."""
+    name = element.get("name")
+    if not name or not name.strip():
+        raise complain(element, "has no name attribute; give it one")
+    return name
+
+
+def floats(element: Element) -> tuple[float, ...]:
+    """All numbers in the text of `element`, which may be infinite or NaN; none at all if one of the words is no number."""
     try:
-        values = tuple(float(word) for word in words)
+        return tuple([float(word) for word in (element.text or "").split()])
     except ValueError:
-        values = ()
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        shown = " ".join(words)[:60]
+        return ()
+
+
+def numbers(element: Element, count: int) -> tuple[float, ...]:
+    """The `count` finite numbers that are the text of `element`."""
+    values = floats(element)
+    if len(values) != count or not all(map(math.isfinite, values)):
+        shown = " ".join((element.text or "").split())[:60]
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
-        raise complain(element, path, f"expected {wanted}, found '{shown}'")
+        raise complain(element, f"expected {wanted}, found '{shown}'")
     return values
 
 
-def number(parent: Element, tag: str, path: Path, default: float) -> float:
+def number(parent: Element, tag: str, default: float) -> float:
     """The number in child `tag` of `parent`, or `default` where there is none."""
     child = parent.find(tag)
-    return default if child is None else numbers(child, path, 1)[0]
+    return default if child is None else numbers(child, 1)[0]
 
 
-def truth(parent: Element, tag: str, path: Path, default: bool) -> bool:
+def truth(parent: Element, tag: str, default: bool) -> bool:
     """SDF's booleans: true, false, 1, 0."""
     child = parent.find(tag)
     if child is None:
@@ -125,4 +147,4 @@ def truth(parent: Element, tag: str, path: Path, default: bool) -> bool:
         return True
     if word in ("0", "false"):
         return False
-    raise complain(child, path, f"expected true or false, found '{word[:60]}'")
+    raise complain(child, f"expected true or false, found '{word[:60]}'")

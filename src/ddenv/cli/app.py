@@ -1,4 +1,4 @@
-"""The command line: parses, calls, prints.
+"""The commands, and what their exits mean.
 
 Exit codes: 0 done (for a reduction: minimal), 1 stopped before that, 2 wrong input, 130 interrupted.
 """
@@ -6,7 +6,6 @@ Exit codes: 0 done (for a reduction: minimal), 1 stopped before that, 2 wrong in
 from __future__ import annotations
 
 import json
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,45 +13,9 @@ from typing import Any
 import click
 
 from ddenv import __version__
+from ddenv.cli.options import JOBS, reading_options, scenario_options
+from ddenv.cli.world import world_group
 from ddenv.errors import UserError, printable
-
-JOBS = os.cpu_count() or 1
-
-
-class Numbers(click.ParamType):
-    """Comma-separated finite numbers, at least and at most so many."""
-
-    def __init__(self, name: str, fewest: int, most: int) -> None:
-        self.name, self.fewest, self.most = name, fewest, most
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, ...]:
-        try:
-            numbers = tuple(float(word) for word in value.split(","))
-        except ValueError:
-            numbers = ()
-        if not self.fewest <= len(numbers) <= self.most:
-            self.fail(
-                f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
-                param,
-                ctx,
-            )
-        return numbers
-
-
-def scenario_options(command):
-    """How a scenario is chosen and changed: shared by the commands that take one."""
-    for option in reversed(
-        (
-            click.option(
-                "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
-            ),
-            click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it shall go, m (for an SDF world)."),
-            click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
-            click.option("--timeout", type=float, help="Simulated time the robot has, s."),
-        )
-    ):
-        command = option(command)
-    return command
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -69,6 +32,7 @@ def app(context: click.Context) -> None:
 @app.command()
 @click.argument("scenario")
 @scenario_options
+@reading_options
 @click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal.")
 @click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure.")
 @click.option("--n-partitions", type=int, help="Partitions in the first round.")
@@ -80,16 +44,20 @@ def app(context: click.Context) -> None:
     "--output", type=Path, help="A .ddenv file or a folder for the run; or a .sdf file for the minimal world."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
-def run(scenario, spawn, goal, world, timeout, name, output, jobs, as_json, **options) -> int:
+def run(
+    scenario, spawn, goal, world, timeout, model_path, stand_in, ignore, name, output, jobs, as_json, **options
+) -> int:
     """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
     from ddenv.launch.programs import start_engine
     from ddenv.launch.runs import create_run, run_path
     from ddenv.launch.scenarios import with_options
 
-    chosen = with_options(_scenario(scenario, spawn, goal, world, timeout), **options)
+    reading = {"model_path": model_path, "stand_in": stand_in, "ignore": ignore}
+    chosen = with_options(_scenario(scenario, spawn, goal, world, timeout, reading), **options)
     path = run_path(chosen.name, name, output)
     sdf = output if output is not None and output.suffix in (".sdf", ".world") else None
-    create_run(chosen, path)
+    read = create_run(chosen, path, _tell)
+    _tell_notes(read, as_json)
     return _follow(path, start_engine(path, jobs), as_json, sdf)
 
 
@@ -139,6 +107,7 @@ def runs() -> int:
 @app.command()
 @click.argument("subject", metavar="SCENARIO_OR_RUN")
 @scenario_options
+@reading_options
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models that the run has left.")
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
@@ -147,11 +116,14 @@ def runs() -> int:
 @click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Runs of each.")
 @click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Runs at the same time.")
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
-def test(subject, spawn, goal, world, timeout, keep, jobs, as_json, leave_out, **options) -> int:
+def test(
+    subject, spawn, goal, world, timeout, model_path, stand_in, ignore, keep, jobs, as_json, leave_out, **options
+) -> int:
     """Runs the robot in a scenario, or in a run's world, and prints each run's outcome."""
     from ddenv.engine.trial import plan, run_trials
 
-    what = _subject(subject, spawn, goal, world, timeout)
+    reading = {"model_path": model_path, "stand_in": stand_in, "ignore": ignore}
+    what = _subject(subject, spawn, goal, world, timeout, reading)
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     trials = plan(what, keep=names, leave_out=list(leave_out), **options)
     told = []
@@ -179,9 +151,9 @@ def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     return 0
 
 
-def _scenario(name, spawn, goal, world, timeout):
+def _scenario(name, spawn, goal, world, timeout, reading):
     """The scenario that a command line asks for."""
-    from ddenv.launch.scenarios import scenario_for_world, with_options
+    from ddenv.launch.scenarios import reading_of, scenario_for_world, with_options
     from ddenv.world.load import find_scenario, load_scenario
 
     if Path(name).suffix.lower() in (".sdf", ".world"):
@@ -189,11 +161,14 @@ def _scenario(name, spawn, goal, world, timeout):
             raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
         if world is not None:
             raise UserError(f"--world: goes with a scenario; {name} is a world already")
-        return with_options(scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal), timeout=timeout)
-    return with_options(load_scenario(find_scenario(name)), timeout=timeout, spawn=spawn, goal=goal, world=world)
+        scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
+        return with_options(scenario, timeout=timeout, reading=reading_of(**reading))
+    scenario = load_scenario(find_scenario(name))
+    chosen = reading_of(scenario.reading, **reading)
+    return with_options(scenario, timeout=timeout, spawn=spawn, goal=goal, world=world, reading=chosen)
 
 
-def _subject(name, spawn, goal, world, timeout):
+def _subject(name, spawn, goal, world, timeout, reading):
     """What `ddenv test` tries: a run where there is one of that name, else a scenario."""
     from ddenv.engine.trial import Subject, subject_of_run
     from ddenv.launch.runs import find_run
@@ -202,12 +177,26 @@ def _subject(name, spawn, goal, world, timeout):
 
     path = find_run(name)
     if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
-        if any(option is not None for option in (spawn, goal, world, timeout)):
-            raise UserError("--spawn, --goal, --world and --timeout go with a scenario; a run keeps its own")
+        if any(option is not None for option in (spawn, goal, world, timeout)) or any(reading.values()):
+            raise UserError(
+                "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore go with a scenario; "
+                "a run keeps its own"
+            )
         with RunFile(path) as file:
             return subject_of_run(file)
-    scenario = _scenario(name, spawn, goal, world, timeout)
-    return Subject(scenario, *load_parts(scenario))
+    scenario = _scenario(name, spawn, goal, world, timeout, reading)
+    return Subject(scenario, *load_parts(scenario, _tell))
+
+
+def _tell(line: str) -> None:
+    """Says that something takes longer, without disturbing what is printed for programs."""
+    print(printable(line), file=sys.stderr, flush=True)
+
+
+def _tell_notes(world: Any, as_json: bool) -> None:
+    if world.notes:
+        line = f"{len(world.notes)} parts of {world.path} were replaced or ignored; 'ddenv world check' tells which and why"
+        print(printable(line), file=sys.stderr if as_json else sys.stdout, flush=True)
 
 
 def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
@@ -240,6 +229,9 @@ def _trial_line(result: dict[str, Any]) -> str:
         f"seed {result['seed']:<4} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
         f"after {result['simulated_seconds']:.1f} s{failure}{distance}{without}"
     )
+
+
+app.add_command(world_group)
 
 
 def main() -> None:

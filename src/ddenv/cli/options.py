@@ -1,0 +1,74 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+JOBS = os.cpu_count() or 1
+# What `ddenv.world.scenario.IGNORABLE` holds, which is too slow to import for every command.
+IGNORABLE = ("heightmap", "image", "mesh", "include", "joint")
+
+
+class Numbers(click.ParamType):
+    """Comma-separated finite numbers, at least and at most so many."""
+
+    def __init__(self, name: str, fewest: int, most: int) -> None:
+        self.name, self.fewest, self.most = name, fewest, most
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, ...]:
+        try:
+            numbers = tuple(float(word) for word in value.split(","))
+        except ValueError:
+            numbers = ()
+        if not self.fewest <= len(numbers) <= self.most:
+            self.fail(
+                f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
+                param,
+                ctx,
+            )
+        return numbers
+
+
+def scenario_options(command):
+    """How a scenario is chosen and changed: shared by the commands that take one."""
+    for option in reversed(
+        (
+            click.option(
+                "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
+            ),
+            click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it shall go, m (for an SDF world)."),
+            click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
+            click.option("--timeout", type=float, help="Simulated time the robot has, s."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def reading_options(command):
+    """How the world's SDF is read where it names other files: shared by the commands that read one."""
+    for option in reversed(
+        (
+            click.option(
+                "--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."
+            ),
+            click.option(
+                "--stand-in",
+                multiple=True,
+                metavar="URI=SHAPE",
+                help="A shape for what cannot be found there, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
+            ),
+            click.option(
+                "--ignore",
+                multiple=True,
+                type=click.Choice(IGNORABLE),
+                help="Leave such elements out instead of refusing the file; may be repeated.",
+            ),
+        )
+    ):
+        command = option(command)
+    return command

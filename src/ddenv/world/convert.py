@@ -1,0 +1,245 @@
+"""Writes a world as clean SDF 1.9 that Drake's own parser loads: what was understood of a file, and nothing else.
+
+Poses are those after `<state>`, frames are resolved, included and nested models are written out, names are unique, meshes are
+convex hulls in files of their own, and an infinite plane is a large box: Drake crashes with half spaces on the welded bodies
+that its parser makes of static models (drake#19263).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from ddenv.errors import UserError
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Inertia,
+    Joint,
+    Link,
+    Mesh,
+    Model,
+    Plane,
+    Shape,
+    Sphere,
+    Visual,
+    World,
+)
+from ddenv.world.pose import Pose
+from ddenv.world.write import write_file
+
+DRAKE = "http://drake.mit.edu"
+GROUND = Box((200.0, 200.0, 1.0))
+BELOW = Pose((0.0, 0.0, -0.5))
+
+
+@dataclass
+class Converted:
+    """`text` is the world's SDF; `meshes` are the OBJ files it names, by their place beside it."""
+
+    text: bytes = b""
+    meshes: dict[str, bytes] = field(default_factory=dict)
+
+
+def convert(world: World, mesh_folder: str) -> Converted:
+    """`world` as SDF 1.9, its meshes in the folder `mesh_folder` beside it."""
+    out = Converted()
+    files: dict[Mesh, str] = {}
+    ElementTree.register_namespace("drake", DRAKE)
+    root = Element("sdf", version="1.9")
+    inside = SubElement(root, "world", name=_clean(world.name) or "world")
+    SubElement(inside, "gravity").text = _numbers(world.gravity)
+    names = _unique(model.name for model in world.models)
+    for name, model in zip(names, world.models, strict=True):
+        _model(inside, name, model, files, mesh_folder)
+    for mesh, name in files.items():
+        out.meshes[name] = obj(mesh)
+    ElementTree.indent(root)
+    out.text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    return out
+
+
+def write_converted(world: World, path: Path) -> list[Path]:
+    """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns what was written. Raises UserError."""
+    folder = path.with_name(f"{path.stem}_meshes")
+    converted = convert(world, folder.name)
+    if converted.meshes:
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise UserError(f"{folder}: cannot be made: {error.strerror}") from None
+    files = {path.parent / name: content for name, content in converted.meshes.items()} | {path: converted.text}
+    for file, content in files.items():
+        write_file(file, content)
+    return list(files)
+
+
+def _model(parent: Element, name: str, model: Model, files: dict[Mesh, str], folder: str) -> None:
+    element = SubElement(parent, "model", name=name)
+    if model.static:
+        SubElement(element, "static").text = "true"
+    if model.self_collide:
+        SubElement(element, "self_collide").text = "true"
+    _pose(element, model.pose)
+    names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
+    for link in model.links:
+        _link(element, names[link.name], link, model, files, folder)
+    joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
+    poses = {link.name: link.pose for link in model.links}
+    for joint_name, joint in zip(joint_names, model.joints, strict=True):
+        _joint(element, joint_name, joint, model, poses[joint.child], names)
+
+
+def _link(parent: Element, name: str, link: Link, model: Model, files: dict[Mesh, str], folder: str) -> None:
+    element = SubElement(parent, "link", name=name)
+    _pose(element, model.pose.inverse() @ link.pose)
+    if not model.gravity:
+        SubElement(element, "gravity").text = "false"
+    if link.inertia is not None:
+        _inertia(element, link.inertia, link.pose)
+    back = link.pose.inverse()
+    for one, own in zip(link.collisions, _unique(one.name for one in link.collisions), strict=True):
+        _collision(element, own, one, back, files, folder)
+    for one, own in zip(link.visuals, _unique(one.name for one in link.visuals), strict=True):
+        _visual(element, own, one, back, files, folder)
+
+
+def _collision(parent: Element, name: str, one: Collision, back: Pose, files: dict[Mesh, str], folder: str) -> None:
+    element = SubElement(parent, "collision", name=name)
+    endless = isinstance(one.shape, Plane)
+    _pose(element, back @ one.pose @ BELOW if endless else back @ one.pose)
+    _geometry(element, GROUND if endless else one.shape, files, folder)
+    friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
+    for tag in ("mu", "mu2"):
+        SubElement(friction, tag).text = repr(one.mu)
+
+
+def _visual(parent: Element, name: str, one: Visual, back: Pose, files: dict[Mesh, str], folder: str) -> None:
+    element = SubElement(parent, "visual", name=name)
+    _pose(element, back @ one.pose)
+    _geometry(element, one.shape, files, folder)
+    if one.color is not None:
+        material = SubElement(element, "material")
+        for tag in ("ambient", "diffuse"):
+            SubElement(material, tag).text = _numbers(one.color)
+
+
+def _geometry(parent: Element, shape: Shape, files: dict[Mesh, str], folder: str) -> None:
+    geometry = SubElement(parent, "geometry")
+    if not isinstance(shape, Mesh):
+        kind, sizes = _primitive(shape)
+        element = SubElement(geometry, kind)
+        for name, values in sizes.items():
+            SubElement(element, name).text = _numbers(values)
+        return
+    element = SubElement(geometry, "mesh")
+    name = files.setdefault(shape, f"{folder}/mesh_{len(files) + 1}.obj")
+    SubElement(element, "uri").text = name
+    if parent.tag == "collision":
+        SubElement(element, f"{{{DRAKE}}}declare_convex")
+
+
+def _primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
+    """The element of a shape that is no mesh, with the sizes in it."""
+    match shape:
+        case Box(size):
+            return "box", {"size": size}
+        case Cylinder(radius, length):
+            return "cylinder", {"radius": (radius,), "length": (length,)}
+        case Capsule(radius, length):
+            return "capsule", {"radius": (radius,), "length": (length,)}
+        case Sphere(radius):
+            return "sphere", {"radius": (radius,)}
+        case Ellipsoid(radii):
+            return "ellipsoid", {"radii": radii}
+        case Plane(size):
+            return "plane", {"normal": (0.0, 0.0, 1.0), "size": size}
+    raise TypeError(type(shape).__name__)
+
+
+def _inertia(parent: Element, inertia: Inertia, link_pose: Pose) -> None:
+    element = SubElement(parent, "inertial")
+    _pose(element, link_pose.inverse() @ inertia.pose)
+    SubElement(element, "mass").text = repr(inertia.mass)
+    tensor = SubElement(element, "inertia")
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    for name, value in zip(names, (*inertia.moments, *inertia.products), strict=True):
+        SubElement(tensor, name).text = repr(value)
+
+
+def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: Pose, names: dict[str, str]) -> None:
+    element = SubElement(parent, "joint", name=name, type=joint.kind)
+    _pose(element, child_pose.inverse() @ joint.pose)
+    SubElement(element, "parent").text = names.get(joint.parent, joint.parent)
+    SubElement(element, "child").text = names[joint.child]
+    if joint.kind in ("fixed", "ball"):
+        return
+    turn = Pose(quaternion=model.pose.inverse().quaternion)
+    for tag, axis in (("axis", joint.axis), ("axis2", joint.axis2)):
+        if axis is not None:
+            holder = SubElement(element, tag)
+            SubElement(holder, "xyz", expressed_in="__model__").text = _numbers(turn.rotate(axis))
+            _limits(holder, joint)
+
+
+def _limits(holder: Element, joint: Joint) -> None:
+    limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
+    finite = {tag: value for tag, value in limits.items() if math.isfinite(value)}
+    if finite:
+        limit = SubElement(holder, "limit")
+        for tag, value in finite.items():
+            SubElement(limit, tag).text = repr(value)
+    if joint.damping:
+        SubElement(SubElement(holder, "dynamics"), "damping").text = repr(joint.damping)
+
+
+def _pose(parent: Element, pose: Pose) -> None:
+    """Nothing for a pose that is none; yaw alone, as a person would write it; else a quaternion, which loses nothing."""
+    w, x, y, z = pose.quaternion
+    if x == 0.0 and y == 0.0:
+        angles = (0.0, 0.0, pose.yaw())
+        if any(pose.position) or angles[2]:
+            SubElement(parent, "pose").text = _numbers((*pose.position, *angles))
+        return
+    SubElement(parent, "pose", rotation_format="quat_xyzw").text = _numbers((*pose.position, x, y, z, w))
+
+
+def _numbers(values: Iterable[float]) -> str:
+    # Adding zero makes -0 a plain 0.
+    return " ".join(f"{value + 0.0:.12g}" for value in values)
+
+
+def _clean(name: str) -> str:
+    """`name` without what SDF keeps for itself."""
+    name = "".join(char if char.isprintable() else "_" for char in name).replace("::", "_")
+    reserved = name == "world" or (name.startswith("__") and name.endswith("__"))
+    return f"{name.strip('_') or 'a'}_" if reserved else name
+
+
+def _unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """Clean names, each once; a second one of the same name gets a number."""
+    used, unique = set(taken), []
+    for name in map(_clean, names):
+        own, number = name, 1
+        while own in used:
+            number += 1
+            own = f"{name}_{number}"
+        used.add(own)
+        unique.append(own)
+    return unique
+
+
+def obj(mesh: Mesh) -> bytes:
+    """A mesh as an OBJ file."""
+    points = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in np.asarray(mesh.vertices, dtype=float)]
+    faces = [f"f {a} {b} {c}" for a, b, c in np.asarray(mesh.faces, dtype=int) + 1]
+    return "\n".join([*points, *faces, ""]).encode()

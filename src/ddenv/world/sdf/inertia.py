@@ -1,0 +1,148 @@
+"""Mass and inertia of the links that move: as the file says, or worked out from their shapes where that cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Inertia, Mesh, Plane, Shape, Sphere
+from ddenv.world.pose import Pose
+from ddenv.world.sdf.context import Context
+from ddenv.world.sdf.frames import pose_of
+from ddenv.world.sdf.xml import Element, floats, text_of
+
+WATER = 1000.0  # kg/m^3, SDF's default for a link whose mass is to be computed
+DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
+# A link without shapes is taken as a ball of this radius, m.
+BARE = 0.05
+HEAVIEST = 1e9  # kg
+
+
+def read_inertia(
+    link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
+) -> Inertia:
+    """The inertia of a moving link at `link_pose`; `density` (kg/m^3) is of each of its `collisions`, in the world frame."""
+    element = link.find("inertial")
+    if element is None:
+        context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
+        return spread(collisions, density, link_pose, DEFAULT_MASS)
+    if (element.get("auto") or "").strip().lower() in ("1", "true"):
+        return spread(collisions, density, link_pose, None)
+    mass = _number(element, "mass", DEFAULT_MASS)
+    if not 0 < mass <= HEAVIEST:
+        computed = spread(collisions, density, link_pose, None)
+        why = f"mass {mass:g} kg cannot be: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
+        context.note("replaced", element, why)
+        return computed
+    tensor = element.find("inertia")
+    place = element.find("pose")
+    pose = Pose() if place is None else pose_of(place)
+    if tensor is not None:
+        moments = tuple(_number(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
+        products = tuple(_number(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+        if is_possible(moments, products):
+            return Inertia(mass, link_pose @ pose, moments, products)  # type: ignore[arg-type]
+    said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 cannot be"
+    context.note("replaced", element, f"{said}: worked out from its shapes and its mass of {mass:g} kg")
+    return spread(collisions, density, link_pose, mass)
+
+
+def _number(parent: Element, tag: str, default: float) -> float:
+    child = parent.find(tag)
+    values = (default,) if child is None else floats(child)
+    return values[0] if len(values) == 1 else math.nan
+
+
+def _shown(tensor: Element) -> str:
+    return " ".join(text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
+
+
+def is_possible(moments: Sequence[float], products: Sequence[float]) -> bool:
+    """Whether a body can have these: its principal moments are above zero, and none exceeds the sum of the others."""
+    xx, yy, zz = moments
+    xy, xz, yz = products
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if not np.isfinite(tensor).all() or np.abs(tensor).max() > HEAVIEST:
+        return False
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    return bool(low > 0 and high <= (low + middle) * (1 + 1e-6))
+
+
+def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
+    """The inertia of solid shapes (overlaps count twice), scaled to `mass` (kg) unless that is None."""
+    pairs = [(one, each) for one, each in zip(collisions, density, strict=True) if not isinstance(one.shape, Plane)]
+    if not pairs:
+        return _ball(link_pose, DEFAULT_MASS if mass is None else mass)
+    solids = [(*solid(one.shape), one.pose, each) for one, each in pairs]
+    masses = np.array([volume * each for volume, _, _, _, each in solids])
+    centers = np.array([np.array(pose.position) + pose.rotation() @ center for _, center, _, pose, _ in solids])
+    total = float(masses.sum())
+    middle = masses @ centers / total
+    tensor = np.zeros((3, 3))
+    for (_, _, unit, pose, _), each, center in zip(solids, masses, centers, strict=True):
+        rotation, arm = pose.rotation(), center - middle
+        tensor += each * (rotation @ unit @ rotation.T + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    factor = 1.0 if mass is None else mass / total
+    tensor *= factor
+    moments = tuple(float(tensor[axis, axis]) for axis in range(3))
+    products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
+    place = Pose(tuple(float(part) for part in middle))  # type: ignore[arg-type]
+    return Inertia(total * factor, place, moments, products)  # type: ignore[arg-type]
+
+
+def _ball(link_pose: Pose, mass: float) -> Inertia:
+    moment = 0.4 * mass * BARE**2
+    return Inertia(mass, link_pose, (moment, moment, moment))
+
+
+def solid(shape: Shape) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume (m^3), centre (3,) m, and inertia about it for a mass of 1 kg, shape (3, 3) m^2, in the shape's own frame."""
+    origin = np.zeros(3)
+    match shape:
+        case Box(size):
+            x, y, z = (part * part / 12 for part in size)
+            return math.prod(size), origin, np.diag([y + z, x + z, x + y])
+        case Ellipsoid(radii):
+            x, y, z = (part * part / 5 for part in radii)
+            return 4 / 3 * math.pi * math.prod(radii), origin, np.diag([y + z, x + z, x + y])
+        case Sphere(radius):
+            return 4 / 3 * math.pi * radius**3, origin, 0.4 * radius**2 * np.eye(3)
+        case Cylinder(radius, length):
+            return math.pi * radius**2 * length, origin, _cylinder(radius, length)
+        case Capsule(radius, length):
+            return _capsule(radius, length)
+        case Mesh(_, vertices, faces):
+            return _polyhedron(vertices[faces])
+    raise TypeError(type(shape).__name__)
+
+
+def _cylinder(radius: float, length: float) -> np.ndarray:
+    across = radius**2 / 4 + length**2 / 12
+    return np.diag([across, across, radius**2 / 2])
+
+
+def _capsule(radius: float, length: float) -> tuple[float, np.ndarray, np.ndarray]:
+    tube, balls = math.pi * radius**2 * length, 4 / 3 * math.pi * radius**3
+    volume = tube + balls
+    # Two half balls, each with its centre of mass 3/8 r beyond the end of the tube.
+    across = 0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius
+    unit = tube * _cylinder(radius, length) + balls * np.diag([across, across, 0.4 * radius**2])
+    return volume, np.zeros(3), unit / volume
+
+
+def _polyhedron(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """By signed tetrahedra between a point inside and each of the triangles (N, 3, 3)."""
+    inside = triangles.reshape(-1, 3).mean(axis=0)
+    a, b, c = np.moveaxis(triangles - inside, 1, 0)
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    volume = float(volumes.sum())
+    first = np.einsum("i,ij->j", volumes, a + b + c) / 4
+    corners = np.stack([a, b, c], axis=1)
+    total = corners.sum(axis=1)
+    second = np.einsum("i,ij,ik->jk", volumes, total, total) + np.einsum("i,ilj,ilk->jk", volumes, corners, corners)
+    covariance = second / 20 / volume
+    center = first / volume
+    covariance -= np.outer(center, center)
+    return volume, center + inside, np.trace(covariance) * np.eye(3) - covariance

@@ -1,0 +1,168 @@
+"""Reads the `<joint>`s between the links of one model, in the world frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ddenv.world.model import Joint
+from ddenv.world.pose import Pose, Vector
+from ddenv.world.sdf.context import Context, refuse, version
+from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
+
+KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
+WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
+LIMITED = ("revolute", "prismatic")
+# An unlimited value is written by simulators as a huge number or as -1; SDF's own default for both limits is infinite.
+UNLIMITED = 1e15
+WORLD = "world"
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A link's pose in the world: as its model has it, and as it is once `<state>` moved it."""
+
+    nominal: Pose
+    actual: Pose
+
+
+def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand], context: Context) -> list[Joint]:
+    """The joints directly inside a model at the nominal `pose`; `stands` are its links by full name. Raises UserError."""
+    joints = []
+    for element in scope.element.findall("joint"):
+        kind = element.get("type", "")
+        if kind in KINDS:
+            joints.append(_joint(element, kind, scope, pose, prefix, stands))
+        elif context.ignores("joint"):
+            context.note("ignored", element, f"a '{kind}' joint is left out as asked: its links move freely")
+        else:
+            raise refuse(element, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+    return joints
+
+
+def _joint(element: Element, kind: str, scope: Scope, model_pose: Pose, prefix: str, stands: dict[str, Stand]) -> Joint:
+    parent, child = (_end(element, tag, scope, prefix, stands) for tag in ("parent", "child"))
+    if parent == child:
+        raise complain(element, f"joins '{child}' to itself")
+    nominal = model_pose @ scope.pose(name_of(element), element)
+    moved = stands[child].actual @ stands[child].nominal.inverse()
+    axis = element.find("axis")
+    if kind in ("revolute", "prismatic", "universal") and axis is None:
+        raise complain(element, f"a {kind} joint needs an <axis>")
+    first = _axis(axis, scope, model_pose, nominal)
+    second = _second_axis(element, first, scope, model_pose, nominal) if kind == "universal" else None
+    limit = None if axis is None or kind not in LIMITED else axis.find("limit")
+    dynamics = None if axis is None else axis.find("dynamics")
+    joint = Joint(
+        name=prefix + name_of(element),
+        kind=kind,
+        parent=parent,
+        child=child,
+        pose=moved @ nominal,
+        axis=moved.rotate(first),
+        lower=-math.inf if limit is None else _bound(number(limit, "lower", -UNLIMITED)),
+        upper=math.inf if limit is None else _bound(number(limit, "upper", UNLIMITED)),
+        effort=_limit(axis, "effort"),
+        velocity=_limit(axis, "velocity"),
+        damping=0.0 if dynamics is None else _damping(dynamics),
+        axis2=None if second is None else moved.rotate(second),
+    )
+    if joint.lower > joint.upper:
+        raise complain(limit, f"the lower limit {joint.lower:g} is above the upper one, {joint.upper:g}")
+    return _counted_from_here(joint, first, stands)
+
+
+def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand]) -> str:
+    """The full name of the link at one end of a joint, or `world`."""
+    child = element.find(tag)
+    name = text_of(child)
+    if tag == "parent" and name == WORLD:
+        return WORLD
+    link = scope.link_of(name, element) if name else None
+    if link is None or prefix + link not in stands:
+        raise complain(element if child is None else child, f"<{tag}> names no link of this model: '{name[:80]}'")
+    return prefix + link
+
+
+def _axis(axis: Element | None, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
+    """The unit vector of an `<axis>` in the world frame, as the links nominally are."""
+    element = None if axis is None else axis.find("xyz")
+    x, y, z = (0.0, 0.0, 1.0) if element is None else numbers(element, 3)
+    length = math.sqrt(x * x + y * y + z * z)
+    if not 1e-9 < length < 1e9:
+        raise complain(axis if element is None else element, "a joint's axis needs a length above zero")
+    unit = (x / length, y / length, z / length)
+    frame = "" if element is None else element.get("expressed_in") or ""
+    if frame:
+        return (model_pose @ scope.pose(frame, element)).rotate(unit)
+    in_model = (
+        axis is not None and version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5))
+    )
+    return (model_pose if in_model else joint_pose).rotate(unit)
+
+
+def _second_axis(element: Element, first: Vector, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
+    axis2 = element.find("axis2")
+    if axis2 is None:
+        raise complain(element, "a universal joint needs an <axis2>")
+    second = _axis(axis2, scope, model_pose, joint_pose)
+    along = sum(a * b for a, b in zip(first, second, strict=True))
+    if abs(along) > 1e-3:
+        raise complain(axis2, "the two axes of a universal joint must be at right angles")
+    x, y, z = (b - along * a for a, b in zip(first, second, strict=True))
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+def _counted_from_here(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> Joint:
+    """`joint` with its limits counted from where `<state>` has the links; `axis` is as they nominally are."""
+    if math.isinf(joint.lower) and math.isinf(joint.upper):
+        return joint
+    parent = stands.get(joint.parent, Stand(Pose(), Pose()))
+    child = stands[joint.child]
+    seen = parent.nominal @ parent.actual.inverse() @ child.actual
+    if joint.kind == "prismatic":
+        way = zip(seen.position, child.nominal.position, strict=True)
+        here = sum((a - b) * c for (a, b), c in zip(way, axis, strict=True))
+    else:
+        w, *turn = (seen @ child.nominal.inverse()).quaternion
+        here = 2 * math.atan2(sum(a * b for a, b in zip(turn, axis, strict=True)), w)
+        here -= 2 * math.pi * round(here / (2 * math.pi))
+    return replace(joint, lower=joint.lower - here, upper=joint.upper - here)
+
+
+def _bound(value: float) -> float:
+    return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
+
+
+def _limit(axis: Element | None, tag: str) -> float:
+    limit = None if axis is None else axis.find("limit")
+    value = -1.0 if limit is None else number(limit, tag, -1.0)
+    return math.inf if value < 0 or value >= UNLIMITED else value
+
+
+def _damping(dynamics: Element) -> float:
+    damping = number(dynamics, "damping", 0.0)
+    if damping < 0:
+        raise complain(dynamics, f"damping must not be negative, found {damping:g}")
+    return damping
+
+
+def check_tree(joints: list[Joint], element: Element) -> None:
+    """Raises UserError where joints close a loop, or hold one link from two sides."""
+    parents: dict[str, str] = {}
+    for joint in joints:
+        if joint.child in parents:
+            raise complain(
+                element, f"link '{joint.child}' is the child of two joints; only trees of links are supported"
+            )
+        parents[joint.child] = joint.parent
+    for start in parents:
+        chain = [start]
+        while (above := parents.get(chain[-1])) is not None:
+            if above == start:
+                raise complain(element, f"joints close a loop: {' -> '.join(reversed((*chain, above)))}")
+            if above in chain:
+                break
+            chain.append(above)

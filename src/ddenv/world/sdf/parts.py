@@ -1,0 +1,139 @@
+"""The models inside a model or a world: written in place, or included from other files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from ddenv.world.sdf.context import Context, refuse, sdf_root
+from ddenv.world.sdf.resources import Missing
+from ddenv.world.sdf.standin import SIZES, StandIn
+from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
+
+# Files that include each other can ask for more models than any machine holds.
+MOST_INCLUDES = 20_000
+# What an included file may hold in place of a model, which nothing can touch.
+UNTOUCHABLE = ("actor", "light")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A `<model>` (`element`) and where it stands in the file that holds it: there, or as an `<include>` (`at`).
+
+    `static` is what the include says of that. `files` are the files that are being included, the outermost first.
+    """
+
+    element: Element
+    at: Element
+    name: str
+    files: tuple[Path, ...]
+    static: bool | None = None
+
+    @property
+    def pose(self) -> Element | None:
+        """The `<pose>` that counts: an include's own wins."""
+        given = self.at.find("pose")
+        return self.element.find("pose") if given is None else given
+
+    @property
+    def placement_frame(self) -> str:
+        """The frame inside the model that the pose is of; empty for the model's own."""
+        if self.at is not self.element and self.at.find("pose") is not None:
+            return text_of(self.at.find("placement_frame"))
+        return self.element.get("placement_frame") or ""
+
+
+def parts(element: Element, files: tuple[Path, ...], context: Context) -> list[Part]:
+    """The models directly inside a `<model>` or `<world>`, in the file's order. Raises UserError."""
+    found = []
+    for child in element:
+        if child.tag == "model":
+            found.append(Part(child, child, name_of(child), files))
+        elif child.tag == "include":
+            part = _included(child, files, context)
+            if part is not None:
+                found.append(part)
+    return found
+
+
+def _included(include: Element, files: tuple[Path, ...], context: Context) -> Part | None:
+    uri = text_of(include.find("uri"))
+    if not uri:
+        raise complain(include, "has no <uri>")
+    if (include.get("merge") or "").strip().lower() in ("true", "1"):
+        raise refuse(include, "merge='true' is not supported")
+    context.includes += 1
+    if context.includes > MOST_INCLUDES:
+        raise complain(include, f"more than {MOST_INCLUDES} models are included")
+    root = _root(include, uri, context)
+    if root is None:
+        return None
+    if root.source in files:
+        chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
+        raise complain(include, f"includes go in a circle: {chain}")
+    model = _only_model(root, include, context)
+    if model is None:
+        return None
+    name = text_of(include.find("name")) or name_of(model)
+    static = truth(include, "static", False) if include.find("static") is not None else None
+    return Part(model, include, name, (*files, root.source), static)
+
+
+def _root(include: Element, uri: str, context: Context) -> Element | None:
+    """The included file; None where it is nowhere and the user wants it left out."""
+    given = context.stand_in(uri)
+    if given is not None:
+        context.note("replaced", include, f"'{uri}' by the stand-in {given[0]}")
+        return _stand_in_root(include, *given)
+    try:
+        return context.root(include, uri)
+    except Missing as error:
+        if context.ignores("include"):
+            context.note("ignored", include, f"'{uri}' was not found: {error}")
+            return None
+        raise complain(
+            include,
+            f"'{uri}' was not found ({error}); name its folder with --model-path, or a shape for it with --stand-in "
+            f"'{uri}=box:x,y,z' (or cylinder, sphere, ...), or leave it out with --ignore include",
+        ) from None
+
+
+def _only_model(root: Element, include: Element, context: Context) -> Element | None:
+    models = root.findall("model")
+    if len(models) == 1:
+        return models[0]
+    if not models and any(root.find(tag) is not None for tag in UNTOUCHABLE):
+        context.note("ignored", include, "nothing can touch it")
+        return None
+    found = f"{len(models)} <model> elements" if models else "no <model>"
+    raise complain(include, f"{root.source} holds {found}; expected one")
+
+
+def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
+    """A file with one model of that shape, static unless the include says otherwise."""
+    if stand_in.shape is None:
+        raise complain(include, f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model")
+    geometry = _geometry_text(stand_in.shape)
+    pose = " ".join(repr(value) for value in (*stand_in.center, 0.0, 0.0, 0.0))
+    inside = f"<pose>{pose}</pose><geometry>{geometry}</geometry>"
+    sdf = (
+        '<sdf version="1.12"><model name="stand-in"><static>true</static><link name="link">'
+        f'<collision name="stand-in">{inside}</collision></link></model></sdf>'
+    )
+    return sdf_root(sdf.encode(), include.source.parent / f"stand-in {text}")
+
+
+def _geometry_text(shape: Shape) -> str:
+    match shape:
+        case Box(size):
+            return f"<box><size>{size[0]!r} {size[1]!r} {size[2]!r}</size></box>"
+        case Cylinder(radius, length):
+            return f"<cylinder><radius>{radius!r}</radius><length>{length!r}</length></cylinder>"
+        case Sphere(radius):
+            return f"<sphere><radius>{radius!r}</radius></sphere>"
+        case Capsule(radius, length):
+            return f"<capsule><radius>{radius!r}</radius><length>{length!r}</length></capsule>"
+        case Ellipsoid(radii):
+            return f"<ellipsoid><radii>{radii[0]!r} {radii[1]!r} {radii[2]!r}</radii></ellipsoid>"
+    raise TypeError(type(shape).__name__)

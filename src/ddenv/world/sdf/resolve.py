@@ -1,0 +1,189 @@
+"""Which file a URI of an SDF file means. Nothing is ever downloaded, and no URI climbs out of the folder it is relative to."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+from ddenv.world.sdf import fuel
+from ddenv.world.sdf.files import Missing, Unusable, is_folder, read, reason, without_tilde
+
+ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
+# The newest SDF that is understood: a model's folder may hold one file for each version.
+NEWEST_SDF = (1, 12)
+MODEL_CONFIG_LIMIT = 1_000_000
+CLIMBS = "climbs out of its folder through '..'"
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
+# What the file system says of a file that is simply not there.
+_ABSENT = (errno.ENOENT, errno.ENOTDIR)
+
+
+def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path, ...]:
+    """Where models are looked for: `model_path`, then Gazebo's environment variables, then the world's own folder.
+
+    The folders are absolute; those that do not exist are left out, and each stands once.
+    """
+    named = [str(folder) for folder in model_path]
+    for variable in ENVIRONMENT:
+        named += os.environ.get(variable, "").split(os.pathsep)
+    absolute = [_absolute(without_tilde(name)) for name in [*named, str(world_folder)] if name]
+    return tuple(dict.fromkeys(folder for folder in absolute if is_folder(folder)))
+
+
+def _absolute(path: Path) -> Path:
+    """`path` without `..`, as text: a link on the way is not looked at."""
+    return Path(os.path.normpath(path.absolute()))
+
+
+def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
+    """The file or folder that `uri` means, named in a file of the folder `base`, with `folders` from `search_folders`.
+
+    Raises Missing if there is none, and Unusable if the URI cannot be followed.
+    """
+    scheme, rest = _split(uri.strip())
+    if scheme in ("model", "package"):
+        return _first(_of_model(_inside(rest), folders), f"not in the model path ({_count(folders)})")
+    if scheme in ("http", "https"):
+        return _downloaded(rest, folders)
+    if scheme not in ("", "file"):
+        raise Unusable(f"scheme '{scheme[:30]}:' is not supported")
+    if rest.startswith("/"):
+        return _first([Path(os.path.normpath(rest))], "there is no such file")
+    where = f"neither beside the file that names it nor in the model path ({_count(folders)})"
+    return _first(_beside(rest, base, folders), where)
+
+
+def _split(uri: str) -> tuple[str, str]:
+    """Scheme in small letters (empty for a plain path) and what follows it, percent-decoded."""
+    match = _SCHEME.fullmatch(uri)
+    scheme, rest = ("", uri) if match is None else (match[1].lower(), match[2].removeprefix("//"))
+    rest = unquote(rest, errors="surrogateescape")
+    if not rest.strip("/ "):
+        raise Unusable("names no file")
+    if "\0" in rest:
+        raise Unusable("has a NUL byte")
+    return scheme, rest
+
+
+def _inside(rest: str) -> str:
+    """`rest`, normalised, as a path below some folder; "." is that folder. Raises Unusable if it would leave it."""
+    path = os.path.normpath(rest.lstrip("/") or ".")
+    if Path(path).parts[:1] == ("..",):
+        raise Unusable(CLIMBS)
+    return path
+
+
+def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
+    if path == ".":
+        raise Unusable("names no file")
+    name, _, rest = path.partition(os.sep)
+    for folder in folders:
+        yield folder / path
+        if folder.name == name:
+            yield folder / rest
+
+
+def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
+    """`rest` below `base`, and below each search folder, as long as that stays in any of them."""
+    allowed = [_absolute(folder) for folder in (base, *folders)]
+    candidates = [Path(os.path.normpath(folder / rest)) for folder in (base, *folders)]
+    staying = [path for path in candidates if any(_absolute(path).is_relative_to(folder) for folder in allowed)]
+    if not staying:
+        raise Unusable(CLIMBS)
+    yield from staying
+
+
+def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
+    """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
+    words = rest.split("/")
+    if words[0].lower() not in fuel.HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
+        raise Missing("is not downloaded; name a file or folder of this machine instead")
+    if any(word in (".", "..") for word in words):
+        raise Unusable(CLIMBS if ".." in words else "names no file")
+    owner, name, tail = words[2], words[4], words[5:]
+    version = tail.pop(0) if tail and tail[0] != "files" else ""
+    path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
+    models = (*fuel.in_cache(owner, name, version), *fuel.of_name(name, tuple(folders)))
+    where = f"neither in the Fuel cache nor in the model path ({_count(folders)}), and is not downloaded"
+    return _first((model / path for model in models), where)
+
+
+def _first(candidates: Iterable[Path], where: str) -> Path:
+    """The first candidate that exists. One that cannot be looked at matters only if none of the others is there."""
+    problem = ""
+    for path in candidates:
+        try:
+            path.stat()
+        except OSError as error:
+            problem = problem or ("" if error.errno in _ABSENT else reason(error))
+        except ValueError:
+            raise Unusable("cannot be the name of a file") from None
+        else:
+            return path
+    if problem:
+        raise Unusable(problem)
+    raise Missing(where)
+
+
+def _count(folders: Sequence[Path]) -> str:
+    return "1 folder" if len(folders) == 1 else f"{len(folders)} folders"
+
+
+def model_file(folder: Path) -> Path:
+    """The SDF file of a model's folder: what its model.config names for the newest SDF we read, or else model.sdf.
+
+    Raises Unusable if model.config cannot be read or names no file of the folder, and Missing if there is no SDF file at all.
+    """
+    config = folder / "model.config"
+    if not _is_there(config):
+        return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
+    name = _configured(read(config, MODEL_CONFIG_LIMIT))
+    if not name:
+        return _first([folder / "model.sdf"], f"model.config names no file for SDF {_dotted(NEWEST_SDF)} or older")
+    try:
+        path = _inside(name)
+    except Unusable as error:
+        raise Unusable(f"model.config: <sdf> {error}") from None
+    return _first([folder / path], f"model.config names '{name[:60]}', which is not there")
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        _first([path], "")
+    except Missing:
+        return False
+    return True
+
+
+def _configured(text: bytes) -> str:
+    """The file that a model.config names for the newest SDF version up to ours; empty if there is none."""
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import fromstring
+
+    try:
+        root = fromstring(text)
+    except ElementTree.ParseError as error:
+        raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
+    except DefusedXmlException:
+        raise Unusable("model.config: XML entities are refused") from None
+    except (LookupError, ValueError):
+        raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
+    entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]
+    # Of two entries for one version the first counts.
+    usable = [entry for entry in entries if entry[0] <= NEWEST_SDF and entry[1] and "\0" not in entry[1]]
+    return max(usable, key=lambda entry: entry[0], default=((), ""))[1]
+
+
+def _version(text: str) -> tuple[int, ...]:
+    """1.12 is above 1.9. Whatever is no version counts as the oldest."""
+    match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", text)
+    return (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))

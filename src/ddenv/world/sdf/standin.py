@@ -1,0 +1,111 @@
+"""Stand-ins: simple shapes in place of models and meshes that cannot be found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ddenv.errors import UserError
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from ddenv.world.pose import Vector
+
+# The kinds, with the sizes (m) each wants, as they are written in complaints.
+SIZES = {
+    "box": "x,y,z",
+    "cylinder": "radius,length",
+    "sphere": "radius",
+    "capsule": "radius,length",
+    "ellipsoid": "x,y,z",
+}
+SIBLINGS = ("visual", "collision")
+LARGEST = 1e6  # m
+HOW = (
+    "box:x,y,z, cylinder:radius,length, sphere:radius, capsule:radius,length, ellipsoid:x,y,z (m), visual or collision"
+)
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """A shape with the place of its centre in the frame of what it stands for, m; or the box around the link's `sibling` shapes."""
+
+    shape: Shape | None
+    center: Vector
+    sibling: str = ""
+
+
+def parse_stand_ins(texts: Mapping[str, str]) -> dict[str, StandIn]:
+    """The stand-ins of a scenario by the URI they are for. Raises UserError."""
+    return {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
+
+
+def parse_option(option: str) -> tuple[str, str]:
+    """The URI and the shape of `--stand-in URI=SHAPE`. Raises UserError."""
+    uri, sign, text = option.rpartition("=")
+    if not sign or not uri.strip():
+        raise UserError(f"--stand-in: expected URI=SHAPE, such as model://barrel=cylinder:0.3,1.0; found '{option}'")
+    parse_stand_in(text.strip(), "--stand-in")
+    return uri.strip(), text.strip()
+
+
+def parse_stand_in(text: str, where: str) -> StandIn:
+    """The stand-in written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError, which `where` begins.
+
+    It stands on the origin of the frame of what it replaces, as the meshes of most props do; `@x,y,z` puts its centre elsewhere.
+    """
+    if text in SIBLINGS:
+        return StandIn(None, (0.0, 0.0, 0.0), text)
+    kind, _, rest = text.partition(":")
+    words, at, center = rest.partition("@")
+    if kind not in SIZES:
+        raise UserError(f"{where}: '{text[:60]}' is no stand-in; use {HOW}")
+    sizes = _numbers(words, SIZES[kind], f"{where}: {kind}")
+    if min(sizes) <= 0:
+        raise UserError(f"{where}: {kind}: sizes must be above zero, found '{words[:60]}'")
+    shape = _shape(kind, sizes)
+    middle = _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, _height(shape) / 2)
+    return StandIn(shape, middle)  # type: ignore[arg-type]
+
+
+def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != names.count(",") + 1 or not all(map(math.isfinite, values)) or max(map(abs, values)) > LARGEST:
+        raise UserError(f"{where}: expected {names} in m, found '{text[:60]}'")
+    return values
+
+
+def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
+    match kind:
+        case "box":
+            return Box(sizes)  # type: ignore[arg-type]
+        case "cylinder":
+            return Cylinder(*sizes)
+        case "sphere":
+            return Sphere(*sizes)
+        case "capsule":
+            return Capsule(*sizes)
+    return Ellipsoid(tuple(size / 2 for size in sizes))  # type: ignore[arg-type]
+
+
+def _height(shape: Shape) -> float:
+    match shape:
+        case Box(size):
+            return size[2]
+        case Cylinder(_, length):
+            return length
+        case Sphere(radius):
+            return 2 * radius
+        case Capsule(radius, length):
+            return length + 2 * radius
+        case Ellipsoid(radii):
+            return 2 * radii[2]
+    raise TypeError(type(shape).__name__)
+
+
+def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
+    """The longest of the URIs given that is `uri` or a folder above it."""
+    found = [key for key in stand_ins if uri == key or uri.startswith(key.rstrip("/") + "/")]
+    return max(found, key=len, default=None)

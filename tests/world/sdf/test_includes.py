@@ -1,0 +1,178 @@
+"""Included models, nested models, and names."""
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.world.model import Cylinder
+from ddenv.world.read import parse_world, unique_names
+from ddenv.world.scenario import Reading
+from ddenv.world.sdf.resources import Stored
+from tests.world.sdf.conftest import BOX, world_text
+
+TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"
+TABLE = f"<sdf version='1.7'><model name='table'>{TOP}</model></sdf>"
+
+
+@pytest.fixture
+def table(tmp_path):
+    """A folder of models, as Gazebo has them."""
+    folder = tmp_path / "models" / "table"
+    folder.mkdir(parents=True)
+    (folder / "model.sdf").write_text(TABLE)
+    (folder / "model.config").write_text("<model><sdf version='1.7'>model.sdf</sdf></model>")
+    return tmp_path / "models"
+
+
+def included(inside="", uri="model://table"):
+    return f"<include><uri>{uri}</uri>{inside}</include>"
+
+
+def test_a_model_is_found_in_the_model_path(read, table):
+    world = read(
+        included() + included("<name>desk</name><pose>1 2 3 0 0 0</pose><static>0</static>"), model_path=(table,)
+    )
+    first, second = world.models
+    assert (first.name, first.pose.position, first.static) == ("table", (0, 0, 5), True)
+    assert (second.name, second.pose.position, second.static) == ("desk", (1, 2, 3), False)
+    assert second.links[0].inertia is not None
+
+
+@pytest.mark.parametrize("variable", ["GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH"])
+def test_gazebos_variables_are_known(read, table, monkeypatch, variable):
+    monkeypatch.setenv(variable, f"/nowhere:{table}")
+    assert read(included()).models[0].name == "table"
+
+
+def test_the_place_of_an_include_can_be_that_of_a_frame_inside(read, table):
+    text = TABLE.replace("<link", "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame><link")
+    (table / "table" / "model.sdf").write_text(text)
+    world = read(included("<placement_frame>foot</placement_frame><pose>1 0 0 0 0 0</pose>"), model_path=(table,))
+    assert world.models[0].pose.position == (1, 0, 1)
+
+
+def test_an_included_model_goes_with_its_include(read, table):
+    text = world_text(included() + "<model name='m'><link name='l'/></model>")
+    world = read(included() + "<model name='m'><link name='l'/></model>", model_path=(table,))
+    start, end = world.model("table").spans[0]
+    assert text[start:end].decode() == included()
+
+
+def test_what_was_included_can_be_read_again_without_the_files(read, table, tmp_path):
+    text = world_text(included())
+    world = read(included(), model_path=(table,))
+    (table / "table" / "model.sdf").unlink()
+    again = parse_world(text, tmp_path / "here.sdf", Reading(model_path=(table,)), Stored(world.resources))
+    assert again.models == world.models
+
+
+def test_models_in_models_become_one(read, table):
+    inner = f"<model name='in'><pose>0 0 1 0 0 0</pose><link name='l'>{BOX}</link></model>"
+    world = read(
+        f"<model name='m'><static>1</static><pose>1 0 0 0 0 0</pose>{inner}{included('<name>t</name>')}</model>",
+        model_path=(table,),
+    )
+    links = {link.name: link.pose.position for link in world.models[0].links}
+    assert links == {"in::l": (1, 0, 1), "t::top": (1, 0, 5)}
+
+
+def test_a_static_model_in_one_that_moves_hangs_on_the_world(read):
+    inner = f"<model name='in'><static>1</static><link name='l'>{BOX}</link></model>"
+    (joint,) = read(f"<model name='m'><link name='a'/>{inner}</model>").models[0].joints
+    assert (joint.kind, joint.parent, joint.child) == ("fixed", "world", "in::l")
+
+
+def test_a_model_that_is_nowhere_is_refused_with_the_remedies(read):
+    with pytest.raises(UserError, match="/world/include: 'model://table' was not found") as caught:
+        read(included())
+    assert all(
+        word in str(caught.value) for word in ("--model-path", "--stand-in 'model://table=box", "--ignore include")
+    )
+
+
+def test_a_stand_in_for_a_whole_model(read):
+    text = included("<name>desk</name><pose>1 0 0 0 0 0</pose>")
+    world = read(text, stand_ins={"model://table": "cylinder:0.5,2"})
+    (desk,) = world.models
+    assert (desk.name, desk.static) == ("desk", True)
+    assert desk.collisions[0].shape == Cylinder(0.5, 2)
+    assert desk.collisions[0].pose.position == (1, 0, 1)
+    assert "stand-in cylinder:0.5,2" in world.notes[0].why
+    assert read(included(), ignore=("include",)).models == ()
+
+
+def test_files_that_include_each_other_are_refused(read, table):
+    (table / "a.sdf").write_text(f"<sdf version='1.9'><model name='a'>{included(uri='b.sdf')}</model></sdf>")
+    (table / "b.sdf").write_text(f"<sdf version='1.9'><model name='b'>{included(uri='a.sdf')}</model></sdf>")
+    with pytest.raises(UserError, match=r"b\.sdf:1: /sdf/model.*circle: a\.sdf includes b\.sdf includes a\.sdf"):
+        read(included(uri="models/a.sdf"))
+
+
+def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
+    (table / "table" / "model.sdf").write_text(TABLE.replace("0 0 5", "0 0 nan"))
+    with pytest.raises(UserError, match=r"table/model\.sdf:1: /sdf/model\[@name='table'\]/pose: expected 6 finite"):
+        read(included(), model_path=(table,))
+
+
+WRONG = {
+    "no uri": ("<include/>", "include: has no <uri>"),
+    "climbing out": (included(uri="model://../../secret"), "climbs out"),
+    "hidden climbing": (included(uri="model://%2e%2e/%2e%2e/secret"), "climbs out"),
+    "merge": ("<include merge='true'><uri>model://table</uri></include>", "merge='true' is not supported"),
+    "world in a world": (included(uri="models/world.sdf"), "holds no <model>"),
+}
+
+
+@pytest.mark.parametrize(("inside", "words"), WRONG.values(), ids=WRONG.keys())
+def test_includes_that_cannot_be(read, table, inside, words):
+    (table / "world.sdf").write_bytes(world_text(""))
+    with pytest.raises(UserError, match=words) as caught:
+        read(inside, model_path=(table,))
+    assert "here.sdf:1: /sdf/world/include" in str(caught.value)
+
+
+def test_lights_and_actors_are_passed_over(read, table):
+    (table / "sun.sdf").write_text("<sdf version='1.7'><light name='sun' type='directional'/></sdf>")
+    world = read(included(uri="models/sun.sdf") + "<light name='l'/><actor name='walker'/>")
+    assert world.models == ()
+    assert sorted(note.what for note in world.notes) == ["<actor>", "<include>"]
+
+
+def test_models_of_one_name_are_told_apart_by_their_place(read):
+    one = "<model name='box'><link name='l'/></model>"
+    world = read(one + "<model name='box #2'><link name='l'/></model>" + one + one)
+    assert [model.name for model in world.models] == ["box", "box #2", "box #3", "box #4"]
+    assert all("stands 3 times" in note.why for note in world.notes if "name" in note.why)
+
+
+def test_unique_names_are_made_quickly():
+    assert unique_names(["a"] * 3 + ["b"]) == ["a", "a #2", "a #3", "b"]
+    assert len(set(unique_names(["a"] * 20_000))) == 20_000
+
+
+def test_words_that_are_not_known_are_noted(read):
+    world = read("<model name='m'><link name='l'><colision name='c'/></link></model>")
+    (note,) = (note for note in world.notes if note.kind == "ignored")
+    assert note.what == "<colision>"
+    assert "no element of SDF" in note.why
+
+
+def test_plugins_and_sensors_are_noted(read):
+    world = read(
+        "<plugin name='p' filename='f'/><model name='m'><static>1</static><link name='l'><sensor name='s'/></link></model>"
+    )
+    assert {note.what for note in world.notes} == {"<plugin>", "<sensor>"}
+
+
+def test_a_ground_that_could_move_does_not(read):
+    plane = "<collision name='c'><geometry><plane/></geometry></collision>"
+    world = read(f"<model name='g'><link name='l'>{plane}</link></model>")
+    assert world.models[0].static
+    assert world.elements() == ()
+
+
+def test_gravity_of_old_and_new_files(read):
+    assert read("").gravity == (0, 0, -9.8)
+    assert read("<gravity>0 0 -1.6</gravity>").gravity == (0, 0, -1.6)
+    assert read("<physics type='ode'><gravity>0 0 -3.7</gravity></physics>", "1.4").gravity == (0, 0, -3.7)
+    light = read("<model name='m'><link name='l'><gravity>0</gravity></link></model>").models[0]
+    assert not light.gravity

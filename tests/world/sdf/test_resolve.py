@@ -1,0 +1,250 @@
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddenv.world.sdf.files import Missing, Unusable, read
+from ddenv.world.sdf.resolve import ENVIRONMENT, find, model_file, search_folders
+
+
+@pytest.fixture(autouse=True)
+def _no_environment(monkeypatch, tmp_path):
+    for variable in (*ENVIRONMENT, "GZ_FUEL_CACHE_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+
+
+@pytest.fixture
+def models(tmp_path) -> Path:
+    folder = tmp_path / "models"
+    put(folder / "box" / "model.sdf")
+    put(folder / "box" / "meshes" / "a b.dae")
+    put(folder / "Oak tree" / "model.sdf")
+    put(folder / "media" / "m.dae")
+    put(tmp_path / "secret.dae")
+    return folder
+
+
+def put(path: Path, text: str = "x") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def test_folders_in_order_without_doubles(tmp_path, monkeypatch):
+    folders = {name: tmp_path / name for name in ("own", "gz", "classic", "sdf", "world", "home/models")}
+    for folder in folders.values():
+        folder.mkdir(parents=True)
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", f"{folders['gz']}{os.pathsep}{os.pathsep}{tmp_path / 'gone'}")
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"~/models{os.pathsep}{folders['classic']}/{os.pathsep}~nobody/x")
+    monkeypatch.setenv("SDF_PATH", f"{folders['sdf']}{os.pathsep}{folders['gz']}/../gz")
+    found = search_folders([folders["own"], tmp_path / "none"], folders["world"])
+    assert found == tuple(folders[name] for name in ("own", "gz", "home/models", "classic", "sdf", "world"))
+
+
+@pytest.mark.parametrize(
+    ("uri", "expected"),
+    [
+        ("model://box", "models/box"),
+        ("model://box/", "models/box"),
+        ("  model://box/model.sdf\n", "models/box/model.sdf"),
+        ("MODEL:///box", "models/box"),
+        ("model://box/meshes/a%20b.dae", "models/box/meshes/a b.dae"),
+        ("model://box/meshes/../model.sdf", "models/box/model.sdf"),
+        ("package://box/meshes/a b.dae", "models/box/meshes/a b.dae"),
+        ("model://models/box", "models/box"),
+        ("meshes/a b.dae", "models/box/meshes/a b.dae"),
+        ("./meshes/a%20b.dae", "models/box/meshes/a b.dae"),
+        ("../media/m.dae", "models/media/m.dae"),
+        ("file://media/m.dae", "models/media/m.dae"),
+        ("media/m.dae", "models/media/m.dae"),
+        ("box", "models/box"),
+    ],
+)
+def test_found(models, tmp_path, uri, expected):
+    assert find(uri, models / "box", (models,)) == tmp_path / expected
+
+
+def test_absolute(models):
+    path = models / "box" / "meshes" / "a b.dae"
+    assert find(f"file://{str(path).replace(' ', '%20')}", models, ()) == path
+    assert find(f"{models}/box/../box/meshes/a b.dae", models, ()) == path
+
+
+def test_first_folder_wins(models, tmp_path):
+    other = put(tmp_path / "other" / "box" / "model.sdf").parent.parent
+    assert find("model://box/model.sdf", tmp_path, (other, models)) == other / "box" / "model.sdf"
+    assert find("model://box/meshes", tmp_path, (other, models)) == models / "box" / "meshes"
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "model://../secret.dae",
+        "model://box/../../secret.dae",
+        "model://%2e%2e/secret.dae",
+        "model://box/%2E%2E%2f..%2fsecret.dae",
+        "package://box/../../secret.dae",
+        "../../secret.dae",
+        "file://../../secret.dae",
+        "meshes/../../../secret.dae",
+        "https://fuel.gazebosim.org/1.0/o/models/box/1/files/../../../../../../secret.dae",
+        "https://fuel.gazebosim.org/1.0/../models/box",
+        "https://fuel.gazebosim.org/1.0/o/models/%2e%2e/box",
+    ],
+)
+def test_climbing_is_refused(models, uri):
+    with pytest.raises(Unusable, match=r"climbs out of its folder through '\.\.'"):
+        find(uri, models / "box", (models,))
+
+
+@pytest.mark.parametrize(
+    ("uri", "reason"),
+    [
+        ("", "names no file"),
+        ("   ", "names no file"),
+        ("model://", "names no file"),
+        ("model:///", "names no file"),
+        ("model://.", "names no file"),
+        ("file://", "names no file"),
+        ("model://box%00.dae", "NUL byte"),
+        ("a\0b", "NUL byte"),
+        ("ftp://host/box.dae", "scheme 'ftp:' is not supported"),
+        ("data:model/obj;base64,AAAA", "scheme 'data:' is not supported"),
+        ("model://" + "x" * 5000, "cannot be read: File name too long"),
+        ("x" * 300, "File name too long"),
+        ("model://\ud800", "cannot be the name of a file"),
+    ],
+)
+def test_unusable(models, uri, reason):
+    with pytest.raises(Unusable, match=reason) as caught:
+        find(uri, models, (models,))
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("uri", "reason"),
+    [
+        ("model://none", r"not in the model path \(1 folder\)"),
+        ("none.dae", "neither beside the file"),
+        ("/none/x.dae", "there is no such file"),
+        ("model://box/model.sdf/x", "not in the model path"),
+        ("https://example.org/box.dae", "is not downloaded"),
+        ("https://fuel.gazebosim.org/1.0/o/worlds/box", "is not downloaded"),
+        ("https://fuel.gazebosim.org/1.0/o/models/none", "Fuel cache"),
+    ],
+)
+def test_missing(models, uri, reason):
+    with pytest.raises(Missing, match=reason):
+        find(uri, models, (models,))
+
+
+def test_fuel_cache(tmp_path, monkeypatch):
+    cache = tmp_path / "home" / ".gz" / "fuel" / "fuel.gazebosim.org" / "openrobotics" / "models" / "oak tree"
+    for version in ("2", "9", "10", "tip"):
+        put(cache / version / "meshes" / "oak.dae")
+    start = "https://fuel.gazebosim.org/1.0/OpenRobotics/models/Oak%20tree"
+    assert find(start, tmp_path, ()) == cache / "10"
+    assert find(f"{start}/tip", tmp_path, ()) == cache / "10"
+    assert find(f"{start}/2", tmp_path, ()) == cache / "2"
+    assert find(f"{start}/2/files/meshes/oak.dae", tmp_path, ()) == cache / "2" / "meshes" / "oak.dae"
+    assert find(f"{start}/files/meshes/oak.dae", tmp_path, ()) == cache / "10" / "meshes" / "oak.dae"
+    old = start.replace("gazebosim", "ignitionrobotics")
+    assert find(f"{old}/9", tmp_path, ()) == cache / "9"
+    with pytest.raises(Missing):
+        find(f"{start}/3", tmp_path, ())
+    monkeypatch.setenv("GZ_FUEL_CACHE_PATH", str(tmp_path / "elsewhere"))
+    with pytest.raises(Missing):
+        find(start, tmp_path, ())
+
+
+@pytest.mark.parametrize("name", ["Oak tree", "Oak%20tree", "oak_tree", "OAK TREE"])
+def test_fuel_model_in_the_model_path(models, name):
+    uri = f"https://fuel.ignitionrobotics.org/1.0/o/models/{name}/3/files/model.sdf"
+    assert find(uri, models, (models,)) == models / "Oak tree" / "model.sdf"
+
+
+def test_folder_that_cannot_be_looked_at(models, tmp_path):
+    class Locked(type(tmp_path)):
+        def stat(self, **options):
+            raise PermissionError(13, "Permission denied", str(self))
+
+    assert find("model://box", tmp_path, (Locked(tmp_path), models)) == models / "box"
+    with pytest.raises(Unusable, match="cannot be read: Permission denied"):
+        find("model://none", tmp_path, (Locked(tmp_path), models))
+
+
+def config(folder: Path, *entries: str) -> Path:
+    put(folder / "model.config", f"<model><name>x</name>{''.join(entries)}</model>")
+    return folder
+
+
+def test_model_file(tmp_path):
+    for name in ("model.sdf", "old.sdf", "new.sdf", "future.sdf"):
+        put(tmp_path / name)
+    assert model_file(tmp_path).name == "model.sdf"
+    config(tmp_path, "<sdf version='1.4'>old.sdf</sdf>", "<sdf version='1.12'>new.sdf</sdf>", "<sdf>model.sdf</sdf>")
+    assert model_file(tmp_path).name == "new.sdf"
+    config(tmp_path, "<sdf version='1.9'> old.sdf </sdf>", "<sdf version='1.13'>future.sdf</sdf>")
+    assert model_file(tmp_path).name == "old.sdf"
+    config(tmp_path, "<sdf version='2.0'>future.sdf</sdf>", "<sdf version='1.5'/>")
+    assert model_file(tmp_path).name == "model.sdf"
+    config(tmp_path, "<sdf version='one'>old.sdf</sdf>")
+    assert model_file(tmp_path).name == "old.sdf"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<model",
+        "",
+        "<!DOCTYPE x [<!ENTITY a 'b'>]><model>&a;</model>",
+        "<model><sdf version='1.6'>../../secret.sdf</sdf></model>",
+        "<?xml version='1.0' encoding='nonsense'?><model/>",
+    ],
+)
+def test_bad_model_config(tmp_path, text):
+    put(tmp_path / "model.sdf")
+    put(tmp_path / "model.config", text)
+    with pytest.raises(Unusable, match=r"model\.config"):
+        model_file(tmp_path)
+
+
+def test_model_folder_without_file(tmp_path):
+    with pytest.raises(Missing, match="neither"):
+        model_file(tmp_path)
+    with pytest.raises(Missing, match="which is not there"):
+        model_file(config(tmp_path, "<sdf version='1.6'>gone.sdf</sdf>"))
+
+
+def test_read_refuses_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for name, reason in (("", "is a folder"), ("pipe", "not a plain file"), ("none", "No such file")):
+        with pytest.raises(Unusable, match=reason):
+            read(tmp_path / name, 10)
+    with pytest.raises(Unusable, match="the limit is"):
+        read(put(tmp_path / "big", "x" * 11), 10)
+    assert read(put(tmp_path / "fits", "x" * 10), 10) == b"x" * 10
+
+
+WORDS = st.sampled_from(
+    ["..", ".", "box", "%2e%2e", "%2f", "/", "//", "model:", "file:", "https:", "~", "\0", "a b", "\ud800"]
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(words=st.lists(WORDS | st.text(max_size=4), max_size=6))
+def test_any_uri_stays_inside_or_is_refused(tmp_path_factory, words):
+    folder = tmp_path_factory.getbasetemp() / "inside"
+    put(folder / "box" / "box")
+    uri = "/".join(words)
+    try:
+        path = find(uri, folder / "box", (folder,))
+    except (Missing, Unusable) as error:
+        assert "\n" not in str(error)
+    else:
+        is_absolute = uri.strip().replace("file:", "", 1).startswith(("/", "%2f"))
+        assert path.is_relative_to(folder) or is_absolute

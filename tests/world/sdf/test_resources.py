@@ -1,0 +1,153 @@
+import json
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+from ddenv.world.sdf import resources
+from ddenv.world.sdf.meshes import pack
+from ddenv.world.sdf.resources import Disk, Missing, Stored, Unusable
+
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
+    + ["o cube", "f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
+
+
+@pytest.fixture
+def world(tmp_path, monkeypatch):
+    for variable in ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    folder = tmp_path / "world"
+    (folder / "box").mkdir(parents=True)
+    (folder / "cube.obj").write_text(CUBE)
+    (folder / "bad.obj").write_text("f 1 2 3")
+    (folder / "box" / "box.sdf").write_text("<sdf version='1.6'/>")
+    (folder / "box" / "model.config").write_text("<model><sdf version='1.6'>box.sdf</sdf></model>")
+    return folder
+
+
+def test_stored_gives_the_same_without_the_files(world):
+    disk = Disk(world)
+    ways = [
+        {"convex": convex, "center": center, "submesh": name}
+        for convex in (False, True)
+        for center in (False, True)
+        for name in ("", "cube")
+    ]
+    given = [disk.mesh("cube.obj", world, **way) for way in ways]
+    text = disk.sdf("model://box", world)
+    assert text == (world / "box" / "box.sdf", b"<sdf version='1.6'/>")
+    assert disk.sdf("box/box.sdf", world)[1] == text[1]
+    shutil.rmtree(world)
+    stored = Stored(dict(disk.taken))
+    assert stored.sdf("model://box", world) == text
+    for way, mesh in zip(ways, given, strict=True):
+        again = stored.mesh("cube.obj", world, **way)
+        assert again == mesh
+        assert again.vertices.tobytes() == mesh.vertices.tobytes()
+        assert again.faces.tobytes() == mesh.faces.tobytes()
+        assert (again.vertices.dtype, again.faces.dtype) == (np.float64, np.uint32)
+        assert not again.vertices.flags.writeable and not again.faces.flags.writeable
+    assert len({mesh.origin for mesh in given}) == len(ways)
+
+
+def test_stored_touches_neither_disk_nor_readers(world, monkeypatch):
+    disk = Disk(world)
+    disk.mesh("cube.obj", world, convex=True)
+    disk.sdf("model://box", world)
+
+    def forbidden(*arguments, **options):
+        raise AssertionError("reads a file")
+
+    for name in ("find", "read", "read_parts", "build", "size_of", "is_folder", "model_file"):
+        monkeypatch.setattr(resources, name, forbidden)
+    monkeypatch.setattr("os.stat", forbidden)
+    monkeypatch.setattr("builtins.open", forbidden)
+    stored = Stored(disk.taken)
+    stored.mesh("cube.obj", world, convex=True)
+    stored.sdf("model://box", world)
+    for ask in (lambda: stored.sdf("model://none", world), lambda: stored.mesh("cube.obj", world, convex=False)):
+        with pytest.raises(Missing):
+            ask()
+
+
+def test_same_request_is_cheap_and_gives_the_same_object(world):
+    disk = Disk(world)
+    disk.mesh("cube.obj", world, convex=True)
+    for source in (disk, Stored(disk.taken)):
+        first = source.mesh("cube.obj", world, convex=True)
+        start = time.perf_counter()
+        assert all(source.mesh("cube.obj", world, convex=True) is first for _ in range(5000))
+        assert time.perf_counter() - start < 5000 * 50e-6
+
+
+def test_refusals_are_kept_but_not_taken(world, monkeypatch):
+    disk = Disk(world)
+    asks = {
+        "bad": (lambda: disk.mesh("bad.obj", world, convex=True), Unusable),
+        "none": (lambda: disk.sdf("model://none", world), Missing),
+        "folder": (lambda: disk.mesh("model://box", world, convex=True), Unusable),
+    }
+    for ask, kind in asks.values():
+        with pytest.raises(kind):
+            ask()
+    monkeypatch.setattr(resources, "find", None)
+    for ask, kind in asks.values():
+        with pytest.raises(kind):
+            ask()
+    assert disk.taken == {}
+
+
+def test_limits(world, monkeypatch):
+    monkeypatch.setattr(resources, "SDF_LIMIT", 3)
+    with pytest.raises(Unusable, match="the limit is"):
+        Disk(world).sdf("model://box", world)
+
+
+def test_tells_before_something_slow(world):
+    told = []
+    (world / "big.obj").write_text(CUBE + "\n#" + "x" * 2_500_000)
+    disk = Disk(world, tell=told.append)
+    disk.mesh("cube.obj", world, convex=True)
+    disk.mesh("big.obj", world, convex=True)
+    disk.mesh("big.obj", world, convex=False)
+    assert told == ["reading mesh big.obj (3 MB)"]
+
+
+def damaged(packed: bytes):
+    triangle = pack(np.eye(3), np.array([[0, 1, 2]]))
+    yield b""
+    yield packed[:10]
+    yield packed[:-1]
+    yield packed + b"\0"
+    yield b"x" + packed[1:]
+    yield packed[:8] + b"\x10" + packed[9:]
+    yield packed[:8] + b"\0" * 4 + packed[12:]
+    yield packed[:12] + b"\xff" * 8 + packed[20:]
+    yield pack(np.full((3, 3), np.nan), np.array([[0, 1, 2]]))
+    yield pack(np.eye(3) * 1e9, np.array([[0, 1, 2]]))
+    yield pack(np.eye(3), np.zeros((0, 3)))
+    yield triangle[:-4] + b"\x03\0\0\0"
+
+
+def test_damaged_bytes(world):
+    disk = Disk(world)
+    disk.mesh("cube.obj", world, convex=True)
+    disk.sdf("model://box", world)
+    keys = {json.loads(key)[0]: key for key in disk.taken}
+    for bad in damaged(disk.taken[keys["mesh"]]):
+        with pytest.raises(Unusable, match="damaged"):
+            Stored({keys["mesh"]: bad}).mesh("cube.obj", world, convex=True)
+    for bad in (b"", b"no end", b"\0<sdf/>"):
+        with pytest.raises(Unusable, match="damaged"):
+            Stored({keys["sdf"]: bad}).sdf("model://box", world)
+
+
+def test_files_of_one_name_are_told_apart_by_content(world):
+    disk = Disk(world)
+    first = disk.mesh("cube.obj", world, convex=True)
+    (world / "box" / "cube.obj").write_text(CUBE.replace("2", "3"))
+    other = disk.mesh("cube.obj", world / "box", convex=True)
+    assert first != other

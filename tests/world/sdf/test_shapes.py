@@ -1,0 +1,192 @@
+"""Shapes, friction and colours."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from ddenv.errors import UserError
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sphere
+from ddenv.world.pose import Pose
+
+
+def model(geometry, more="", tag="collision"):
+    inside = f"<{tag} name='c'><geometry>{geometry}</geometry>{more}</{tag}>"
+    return f"<model name='m'><static>1</static><link name='l'>{inside}</link></model>"
+
+
+def shape_of(world):
+    return world.models[0].collisions[0].shape
+
+
+SHAPES = {
+    "<box><size>1 2 3</size></box>": Box((1, 2, 3)),
+    "<cylinder><radius>1</radius><length>2</length></cylinder>": Cylinder(1, 2),
+    "<capsule><radius>1</radius><length>2</length></capsule>": Capsule(1, 2),
+    "<sphere><radius>1</radius></sphere>": Sphere(1),
+    "<ellipsoid><radii>1 2 3</radii></ellipsoid>": Ellipsoid((1, 2, 3)),
+    "<plane><size>5 6</size></plane>": Plane((5, 6)),
+}
+
+
+@pytest.mark.parametrize(("geometry", "shape"), SHAPES.items())
+def test_primitives(read, geometry, shape):
+    assert shape_of(read(model(geometry))) == shape
+
+
+@pytest.mark.parametrize("normal", ["0 0 2", "0 1 0", "1 -2 0.5", "0 0 -1"])
+def test_planes_are_turned_as_their_normal_says(read, normal):
+    plane = read(model(f"<plane><normal>{normal}</normal></plane>")).models[0].collisions[0]
+    wanted = np.array([float(word) for word in normal.split()])
+    assert plane.pose.rotate((0, 0, 1)) == pytest.approx(wanted / np.linalg.norm(wanted))
+
+
+def test_a_polyline_stands_on_its_frame_as_its_hull(read):
+    points = "".join(f"<point>{x} {y}</point>" for x, y in ((0, 0), (2, 0), (2, 1), (1, 0.2), (0, 1)))
+    world = read(model(f"<polyline><height>3</height>{points}</polyline>"))
+    shape = shape_of(world)
+    low, high = shape_bounds(shape, Pose())
+    assert (low.tolist(), high.tolist()) == ([0, 0, 0], [2, 1, 3])
+    solid = trimesh.Trimesh(shape.vertices, shape.faces)
+    assert solid.is_watertight and solid.volume == pytest.approx(6)
+    assert "not convex" in world.notes[0].why
+
+
+def test_meshes_are_convex_hulls_where_they_collide_and_themselves_where_they_are_seen(read, tmp_path):
+    angle = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    mesh = _extruded(angle, 1.0)
+    mesh.export(tmp_path / "angle.obj")
+    geometry = "<mesh><uri>angle.obj</uri><scale>1 1 -2</scale></mesh>"
+    link = "<{0} name='c'><geometry>" + geometry + "</geometry></{0}>"
+    both = f"<model name='m'><static>1</static><link name='l'>{link.format('collision')}{link.format('visual')}</link></model>"
+    found = read(both).models[0].links[0]
+    hull, seen = found.collisions[0].shape, found.visuals[0].shape
+    assert isinstance(hull, Mesh)
+    assert trimesh.Trimesh(hull.vertices, hull.faces).volume == pytest.approx(7)
+    assert trimesh.Trimesh(seen.vertices, seen.faces).volume == pytest.approx(6)
+    assert hull.vertices[:, 2].min() == pytest.approx(-2)
+
+
+def _extruded(outline, height):
+    """A prism over an L."""
+    count = len(outline)
+    low = np.column_stack([outline, np.zeros(count)])
+    walls = [[i, (i + 1) % count, (i + 1) % count + count] for i in range(count)]
+    walls += [[i, (i + 1) % count + count, i + count] for i in range(count)]
+    fan = [[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]]
+    faces = [*walls, *([a, c, b] for a, b, c in fan), *([a + count, b + count, c + count] for a, b, c in fan)]
+    return trimesh.Trimesh(np.vstack([low, low + np.array([0, 0, height])]), faces, process=False)
+
+
+def test_a_mesh_that_is_nowhere_is_not_drawn(read):
+    world = read(model("<mesh><uri>model://no/a.dae</uri></mesh>", tag="visual"))
+    assert world.models[0].links[0].visuals == ()
+    assert "'model://no/a.dae' is not drawn" in world.notes[0].why
+
+
+def test_a_collision_mesh_that_is_nowhere_is_refused_with_all_remedies(read):
+    with pytest.raises(UserError) as caught:
+        read(model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>"))
+    said = str(caught.value)
+    assert "/geometry/mesh: mesh 'model://barrel/meshes/a.dae'" in said
+    assert (
+        "--model-path" in said
+        and "--stand-in 'model://barrel=cylinder:radius,length'" in said
+        and "--ignore mesh" in said
+    )
+
+
+def test_a_stand_in_stands_on_the_frame_of_what_it_replaces(read):
+    barrel = model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>", "<pose>0 0 2 0 0 0</pose>")
+    world = read(barrel, stand_ins={"model://barrel": "cylinder:0.3,1.0"})
+    (collision,) = world.models[0].collisions
+    assert collision.shape == Cylinder(0.3, 1.0)
+    assert collision.pose.position == (0, 0, 2.5)
+    placed = read(barrel, stand_ins={"model://barrel/meshes": "box:1,2,3@1,0,0"}).models[0].collisions[0]
+    assert placed.pose.position == (1, 0, 2)
+
+
+@pytest.mark.parametrize("kind", ["visual", "collision"])
+def test_the_box_around_the_other_shapes_of_a_link_can_stand_in(read, kind):
+    pose = "<pose>0 0 1 0 0 0</pose>"
+    other = f"<{kind} name='o'>{pose}<geometry><cylinder><radius>0.5</radius><length>2</length></cylinder></geometry></{kind}>"
+    lost = f"<collision name='c'>{pose}<geometry><mesh><uri>a.dae</uri></mesh></geometry></collision>"
+    text = f"<model name='m'><static>1</static><link name='l'>{lost}{other}</link></model>"
+    with pytest.raises(UserError, match=f"'a.dae={kind}' for the box around its link's {kind} shapes"):
+        read(text)
+    found = read(text, stand_ins={"a.dae": kind}).models[0].collisions[0]
+    assert found.shape == Box((1, 1, 2))
+    assert found.pose.position == (0, 0, 1)
+
+
+def test_a_stand_in_that_nothing_asks_for_is_noted(read):
+    world = read(model("<box><size>1 1 1</size></box>"), stand_ins={"model://bariel": "sphere:1"})
+    assert "stand-in for 'model://bariel' was not needed" in world.notes[0].why
+
+
+@pytest.mark.parametrize("tag", ["heightmap", "image"])
+def test_grounds_that_cannot_be_simulated_are_refused_unless_ignored(read, tag):
+    text = model(f"<{tag}><uri>file://hills.png</uri></{tag}>")
+    with pytest.raises(UserError, match=rf"geometry/{tag}: a {tag} is not supported.*--ignore {tag}"):
+        read(text)
+    world = read(text, ignore=(tag,))
+    assert world.models[0].collisions == ()
+    assert world.notes[0].kind == "ignored"
+
+
+def test_the_smaller_friction_counts(read):
+    surface = "<surface><friction><ode><mu>0.3</mu><mu2>0.2</mu2></ode></friction></surface>"
+    world = read(model("<box><size>1 1 1</size></box>", surface))
+    assert world.models[0].collisions[0].mu == 0.2
+    assert "0.3 and 0.2" in world.notes[0].why
+    bullet = "<surface><friction><bullet><friction>0.4</friction></bullet></friction></surface>"
+    assert read(model("<box><size>1 1 1</size></box>", bullet)).models[0].collisions[0].mu == 0.4
+
+
+@pytest.mark.parametrize(
+    "contact", ["<collide_bitmask>0x00</collide_bitmask>", "<collide_without_contact>1</collide_without_contact>"]
+)
+def test_what_nothing_can_touch_is_left_out(read, contact):
+    world = read(model("<box><size>1 1 1</size></box>", f"<surface><contact>{contact}</contact></surface>"))
+    assert world.models[0].collisions == ()
+    assert world.notes[0].kind == "ignored"
+
+
+COLORS = {
+    "<material><diffuse>1 0 0 1</diffuse><ambient>0 1 0 1</ambient></material>": (1, 0, 0, 1),
+    "<material><ambient>0 1 0 0</ambient></material>": (0, 1, 0, 1),
+    "<material><diffuse>0 0 1</diffuse></material><transparency>0.75</transparency>": (0, 0, 1, 0.25),
+    "<material><script><name>Gazebo/Red</name></script></material>": (0.8, 0.1, 0.1, 1),
+    "<material><script><name>My/Own</name></script></material>": None,
+}
+
+
+@pytest.mark.parametrize(("material", "color"), COLORS.items())
+def test_visuals_keep_their_colours(read, material, color):
+    world = read(model("<box><size>1 1 1</size></box>", material, "visual"))
+    assert world.models[0].links[0].visuals[0].color == color
+
+
+WRONG = {
+    "zero": ("<box><size>1 0 1</size></box>", "size: sizes must be above zero"),
+    "negative": ("<cylinder><radius>-1</radius><length>1</length></cylinder>", "radius: sizes must be above zero"),
+    "no size": ("<sphere/>", "sphere: has no <radius>"),
+    "huge": ("<box><size>1e300 1 1</size></box>", "at most 1e"),
+    "nothing": ("", "has no <geometry>"),
+    "unknown": ("<torus><radius>1</radius></torus>", "<torus> is no shape that is known"),
+    "flat polyline": ("<polyline><point>0 0</point><point>1 1</point><height>1</height></polyline>", "three <point>s"),
+    "low polyline": (
+        "<polyline><point>0 0</point><point>1 1</point><point>1 0</point><height>0</height></polyline>",
+        "height",
+    ),
+    "no uri": ("<mesh/>", "mesh: has no <uri>"),
+    "climbing": ("<mesh><uri>../../etc/passwd</uri></mesh>", r"climbs out of its folder"),
+    "scale": ("<mesh><uri>a.obj</uri><scale>1 0 1</scale></mesh>", "scale must not be zero"),
+}
+
+
+@pytest.mark.parametrize(("geometry", "words"), WRONG.values(), ids=WRONG.keys())
+def test_shapes_that_cannot_be_are_refused_with_their_place(read, geometry, words):
+    with pytest.raises(UserError, match=words) as caught:
+        read(model(geometry))
+    assert "here.sdf:1: /sdf/world/model[@name='m']/link[@name='l']/collision[@name='c']" in str(caught.value)
