@@ -11,13 +11,14 @@ from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Iner
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
-from ddenv.world.sdf.xml import Element, floats, text_of
+from ddenv.world.sdf.xml import Element, complain, floats, number, text_of
 
 WATER = 1000.0  # kg/m^3, SDF's default for a link whose mass is to be computed
 DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
 # A link without shapes is taken as a ball of this radius, m.
 BARE = 0.05
 HEAVIEST = 1e9  # kg
+DENSEST = 1e6  # kg/m^3
 
 
 def read_inertia(
@@ -47,6 +48,14 @@ def read_inertia(
     said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 cannot be"
     context.note("replaced", element, f"{said}: worked out from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
+
+
+def read_density(parent: Element, default: float) -> float:
+    """The `<density>` in `parent`, kg/m^3. Raises UserError."""
+    density = number(parent, "density", default)
+    if not 0 < density <= DENSEST:
+        raise complain(parent.find("density"), f"a density must be above zero (kg/m^3), found {density:g}")
+    return density
 
 
 def _number(parent: Element, tag: str, default: float) -> float:

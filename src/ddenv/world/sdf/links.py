@@ -13,10 +13,10 @@ from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.geometry import ONE, Lost, Placed, read_shape, remedies
-from ddenv.world.sdf.inertia import WATER, read_inertia
+from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
 from ddenv.world.sdf.surface import can_be_touched, read_color, read_friction
 from ddenv.world.sdf.unread import note_unread
-from ddenv.world.sdf.xml import Element, complain, name_of, number, truth
+from ddenv.world.sdf.xml import Element, complain, name_of, truth
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
                 pose = site.pose @ item.pose @ placed.offset
                 mu = read_friction(item.element, context)
                 collisions.append(Collision(name_of(item.element), placed.shape, pose, mu))
-                density.append(number(item.element, "density", _density(element)))
+                density.append(read_density(item.element, _density(element)))
     inertia = read_inertia(element, site.pose, collisions, density, context) if site.moving else None
     if site.moving and truth(element, "kinematic", False):
         context.note("ignored", element.find("kinematic"), "it moves by itself, as any other link")
@@ -71,8 +71,7 @@ def _item(child: Element, scope: Scope, site: Site, context: Context) -> _Item:
 
 def _density(link: Element) -> float:
     inertial = link.find("inertial")
-    density = WATER if inertial is None else number(inertial, "density", WATER)
-    return density if density > 0 else WATER
+    return WATER if inertial is None else read_density(inertial, WATER)
 
 
 def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None:
