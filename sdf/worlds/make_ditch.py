@@ -23,6 +23,8 @@ BLOCK_HEIGHTS = (0.025, 0.038, 0.05)  # m
 HIGH_BLOCK_HEIGHTS = (0.05, 0.06, 0.07)  # m
 SETBACK = 0.1  # m between the edge tile and the gap
 
+MU = 1.2  # rubber on dry asphalt and wood
+
 ASPHALT = "0.22 0.22 0.24 1"
 PLYWOOD = "0.62 0.47 0.29 1"
 PINE = "0.80 0.66 0.43 1"
@@ -53,10 +55,11 @@ def numbers(values) -> str:
 
 def box(name: str, position, size, color: str) -> str:
     """A collision and a visual of the same box."""
+    friction = f"<surface><friction><ode><mu>{MU}</mu><mu2>{MU}</mu2></ode></friction></surface>"
     shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry><box><size>{numbers(size)}</size></box></geometry>"
     material = f"<material><ambient>{color}</ambient><diffuse>{color}</diffuse></material>"
     return (
-        f'        <collision name="{name}">{shape}</collision>\n'
+        f'        <collision name="{name}">{shape}{friction}</collision>\n'
         f'        <visual name="{name}">{shape}{material}</visual>\n'
     )
 
