@@ -117,7 +117,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         version=root.get("version") or "",
         notes=tuple(context.notes),
         anchors=frozenset(model.name for model in models if model.name in anchors),
-        resources=getattr(context.resources, "taken", {}),
+        resources=context.resources.taken,
     )
 
 

@@ -26,7 +26,10 @@ class Resources(Protocol):
     """Answers for URIs in SDF files. `base` is the folder of the file that names the URI.
 
     Both raise Missing if there is no such file, and Unusable if it is there and cannot be used. Equal requests get the same object.
+    `taken` holds what was given so far, or more, by request.
     """
+
+    taken: Mapping[str, bytes]
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         """Path and content of an SDF file, given by its own URI or by that of its model's folder."""
@@ -89,7 +92,7 @@ class Stored:
     """Gives again what a `Disk` has taken, and looks at no disk. What it did not take is Missing; damaged bytes are Unusable."""
 
     def __init__(self, taken: Mapping[str, bytes]) -> None:
-        self._taken = taken
+        self.taken = taken
         self._answers: dict[tuple, object] = {}
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
@@ -102,7 +105,7 @@ class Stored:
 
     def _bytes(self, request: tuple) -> bytes:
         try:
-            return self._taken[_key(request)]
+            return self.taken[_key(request)]
         except KeyError:
             raise Missing("was not found when the world was read") from None
 
