@@ -1,6 +1,6 @@
 """How long it takes to read worlds, and how much memory, beside parsing the same XML with the standard library alone.
 
-    python benchmarks/reading.py
+python benchmarks/reading.py
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ def main() -> None:
             # A process of its own, so that its memory is that of this world alone.
             done = subprocess.run([sys.executable, __file__, path], capture_output=True, text=True, check=True)
             models, shapes, read, alone, memory = done.stdout.split()
-            ratio = float(read) / float(alone)
-            print(f"| {path.stem} | {models} | {shapes} | {float(read):.2f} | {float(alone):.2f} | {ratio:.1f} | {float(memory):.0f} |")
+            times = f"{float(read):.2f} | {float(alone):.2f} | {float(read) / float(alone):.1f}"
+            print(f"| {path.stem} | {models} | {shapes} | {times} | {float(memory):.0f} |")
 
 
 if __name__ == "__main__":

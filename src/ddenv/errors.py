@@ -1,5 +1,7 @@
 """The one kind of error a user can cause."""
 
+LONGEST = 1500
+
 
 class UserError(Exception):
     """Wrong input, told in one line: what is wrong, where, and what to do.
@@ -8,7 +10,12 @@ class UserError(Exception):
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(printable(" ".join(message.split())))
+        super().__init__(shortened(printable(" ".join(message.split()))))
+
+
+def shortened(text: str) -> str:
+    """`text` with its middle left out where a name or a path in it is endless."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 300]} ... {text[-290:]}"
 
 
 def printable(text: str) -> str:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ddenv.robot.template import Template
 from ddenv.world.bundled import SCENARIOS, SDF
 from ddenv.world.load import load_scenario, validate
-from ddenv.world.model import Model, World
+from ddenv.world.model import Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
+from ddenv.world.pose import Pose, Vector
 from ddenv.world.read import parse_world, read_model, read_world
 from ddenv.world.scenario import Scenario
 
@@ -35,6 +38,41 @@ def box_model(name: str, pose: str, size: str, mass: float | None = None, mu: fl
         f"<size>{size}</size></box></geometry><surface><friction><ode><mu>{mu}</mu></ode></friction></surface></collision>"
         "</link></model>"
     )
+
+
+def link_of(name: str, shape: Shape | None, pose: Pose, mass: float | None = 1.0, mu: float = 1.0) -> Link:
+    """A link of one shape; its inertia is about that of a box of 0.4 m."""
+    moments = (0.03 * mass,) * 3 if mass else (0.0, 0.0, 0.0)
+    collisions = (Collision("c", shape, pose, mu),) if shape else ()
+    return Link(name, pose, Inertia(mass, pose, moments) if mass else None, collisions, ())
+
+
+def joint_of(
+    kind: str, parent: str, child: str, at: Vector, axis: Vector = (0.0, 0.0, 1.0), **changes: object
+) -> Joint:
+    """An unlimited joint `at` a place in the world, with changes to its fields."""
+    joint = Joint(f"{parent}_{child}", kind, parent, child, Pose(at), axis, -np.inf, np.inf, np.inf, np.inf, 0.0)
+    return replace(joint, **changes)
+
+
+def model_of(name: str, *links: Link, joints: tuple[Joint, ...] = (), **changes: object) -> Model:
+    """A model made of `links`, static if the first has no mass."""
+    static = links[0].inertia is None
+    return replace(Model(name, links[0].pose, static, links, joints, (), 1), **changes)
+
+
+def wedge(width: float, depth: float, height: float) -> Mesh:
+    """A ramp up along x, with its lowest corner in the origin's place and its back upright."""
+    x, y, z = depth / 2, width / 2, height / 2
+    vertices = [(-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (x, -y, z), (x, y, z)]
+    faces = [(0, 2, 1), (0, 3, 2), (1, 2, 5), (1, 5, 4), (0, 5, 3), (0, 4, 5), (0, 1, 4), (3, 5, 2)]
+    return Mesh("wedge", np.array(vertices), np.array(faces))
+
+
+@pytest.fixture(scope="session")
+def add() -> Callable[..., World]:
+    """A world with more models."""
+    return lambda world, *models: replace(world, models=world.models + models)
 
 
 @pytest.fixture(scope="session")

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ddenv.errors import UserError
 from ddenv.robot.template import Template, lowest
+from ddenv.world.model import Sphere
+from ddenv.world.pose import Pose
+from tests.robot.conftest import joint_of, link_of, model_of
 
 NOTHING = frozenset()
 
@@ -118,7 +123,22 @@ def test_other_seeds_give_other_noise(world_of, husky, scenario_of):
     assert not same(template.run(NOTHING, seed=1), template.run(NOTHING, seed=2))
 
 
-def test_a_world_drake_cannot_simulate_is_the_users(world_of, husky, scenario_of, box):
-    heavy = box("ghost", "2 2 0.5 0 0 0", "1 1 1", mass=1.0).replace("<inertial>", "<!--").replace("</inertial>", "-->")
+def test_a_world_drake_cannot_simulate_is_the_users(world_of, add, husky, scenario_of):
+    ghost = replace(model_of("ghost", link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)), mass=None)), static=False)
     with pytest.raises(UserError, match=r"ghost.*no <inertial>"):
-        Template(world_of(heavy), husky, scenario_of())
+        Template(add(world_of(), ghost), husky, scenario_of())
+
+
+def test_impossible_inertia_is_the_users(world_of, add, husky, scenario_of):
+    heavy = link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)))
+    heavy = replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0)))
+    with pytest.raises(UserError, match="cannot be simulated"):
+        Template(add(world_of(), model_of("heavy", heavy)), husky, scenario_of())
+
+
+def test_models_that_move_in_a_loop_are_the_users(world_of, add, husky, scenario_of):
+    links = [link_of(name, Sphere(0.1), Pose((float(x), 3.0, 1.0))) for x, name in enumerate("abc")]
+    pairs = (("a", "b"), ("b", "c"), ("a", "c"))
+    loop = model_of("loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs))
+    with pytest.raises(UserError, match="cannot be simulated"):
+        Template(add(world_of(), loop), husky, scenario_of())

@@ -9,11 +9,12 @@ import umsgpack
 from ddenv.runfile.fold import fold
 from ddenv.scene.draw import Scenery, outline, paint, path_on_ground, safe_name
 from ddenv.scene.follow import shot
-from ddenv.scene.mesh import box, merge
+from ddenv.scene.mesh import box, merge, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.stage import Stage
 from ddenv.scene.view import view
 from ddenv.world.bundled import SDF
+from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual
 from ddenv.world.pose import Pose
 from ddenv.world.read import read_model, read_world
 
@@ -54,8 +55,15 @@ def screen() -> Screen:
 
 
 def test_a_model_is_one_mesh(small_world):
-    assert [len(item.mesh.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
+    assert [len(item.surface.faces) for model in small_world.models[1:] for item in paint(model)] == [12] * 4
     assert len(paint(ROBOT)) == 1
+
+
+def test_a_link_without_visuals_shows_its_collisions():
+    cube, ball = Collision("c", Box((1, 1, 1)), Pose(), 1.0), Visual("v", Sphere(0.1), Pose(), (1, 0, 0, 1))
+    links = (Link("seen", Pose(), None, (cube,), (ball,)), Link("lost", Pose(), None, (cube,), ()))
+    (painted,) = paint(Model("m", Pose(), True, links, (), (), 1))
+    assert len(painted.surface.faces) == len(sphere(0.1).faces) + 12
 
 
 def test_the_ditch_is_few_and_small_messages(screen):
@@ -176,4 +184,4 @@ def test_the_camera_sees_the_robot_go_to_the_right():
 
 
 def test_all_meshes_of_the_robot_are_finite():
-    assert np.isfinite(merge([item.mesh for item in paint(ROBOT)]).vertices).all()
+    assert np.isfinite(merge([item.surface for item in paint(ROBOT)]).vertices).all()

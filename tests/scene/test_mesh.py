@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ddenv.scene import mesh
-from ddenv.world.model import Box, Cylinder, Plane, Sphere
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Sphere
 from ddenv.world.pose import Pose
 
 size = st.floats(0.01, 50.0)
@@ -19,13 +20,13 @@ angle = st.floats(-math.pi, math.pi)
 pose = st.builds(Pose.from_rpy, place, place, place, angle, angle, angle)
 
 
-def volume(shape: mesh.Mesh) -> float:
+def volume(shape: mesh.Surface) -> float:
     """By the divergence theorem: above zero only if the faces close up and face outwards."""
     a, b, c = np.moveaxis(shape.triangles - shape.vertices.mean(axis=0), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def area_vector(shape: mesh.Mesh) -> np.ndarray:
+def area_vector(shape: mesh.Surface) -> np.ndarray:
     """The sum of the faces' normals, times area: zero for a closed surface."""
     a, b, c = np.moveaxis(shape.triangles, 1, 0)
     return np.cross(b - a, c - a).sum(axis=0) / 2
@@ -68,6 +69,56 @@ def test_sphere_is_almost_round(radius, at):
     assert 0.95 < volume(shape) / (4 / 3 * math.pi * radius**3) < 1.0
     distances = np.linalg.norm(shape.vertices - at.position, axis=1)
     assert distances == pytest.approx(np.full(len(distances), radius), rel=1e-6)
+
+
+@given(st.tuples(size, size, size))
+def test_ellipsoid_is_almost_round(radii):
+    shape = mesh.of_shape(Ellipsoid(radii))
+    assert 0.95 < volume(shape) / (4 / 3 * math.pi * math.prod(radii)) < 1.0
+    assert np.linalg.norm(shape.vertices / radii, axis=1) == pytest.approx(np.ones(len(shape.vertices)), rel=1e-6)
+
+
+@given(size, size)
+def test_capsule_is_a_cylinder_between_two_halves_of_a_ball(radius, length):
+    shape = mesh.of_shape(Capsule(radius, length))
+    assert 0.95 < volume(shape) / (math.pi * radius**2 * (length + 4 / 3 * radius)) < 1.0
+    assert np.abs(shape.vertices).max(axis=0) == pytest.approx((radius, radius, length / 2 + radius), rel=1e-6)
+
+
+def as_mesh(surface: mesh.Surface) -> Mesh:
+    """With every place once, as the reader gives meshes."""
+    vertices, places = np.unique(np.round(surface.vertices, 9), axis=0, return_inverse=True)
+    return Mesh("m", vertices, places.reshape(-1)[surface.faces])
+
+
+def test_sharp_corners_of_a_mesh_are_not_shared():
+    cube = as_mesh(mesh.box((1, 2, 3)))
+    shape = mesh.of_shape(cube)
+    assert len(cube.vertices) == 8
+    assert np.allclose(shape.triangles, cube.vertices[cube.faces])
+    a, b, c = np.moveaxis(shape.triangles, 1, 0)
+    normals = np.cross(b - a, c - a)
+    for vertex in range(len(shape.vertices)):
+        around = normals[(shape.faces == vertex).any(axis=1)]
+        assert np.cross(around, around[0]) == pytest.approx(np.zeros((len(around), 3)))
+
+
+def test_round_meshes_keep_their_corners():
+    ball = as_mesh(mesh.sphere(1.0))
+    shape = mesh.of_shape(ball)
+    assert len(shape.vertices) == len(ball.vertices)
+    assert volume(shape) == pytest.approx(volume(mesh.sphere(1.0)))
+
+
+def test_the_largest_mesh_is_quick():
+    sheet = mesh.sphere(1.0, sides=224)
+    large = Mesh("m", sheet.vertices, sheet.faces)
+    assert len(large.faces) > 50_000
+    started = time.process_time()
+    shape = mesh.of_shape(large).at(Pose())
+    # 40 ms were measured; a busy machine shall not fail.
+    assert time.process_time() - started < 1.0
+    assert len(shape.faces) == len(large.faces)
 
 
 @given(st.lists(st.tuples(size, pose), min_size=1, max_size=5))

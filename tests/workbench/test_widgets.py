@@ -1,21 +1,24 @@
 """The panels' text, without an app."""
 
+from pathlib import Path
+
 import fake_run
 import numpy as np
 import pytest
 
+from ddenv.map.footprints import footprints
+from ddenv.map.paint import Canvas
+from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Point
-from ddenv.workbench.footprints import footprints
-from ddenv.workbench.paint import Canvas
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.processes import last_line
-from ddenv.workbench.raster import View, masks, owners
 from ddenv.workbench.recent import recent_runs
 from ddenv.workbench.widgets.candidates import _candidates
 from ddenv.workbench.widgets.chart import steps
 from ddenv.workbench.widgets.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.widgets.status import time_left
+from ddenv.workbench.widgets.strips import strip
 from ddenv.workbench.wording import duration, metres, percent, plain, shorten
 from ddenv.world.read import parse_world
 
@@ -48,7 +51,7 @@ def test_names_cannot_steer_the_terminal():
 
 def looks_of(run, candidate=None):
     state = fold(run.file.events())
-    prints = footprints(parse_world(run.world, "w.sdf"))
+    prints = footprints(parse_world(run.world, Path("w.sdf")))
     chosen = state.round.candidates[candidate] if candidate is not None else None
     how = looks(prints, kept(state, chosen), (0, 0, 0), (255, 255, 255))
     return {each.name: (kind, label) for each, kind, label in zip(prints, how.kinds, how.labels, strict=True)}
@@ -78,7 +81,7 @@ def test_a_large_element_is_a_floor(runs):
 
 def test_without_colours_the_cells_still_differ(run):
     state = fold(fake_run.mid_round(run).file.events())
-    prints = footprints(parse_world(run.world, "w.sdf"))
+    prints = footprints(parse_world(run.world, Path("w.sdf")))
     view = View(0, 0, 0.25, 64, 18)
     canvas = Canvas(view.rows, view.columns, (0, 0, 0))
     how = looks(prints, kept(state, state.round.candidates[1]), (0, 0, 0), (255, 255, 255))
@@ -93,13 +96,13 @@ def test_only_changed_rows_are_drawn_again():
     after.put((2, 3), "A")
     assert after.changed_rows(before) == [2]
     assert after.changed_rows(None) == [0, 1, 2, 3]
-    assert after.strip(2).text == "   A      "
+    assert strip(after, 2).text == "   A      "
 
 
 def test_text_ends_at_the_edge_of_the_map():
     canvas = Canvas(1, 4, (0, 0, 0))
     canvas.put((0, 3), "AB")
-    assert canvas.strip(0).text == "   A"
+    assert strip(canvas, 0).text == "   A"
 
 
 def test_steps_fall_with_the_environment():

@@ -38,7 +38,7 @@ LINK = "<link name='l'/>"
 ROWS: dict[str, list[str]] = {
     "an empty file, a folder": [""],
     "XML that is not well-formed": [sdf("<model>"), sdf("\x01")],
-    "XML entities": ["<!DOCTYPE a [<!ENTITY b 'c'>]>" + sdf("&b;")],
+    "a DOCTYPE, and": ["<!DOCTYPE a [<!ENTITY b 'c'>]>" + sdf("&b;")],
     "elements nested more than 100": [sdf("<a>" * 101 + "</a>" * 101)],
     "a root that is not `<sdf>`": ["<urdf/>", sdf("", "0.1"), "<sdf/>"],
     "no `<world>`": ["<sdf version='1.9'/>", "<sdf version='1.9'><world name='a'/><world name='b'/></sdf>"],
@@ -56,7 +56,7 @@ ROWS: dict[str, list[str]] = {
         model("<link name='l'><visual/></link>"),
         model("<link name='l'><collision/></link>"),
     ],
-    "two links of one name": [model(LINK * 2), model("")],
+    "two links or two": [model(LINK * 2), model(""), joints(joint(), joint()), model("<link name='world'/>")],
     "a pose that is not six": [
         model(f"<pose>1 2</pose>{LINK}"),
         model(f"<pose>nan 0 0 0 0 0</pose>{LINK}"),
@@ -96,7 +96,7 @@ ROWS: dict[str, list[str]] = {
     ],
     "a collision `<heightmap>`": [shape("<heightmap><uri>x.png</uri></heightmap>")],
     "a collision `<image>`": [shape("<image><uri>x.png</uri></image>")],
-    "friction, damping or density": [
+    "friction or damping": [
         shape("<sphere><radius>1</radius></sphere>", "<surface><friction><ode><mu>-1</mu></ode></friction></surface>"),
         shape("<sphere><radius>1</radius></sphere>", "<density>-1</density>"),
         shape(

@@ -47,12 +47,9 @@ def test_nothing_removed_changes_no_byte():
 
 
 def test_models_on_one_line_leave_the_rest_of_it():
-    text = b"<sdf version='1.9'><world name='w'><model name='a'><link name='l'/></model> <model name='b'><link name='l'/></model></world></sdf>"
-    world = parse_world(text, DATA)
-    assert (
-        without(world, frozenset("a"))
-        == b"<sdf version='1.9'><world name='w'> <model name='b'><link name='l'/></model></world></sdf>"
-    )
+    one, two = (f"<model name='{name}'><link name='l'/></model>" for name in "ab")
+    world = parse_world(f"<sdf version='1.9'><world name='w'>{one} {two}</world></sdf>".encode(), DATA)
+    assert without(world, frozenset("a")) == f"<sdf version='1.9'><world name='w'> {two}</world></sdf>".encode()
 
 
 def test_unknown_models_are_refused():

@@ -6,6 +6,7 @@ Exit codes: 0 done (for a reduction: minimal), 1 stopped before that, 2 wrong in
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -231,15 +232,33 @@ def _trial_line(result: dict[str, Any]) -> str:
     )
 
 
+def _cannot_print(error: OSError) -> int:
+    """Whoever reads our output may be gone (as with `| head`), or its disk full. Raises anything else again."""
+    if not isinstance(error, BrokenPipeError) and error.filename is not None:
+        raise error
+    # What could not be written would be tried again at the end of the program.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if isinstance(error, BrokenPipeError):
+        return 1
+    print(f"ddenv: cannot print: {error.strerror}", file=sys.stderr)
+    return 2
+
+
 app.add_command(world_group)
 
 
 def main() -> None:
+    # A terminal that lacks a letter of a model's name shows its number instead.
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")
     try:
         code = app(standalone_mode=False)
+        sys.stdout.flush()
     except UserError as error:
         print(f"ddenv: {error}", file=sys.stderr)
         code = 2
+    except OSError as error:
+        code = _cannot_print(error)
     except click.exceptions.Abort:
         code = 130
     except KeyboardInterrupt:

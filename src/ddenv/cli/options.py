@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ class Numbers(click.ParamType):
             numbers = tuple(float(word) for word in value.split(","))
         except ValueError:
             numbers = ()
-        if not self.fewest <= len(numbers) <= self.most:
+        if not self.fewest <= len(numbers) <= self.most or not all(map(math.isfinite, numbers)):
             self.fail(
                 f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
                 param,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -50,7 +51,8 @@ def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
         print(f"wrote {svg}")
         return 0
     columns, rows = shutil.get_terminal_size((100, 36))
-    print(terminal_map(world, columns, rows, color=sys.stdout.isatty(), **marks))
+    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    print(terminal_map(world, columns, rows - 1, color=color, **marks))
     return 0
 
 

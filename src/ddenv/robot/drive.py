@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.errors import UserError
+from ddenv.robot.joints import is_fixed
 from ddenv.robot.navigate import Command
 from ddenv.world.model import Cylinder, Joint, Model, Sphere
 
@@ -27,9 +28,14 @@ class Drive:
         return np.array([left if is_left else right for is_left in self.left])
 
 
+def is_wheel(joint: Joint) -> bool:
+    """Whether `joint` of a robot turns a wheel and has a motor; joints that slide or turn about two axes are left alone."""
+    return joint.kind in ("revolute", "continuous") and not is_fixed(joint)
+
+
 def find_drive(robot: Model) -> Drive:
-    """The drive of `robot`: every joint that turns is a wheel. Raises UserError where that cannot be."""
-    joints = [joint for joint in robot.joints if joint.kind != "fixed"]
+    """The drive of `robot`: every joint that turns about one axis is a wheel. Raises UserError where that cannot be."""
+    joints = [joint for joint in robot.joints if is_wheel(joint)]
     sides = [robot.pose.inverse().rotate(_offset(robot, joint))[1] for joint in joints]
     if not any(side > 0 for side in sides) or not any(side < 0 for side in sides):
         raise UserError(

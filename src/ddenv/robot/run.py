@@ -10,14 +10,16 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from ddenv.robot.clock import Clock
 from ddenv.robot.drive import Drive
 from ddenv.robot.estimate import Estimate, advance
 from ddenv.robot.navigate import Command, Navigator
 from ddenv.robot.observe import Observer
 from ddenv.robot.plant import Body, Built
-from ddenv.robot.recording import RECORD_PERIOD, Recording
+from ddenv.robot.recording import Recording
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensors import SensorSuite, Truth
+from ddenv.robot.sleep import Sleep
 from ddenv.world.scenario import Scenario
 
 Progress = Callable[[float, tuple[float, ...]], None]
@@ -26,8 +28,7 @@ Progress = Callable[[float, tuple[float, ...]], None]
 class Run:
     """One run in a context that has been prepared: start poses set, removed models switched off.
 
-    Time is counted in steps of the plant, so that every run senses, commands and records at the same instants to the last
-    bit. `floor` (m) is the height below which the robot has fallen out of the world.
+    `kept` are the moving models that it records; `floor` (m) is the height below which the robot has fallen out of the world.
     """
 
     def __init__(
@@ -36,19 +37,19 @@ class Run:
         context: Context,
         scenario: Scenario,
         drive: Drive,
+        clock: Clock,
+        sleep: Sleep,
         floor: float,
         kept: Sequence[Body],
         seed: int,
     ) -> None:
         self._scenario = scenario
         self._drive = drive
+        self._clock = clock
+        self._sleep = sleep
         self._floor = floor
         self._kept = kept
         self._seed = seed
-        self._step = scenario.simulation.time_step
-        self._control_every = self._steps(scenario.controller.period)
-        self._record_every = self._steps(RECORD_PERIOD)
-        self._last = self._steps(scenario.failure.timeout)
         self._context = built.plant.GetMyMutableContextFromRoot(context)
         self._motors = built.plant.get_desired_state_input_port(built.robot.instance)
         self._observer = Observer(built, drive, self._context)
@@ -66,7 +67,7 @@ class Run:
             failure=failure,
             trajectory=self._recording.trajectory(),
             motions=self._recording.motions(),
-            simulated_seconds=step * self._step,
+            simulated_seconds=step * self._clock.step,
             wall_seconds=time.perf_counter() - started,
             seed=self._seed,
         )
@@ -78,18 +79,21 @@ class Run:
         estimate = Estimate(truth.x, truth.y, truth.heading)
         step = 0
         while True:
+            self._sleep.tick(step)
             end = self._end(truth, step)
-            if end is not None or step % self._record_every == 0:
+            if end is not None or step % self._clock.record_every == 0:
                 self._record(step, progress)
             if end is not None:
                 return (*end, step)
-            if step % self._control_every == 0:
+            if step % self._clock.control_every == 0:
                 if step > 0:
                     measured = self._sensors.measure(truth)
-                    estimate = advance(estimate, measured, self._scenario.sensors, self._control_every * self._step)
+                    estimate = advance(
+                        estimate, measured, self._scenario.sensors, self._clock.control_every * self._clock.step
+                    )
                 self._command(self._navigator.command(estimate))
-            step = self._next(step)
-            problem = self._simulate(step * self._step)
+            step = self._clock.next(step)
+            problem = self._simulate(step * self._clock.step)
             if problem:
                 return "error", problem, step
             truth = self._observer.truth()
@@ -101,7 +105,7 @@ class Run:
             return "pass", ""
         if self._observer.robot()[2] < self._floor:
             return "failed", "fell"
-        return ("failed", "timeout") if step >= self._last else None
+        return ("failed", "timeout") if step >= self._clock.last else None
 
     def _simulate(self, until: float) -> str:
         """Simulates up to the time `until`; returns what went wrong, or ""."""
@@ -119,15 +123,7 @@ class Run:
         self._motors.FixValue(self._context, np.concatenate([np.zeros_like(speeds), speeds]))
 
     def _record(self, step: int, progress: Progress | None) -> None:
-        now, pose = step * self._step, self._observer.robot()
+        now, pose = step * self._clock.step, self._observer.robot()
         self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._kept})
         if progress is not None:
             progress(now, pose)
-
-    def _next(self, step: int) -> int:
-        """The next step at which something is due."""
-        due = min(step - step % every + every for every in (self._control_every, self._record_every))
-        return min(due, self._last)
-
-    def _steps(self, seconds: float) -> int:
-        return max(1, round(seconds / self._step))

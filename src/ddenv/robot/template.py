@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from ddenv.errors import UserError
+from ddenv.robot.clock import Clock
 from ddenv.robot.drive import find_drive
-from ddenv.robot.plant import Built, build, transform
-from ddenv.robot.presence import without
+from ddenv.robot.hold import Hold
+from ddenv.robot.place import transform
+from ddenv.robot.plant import Body, Built, build
+from ddenv.robot.presence import Presence
+from ddenv.robot.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
 from ddenv.robot.run import Run
-from ddenv.world.model import Box, Cylinder, Model, Plane, Shape, Sphere, World, is_ground
+from ddenv.robot.sleep import Sleep
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Model, World, is_ground
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
 
@@ -23,7 +29,7 @@ class Template:
     """The simulator of one scenario. Building it costs seconds; switching models off for a run costs milliseconds.
 
     All runs share one context. The same `keep` and `seed` give the same result bit for bit, whatever was run before, and the
-    same as a world that never had the removed static models.
+    same as a world that never had the removed models.
     """
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
@@ -35,10 +41,18 @@ class Template:
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         self._always = self._names & frozenset(scenario.protected) | grounds
         self._floor = lowest(world) - FALL
+        self._clock = Clock.of(scenario)
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
         self._place()
-        self._start = self._built.plant.GetPositionsAndVelocities(self._plant_context)
+        start = self._built.plant.GetPositionsAndVelocities(self._plant_context)
+        self._presence = Presence(self._built, self._context)
+        self._hold = Hold(self._built, self._plant_context, start)
+        self._rehearsals = Rehearsals(
+            world, self._built, self._context, self._presence, self._hold, self._clock, self._floor
+        )
+        # False only to measure what sleeping gains: then all models are simulated all the time.
+        self._sleeping = True
 
     def run(
         self,
@@ -56,11 +70,40 @@ class Template:
             raise ValueError(f"no such model: {min(unknown)}")
         removed = self._names - keep - self._always
         kept = [body for name, body in self._built.moving.items() if name not in removed]
-        self._context.SetTime(0.0)
-        self._built.plant.SetPositionsAndVelocities(self._plant_context, self._start)
-        with without(self._built, self._context, removed):
-            run = Run(self._built, self._context, self._scenario, self._drive, self._floor, kept, seed)
+        with self._presence.without(removed), self._asleep(kept, self._names - removed) as sleep:
+            run = Run(
+                self._built,
+                self._context,
+                self._scenario,
+                self._drive,
+                self._clock,
+                sleep,
+                self._floor,
+                kept,
+                seed,
+            )
             return run.execute(progress)
+
+    @contextmanager
+    def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[Sleep]:
+        """The moving models `kept` at their start, in a world of which the models `present` are left."""
+        scripts = self._rehearsals.scripts(kept, present) if self._sleeping else []
+        self._context.SetTime(0.0)
+        sleep = Sleep(
+            self._built,
+            self._plant_context,
+            self._presence,
+            self._hold,
+            self._clock,
+            self._floor,
+            kept,
+            scripts,
+            never=not self._sleeping,
+        )
+        try:
+            yield sleep
+        finally:
+            sleep.end()
 
     def _place(self) -> None:
         """Puts everything where it starts; the plant's default context has it all in the world's origin."""
@@ -87,17 +130,4 @@ def _build(world: World, robot: Model, scenario: Scenario) -> Built:
 def lowest(world: World) -> float:
     """A height (m) that no surface of the world lies below."""
     collisions = [collision for model in world.models for collision in model.collisions]
-    return min((one.pose.position[2] - _reach(one.shape) for one in collisions), default=0.0)
-
-
-def _reach(shape: Shape) -> float:
-    """A distance (m) from a shape's centre that none of its points exceeds; of a plane only its height counts."""
-    match shape:
-        case Box(size):
-            return math.hypot(*size) / 2
-        case Cylinder(radius, length):
-            return math.hypot(radius, length / 2)
-        case Sphere(radius):
-            return radius
-        case Plane():
-            return 0.0
+    return min((float(shape_bounds(one.shape, one.pose)[0][2]) for one in collisions), default=0.0)

@@ -9,18 +9,18 @@ import numpy as np
 from meshcat.geometry import (
     LineBasicMaterial,
     LineSegments,
+    Mesh,
     MeshLambertMaterial,
     PointsGeometry,
     TriangularMeshGeometry,
 )
-from meshcat.geometry import Mesh as MeshObject
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
 from ddenv.scene.follow import Shot
-from ddenv.scene.mesh import Mesh
+from ddenv.scene.mesh import Surface
 from ddenv.scene.stage import Path, Stage
-from ddenv.world.model import Model, Plane, World, is_ground
+from ddenv.world.model import Collision, Link, Model, Plane, Visual, World, is_ground
 from ddenv.world.pose import Pose, Vector
 
 WORLD: Path = ("world",)
@@ -35,25 +35,23 @@ ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 @dataclass(frozen=True)
 class Painted:
-    """Meshes that share one transparency: `tints` (N, 3) is the colour of every vertex."""
+    """A surface of one transparency: `tints` (N, 3) is the colour of every vertex."""
 
-    mesh: Mesh
+    surface: Surface
     tints: np.ndarray
     alpha: float
 
-    def thing(self) -> MeshObject:
-        geometry = TriangularMeshGeometry(self.mesh.vertices, self.mesh.faces, color=self.tints)
+    def thing(self) -> Mesh:
+        geometry = TriangularMeshGeometry(self.surface.vertices, self.surface.faces, color=self.tints)
         # Only outsides are drawn: shadows of two-sided faces fall on the faces themselves.
-        return MeshObject(geometry, MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
+        return Mesh(geometry, MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
 
 
 def paint(model: Model) -> list[Painted]:
-    """Everything a model shows (its collisions if it has no visuals), in the frame its poses are given in."""
-    groups: dict[float, list[tuple[Mesh, Color]]] = {}
+    """Everything a model shows, in the frame its poses are given in. A link without visuals shows its collisions."""
+    groups: dict[float, list[tuple[Surface, Color]]] = {}
     default = colors.default_color(model)
-    visuals = [visual for link in model.links for visual in link.visuals]
-    shown = [(item.shape, item.pose, item.color or default) for item in visuals]
-    shown = shown or [(item.shape, item.pose, default) for item in model.collisions]
+    shown = [(item.shape, item.pose, _color(item) or default) for link in model.links for item in _shown(link)]
     vary = len(shown) > 20
     for number, (shape, pose, color) in enumerate(shown):
         if not isinstance(shape, Plane):
@@ -62,12 +60,20 @@ def paint(model: Model) -> list[Painted]:
     return [_painted(parts, alpha) for alpha, parts in groups.items() if alpha > 0]
 
 
-def _painted(parts: list[tuple[Mesh, Color]], alpha: float) -> Painted:
+def _shown(link: Link) -> tuple[Visual, ...] | tuple[Collision, ...]:
+    return link.visuals or link.collisions
+
+
+def _color(item: Visual | Collision) -> Color | None:
+    return item.color if isinstance(item, Visual) else None
+
+
+def _painted(parts: list[tuple[Surface, Color]], alpha: float) -> Painted:
     tints = np.concatenate([np.tile(color[:3], (len(part.vertices), 1)) for part, color in parts])
     return Painted(mesh.merge([part for part, _ in parts]), tints, alpha)
 
 
-def plain(shape: Mesh, color: Color, *, glow: float = 0.0, offset: int = 0) -> MeshObject:
+def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> Mesh:
     """A thing of one colour. `glow` 0..1 is how much of it is seen without light; `offset` above 0 lets others win in one plane."""
     options = {}
     if glow:
@@ -75,7 +81,7 @@ def plain(shape: Mesh, color: Color, *, glow: float = 0.0, offset: int = 0) -> M
     if offset:
         options |= {"polygonOffset": True, "polygonOffsetFactor": offset, "polygonOffsetUnits": offset}
     material = MeshLambertMaterial(color=colors.hexadecimal(color), opacity=color[3], side=0, **options)
-    return MeshObject(TriangularMeshGeometry(shape.vertices, shape.faces), material)
+    return Mesh(TriangularMeshGeometry(shape.vertices, shape.faces), material)
 
 
 def lines(ends: np.ndarray, color: Color) -> LineSegments:
@@ -84,13 +90,13 @@ def lines(ends: np.ndarray, color: Color) -> LineSegments:
     return LineSegments(PointsGeometry(np.asarray(ends, dtype=np.float32).T), material)
 
 
-def outline(model: Model, shape: Mesh) -> np.ndarray:
+def outline(model: Model, shape: Surface) -> np.ndarray:
     """Ends of the 12 edges of the box around `shape` (in world axes), turned as the model is turned: shape (24, 3)."""
     own = shape.at(model.pose.inverse()).vertices
     low, high = own.min(axis=0), own.max(axis=0)
     corners = np.array([[(high if bit >> axis & 1 else low)[axis] for axis in range(3)] for bit in range(8)])
     pairs = [(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]
-    return Mesh(corners[np.array(pairs).ravel()], shape.faces).at(model.pose).vertices
+    return Surface(corners[np.array(pairs).ravel()], shape.faces).at(model.pose).vertices
 
 
 def safe_name(number: int, name: str) -> str:
@@ -168,16 +174,16 @@ class Scenery:
             self._draw_way((*TRAIL, str(piece)), way, colors.TRAIL)
         self._pieces = pieces
 
-    def _draw_way(self, path: Path, way: Mesh, color: Color) -> None:
+    def _draw_way(self, path: Path, way: Surface, color: Color) -> None:
         if len(way.faces):
             self._stage.draw(path, plain(way, color, glow=0.4), shadow=False)
 
-    def _draw_model(self, number: int, model: Model, element: bool) -> Mesh:
+    def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         key = safe_name(number, model.name)
         painted = paint(model)
         for part, item in enumerate(painted):
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
-        shape = mesh.merge([item.mesh for item in painted])
+        shape = mesh.merge([item.surface for item in painted])
         if element:
             self._keys[model.name] = key
             if len(shape.vertices):
@@ -195,15 +201,15 @@ class Scenery:
         half = GRID_SIZE / 2
         at = np.arange(-half, half + 0.5)
         across = np.array([[[x, -half, 0.002], [x, half, 0.002]] for x in at]).reshape(-1, 3)
-        grid = Mesh(np.concatenate([across, across[:, [1, 0, 2]]]), mesh.EMPTY.faces).at(pose)
+        grid = Surface(np.concatenate([across, across[:, [1, 0, 2]]]), mesh.EMPTY.faces).at(pose)
         self._stage.draw((*WORLD, "grid"), lines(grid.vertices, colors.GRID), shadow=False)
 
     def _draw_robot(self, robot: Model) -> float:
         to_first = robot.links[0].pose.inverse()
         lowest = 0.0
         for part, item in enumerate(paint(robot)):
-            item = Painted(item.mesh.at(to_first), item.tints, item.alpha)
-            lowest = min(lowest, float(item.mesh.vertices[:, 2].min()))
+            item = Painted(item.surface.at(to_first), item.tints, item.alpha)
+            lowest = min(lowest, float(item.surface.vertices[:, 2].min()))
             self._stage.draw((*ROBOT, str(part)), item.thing())
         return lowest
 

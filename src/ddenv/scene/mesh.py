@@ -11,24 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.world.model import Box, Cylinder, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose
 
 SIDES = 24
 # A drawn trajectory bends at most once in so many m: a robot that stands still leaves no pile of points.
 TUBE_STEP = 0.04
+# Where the faces of a mesh bend by less than this from their common direction in a corner, they look round there, rad.
+SMOOTH = math.radians(30.0)
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Surface:
     """`vertices` (N, 3) in m; `faces` (M, 3) are numbers of vertices, counterclockwise seen from outside."""
 
     vertices: np.ndarray
     faces: np.ndarray
 
-    def at(self, pose: Pose) -> Mesh:
-        """This mesh, given in the frame `pose`, seen from that frame's parent."""
-        return Mesh(self.vertices @ pose.rotation().T + pose.position, self.faces)
+    def at(self, pose: Pose) -> Surface:
+        """This surface, given in the frame `pose`, seen from that frame's parent."""
+        return Surface(self.vertices @ pose.rotation().T + pose.position, self.faces)
 
     @property
     def triangles(self) -> np.ndarray:
@@ -36,19 +38,19 @@ class Mesh:
         return self.vertices[self.faces]
 
 
-EMPTY = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
+EMPTY = Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
 
 
-def merge(meshes: Sequence[Mesh]) -> Mesh:
-    """One mesh with the faces of all."""
-    if not meshes:
+def merge(surfaces: Sequence[Surface]) -> Surface:
+    """One surface with the faces of all."""
+    if not surfaces:
         return EMPTY
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.uint32))
+    starts = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
+    faces = [one.faces + start for one, start in zip(surfaces, starts, strict=True)]
+    return Surface(np.concatenate([one.vertices for one in surfaces]), np.concatenate(faces).astype(np.uint32))
 
 
-def _unit_box() -> Mesh:
+def _unit_box() -> Surface:
     quads = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -56,18 +58,18 @@ def _unit_box() -> Mesh:
             normal = np.eye(3)[axis] * sign
             quads.append([0.5 * (normal + a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     faces = [[4 * quad + a, 4 * quad + b, 4 * quad + c] for quad in range(6) for a, b, c in ((0, 1, 2), (0, 2, 3))]
-    return Mesh(np.array(quads).reshape(-1, 3), np.array(faces, dtype=np.uint32))
+    return Surface(np.array(quads).reshape(-1, 3), np.array(faces, dtype=np.uint32))
 
 
 _UNIT_BOX = _unit_box()
 
 
-def box(size: Sequence[float]) -> Mesh:
+def box(size: Sequence[float]) -> Surface:
     """A box about its frame's origin; `size` along x, y, z."""
-    return Mesh(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
+    return Surface(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
 
 
-def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Mesh:
+def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Surface:
     """A cut cone along z about its frame's origin, with the radii `bottom` and `top`; equal radii make a cylinder."""
     angles = np.arange(sides) * 2 * math.pi / sides
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -78,33 +80,68 @@ def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Mes
         [np.column_stack([here, after, after + sides]), np.column_stack([here, after + sides, here + sides])]
     )
     fan = np.column_stack([np.zeros(sides - 2, dtype=int), np.arange(1, sides - 1), np.arange(2, sides)])
-    parts = [Mesh(np.concatenate([low, high]), wall), Mesh(low, fan[:, ::-1]), Mesh(high, fan)]
+    parts = [Surface(np.concatenate([low, high]), wall), Surface(low, fan[:, ::-1]), Surface(high, fan)]
     return merge(parts)
 
 
-def cylinder(radius: float, length: float, sides: int = SIDES) -> Mesh:
+def cylinder(radius: float, length: float, sides: int = SIDES) -> Surface:
     """Along z, about its frame's origin."""
     return frustum(radius, radius, length, sides)
 
 
-def sphere(radius: float, sides: int = SIDES) -> Mesh:
+def sphere(radius: float, sides: int = SIDES) -> Surface:
     """About its frame's origin."""
     rings = sides // 2
     theta, phi = np.meshgrid(np.linspace(0, math.pi, rings + 1), np.arange(sides) * 2 * math.pi / sides, indexing="ij")
     points = radius * np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    return Mesh(points.reshape(-1, 3), _sheet(rings + 1, sides))
+    return Surface(points.reshape(-1, 3), _sheet(rings + 1, sides))
 
 
-def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Mesh:
+def ellipsoid(radii: Sequence[float]) -> Surface:
+    """About its frame's origin; `radii` along x, y, z."""
+    ball = sphere(1.0)
+    return Surface(ball.vertices * np.asarray(radii, dtype=float), ball.faces)
+
+
+def capsule(radius: float, length: float) -> Surface:
+    """A cylinder of `length` along z about its frame's origin, with half a ball on each end."""
+    ball = sphere(radius)
+    rings = ball.vertices.reshape(-1, SIDES, 3)
+    middle = len(rings) // 2
+    # The equator stands twice: once for each end of the cylinder.
+    end = np.array([0.0, 0.0, length / 2])
+    halves = np.concatenate([rings[: middle + 1] + end, rings[middle:] - end])
+    return Surface(halves.reshape(-1, 3), _sheet(len(halves), SIDES))
+
+
+def creased(mesh: Mesh) -> Surface:
+    """The surface of a mesh, round where it bends little and with sharp edges elsewhere."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat, count = mesh.faces.ravel(), len(mesh.vertices)
+    weights = np.repeat(normals, 3, axis=0)
+    common = np.column_stack([np.bincount(flat, weights[:, axis], count) for axis in range(3)])[mesh.faces]
+    along = np.einsum("fi,fci->fc", normals, common)
+    lengths = np.linalg.norm(normals, axis=1)[:, None] * np.linalg.norm(common, axis=2)
+    sharp = along < math.cos(SMOOTH) * lengths
+    faces = mesh.faces.astype(np.int64)
+    faces[sharp] = count + np.arange(sharp.sum())
+    used = np.zeros(count + int(sharp.sum()), dtype=bool)
+    used[faces] = True
+    number = np.cumsum(used) - 1
+    return Surface(np.concatenate([mesh.vertices, corners[sharp]])[used], number[faces].astype(np.uint32))
+
+
+def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Surface:
     """A ring of round section that lies in the plane z = 0 around its frame's origin."""
     around, across = np.meshgrid(np.arange(sides + 1) * 2 * math.pi / sides, np.arange(8) * math.pi / 4, indexing="ij")
     distance = radius + thickness / 2 * np.cos(across)
     height = thickness / 2 * np.sin(across)
     points = np.stack([distance * np.cos(around), distance * np.sin(around), height], axis=-1)
-    return Mesh(points.reshape(-1, 3), _sheet(sides + 1, 8))
+    return Surface(points.reshape(-1, 3), _sheet(sides + 1, 8))
 
 
-def tube(points: np.ndarray, radius: float) -> Mesh:
+def tube(points: np.ndarray, radius: float) -> Surface:
     """A tube along the path `points` (N, 3), thinned out to one point every `TUBE_STEP`; empty for a path without length."""
     path = thinned(points, TUBE_STEP)
     return EMPTY if len(path) < 2 else _pipe(path, radius)
@@ -119,20 +156,27 @@ def thinned(points: np.ndarray, step: float) -> np.ndarray:
     return np.array(taken).reshape(-1, 3)
 
 
-def of_shape(shape: Shape) -> Mesh:
+def of_shape(shape: Shape) -> Surface:
     """The surface of a shape in its own frame. A plane has none: the ground is drawn by itself."""
-    if isinstance(shape, Box):
-        return box(shape.size)
-    if isinstance(shape, Cylinder):
-        return cylinder(shape.radius, shape.length)
-    if isinstance(shape, Sphere):
-        return sphere(shape.radius)
+    match shape:
+        case Box(size):
+            return box(size)
+        case Cylinder(radius, length):
+            return cylinder(radius, length)
+        case Sphere(radius):
+            return sphere(radius)
+        case Capsule(radius, length):
+            return capsule(radius, length)
+        case Ellipsoid(radii):
+            return ellipsoid(radii)
+        case Mesh():
+            return creased(shape)
     return EMPTY
 
 
-def height_at(mesh: Mesh, x: float, y: float) -> float | None:
+def height_at(surface: Surface, x: float, y: float) -> float | None:
     """Height of the highest face above or below the point (x, y), m; None where there is none."""
-    corners = mesh.triangles
+    corners = surface.triangles
     if not len(corners):
         return None
     low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
@@ -158,7 +202,7 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
     return faces.reshape(-1, 3).astype(np.uint32)
 
 
-def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Mesh:
+def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Surface:
     ahead = np.gradient(path, axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
     # A path that is nowhere vertical for long: z serves as the second direction of every section.
@@ -168,4 +212,4 @@ def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Mesh:
     over = np.cross(ahead, aside)
     angles = -np.arange(sides) * 2 * math.pi / sides
     section = np.cos(angles)[None, :, None] * aside[:, None] + np.sin(angles)[None, :, None] * over[:, None]
-    return Mesh((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), sides))
+    return Surface((path[:, None] + radius * section).reshape(-1, 3), _sheet(len(path), sides))

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ddenv.map.footprints import footprints
 from ddenv.runfile.store import RunFile
-from ddenv.workbench.footprints import footprints
 from ddenv.workbench.widgets.map import Place
 
 if TYPE_CHECKING:

@@ -168,10 +168,10 @@ def test_visuals_keep_their_colours(read, material, color):
 
 
 WRONG = {
-    "zero": ("<box><size>1 0 1</size></box>", "size: sizes must be above zero"),
-    "negative": ("<cylinder><radius>-1</radius><length>1</length></cylinder>", "radius: sizes must be above zero"),
+    "zero": ("<box><size>1 0 1</size></box>", "size: sizes must be from 1e-06"),
+    "negative": ("<cylinder><radius>-1</radius><length>1</length></cylinder>", "radius: sizes must be from"),
     "no size": ("<sphere/>", "sphere: has no <radius>"),
-    "huge": ("<box><size>1e300 1 1</size></box>", "at most 1e"),
+    "huge": ("<box><size>1e300 1 1</size></box>", r"to 1e\+06 m, found '1e300 1 1'"),
     "nothing": ("", "has no <geometry>"),
     "unknown": ("<torus><radius>1</radius></torus>", "<torus> is no shape that is known"),
     "flat polyline": ("<polyline><point>0 0</point><point>1 1</point><height>1</height></polyline>", "three <point>s"),

@@ -79,7 +79,7 @@ def test_joint_limits_count_from_where_the_state_has_the_links(read, kind, turne
 WRONG = {
     "two states": (state("") * 2, "a second <state>"),
     "insertions": (state("<insertions><model name='x'/></insertions>"), "insertions"),
-    "zero scale": (state("<model name='m'><scale>1 0 1</scale></model>"), "scale must be above zero"),
+    "zero scale": (state("<model name='m'><scale>1 0 1</scale></model>"), "scale must be from"),
     "nan": (state("<model name='m'><link name='l'><pose>nan 0 0 0 0 0</pose></link></model>"), "6 finite numbers"),
     "nameless": (state("<model/>"), "has no name"),
 }

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ddenv.map.footprints import Footprint
+from ddenv.map.paint import HUES, RGB, Canvas, blend, packed
+from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import Candidate, RunState, partition_letter
-from ddenv.workbench.footprints import Footprint
-from ddenv.workbench.paint import HUES, RGB, Canvas, blend, packed
-from ddenv.workbench.raster import EMPTY
 
 KEPT, FLOOR, LEFT_OUT, FLOOR_OUT, PROTECTED, REMOVED = range(6)
 # A full cell of each. Where the terminal has colours, all but the protected ones look solid; without, they tell.
@@ -105,21 +105,3 @@ def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, co
     gone = (removed[0::2] != EMPTY) & ~solid[grid[0::2]] & ~solid[grid[1::2]]
     canvas.chars[gone] = GONE
     canvas.fore[gone] = color
-
-
-def label_cells(grid: np.ndarray, centers: np.ndarray) -> list[tuple[int, int] | None]:
-    """The cell for each model's letter: of those it fills, the one nearest to its centre (pixels); None if none is free."""
-    owned = np.where(grid[0::2] == grid[1::2], grid[0::2], EMPTY)
-    loose = grid[0::2]
-    cells: list[tuple[int, int] | None] = []
-    for index in range(len(centers)):
-        rows, columns = np.nonzero(owned == index)
-        if not len(rows):
-            rows, columns = np.nonzero(loose == index)
-        if not len(rows):
-            cells.append(None)
-            continue
-        away = (columns + 0.5 - centers[index, 0]) ** 2 + (2 * rows + 1 - centers[index, 1]) ** 2
-        best = int(np.argmin(away))
-        cells.append((int(rows[best]), int(columns[best])))
-    return cells

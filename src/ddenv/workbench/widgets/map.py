@@ -15,13 +15,14 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
+from ddenv.map.footprints import Footprint
+from ddenv.map.paint import RGB, Canvas, blend, packed
+from ddenv.map.raster import View, arrow, braille, fit, heading, label_cells, masks, owners
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
-from ddenv.workbench.footprints import Footprint
-from ddenv.workbench.paint import RGB, Canvas, blend, packed
 from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.raster import View, arrow, braille, fit, heading, masks, owners
-from ddenv.workbench.widgets.looks import REMOVED, Kept, fill, ghosts, kept, label_cells, looks
+from ddenv.workbench.widgets.looks import REMOVED, Kept, fill, ghosts, kept, looks
+from ddenv.workbench.widgets.strips import strip
 
 Point = tuple[float, float]
 LEGEND = (
@@ -265,7 +266,7 @@ class WorldMap(Widget, can_focus=True):
             return self._tell(y)
         if self._canvas is None or y >= self._canvas.chars.shape[0]:
             return Strip.blank(self.size.width, self.rich_style)
-        return self._canvas.strip(y)
+        return strip(self._canvas, y)
 
     def _tell(self, y: int) -> Strip:
         lines = Text(self.notice, justify="center").wrap(self.app.console, max(1, self.size.width))

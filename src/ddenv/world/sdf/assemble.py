@@ -8,9 +8,9 @@ from dataclasses import replace
 from ddenv.world.model import Joint, Link, Model, is_ground
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.context import Context
-from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.frames import WORLD, Scope
 from ddenv.world.sdf.geometry import ONE
-from ddenv.world.sdf.joints import WORLD, Stand, check_tree, read_joints
+from ddenv.world.sdf.joints import Stand, check_tree, read_joints
 from ddenv.world.sdf.links import Site, read_link
 from ddenv.world.sdf.parts import Part
 from ddenv.world.sdf.state import Saved
@@ -19,6 +19,8 @@ from ddenv.world.sdf.xml import Element, complain, name_of, truth
 
 # A model that `<state>` has less than this from its own pose has not been moved, m.
 MOVED = 0.001
+# A few files that include each other many times can ask for more models than any machine holds.
+MOST_MODELS = 50_000
 
 
 def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
@@ -70,6 +72,11 @@ class _Builder:
         self, scope: Scope, nominal: Pose, actual: Pose, prefix: str, saved: Saved | None, scale: Vector = ONE
     ) -> None:
         """Adds what is in `scope`, whose frame is nominally at one pose in the world and actually at another."""
+        self.context.assembled += 1
+        if self.context.assembled > MOST_MODELS:
+            raise complain(
+                scope.element, f"there are more than {MOST_MODELS} models, with those that are nested or included"
+            )
         note_unread(scope.element, self.context)
         scale = scale if saved is None or saved.scale == ONE else saved.scale
         for element in scope.element.findall("link"):
@@ -82,6 +89,8 @@ class _Builder:
     def _add_link(self, element, scope, nominal, actual, prefix, saved, scale) -> None:
         own = name_of(element)
         name = prefix + own
+        if own == WORLD:
+            raise complain(element, "'world' is a name that SDF keeps for the world itself; give it another")
         if name in self.stands:
             raise complain(element, "this name stands twice; every link of a model needs a name of its own")
         local = scope.place(element)

@@ -27,8 +27,10 @@ class Context:
     stand_ins: dict[str, StandIn] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     includes: int = 0
+    assembled: int = 0
     files: dict[Path, Element] = field(default_factory=dict)
     scopes: dict[int, Any] = field(default_factory=dict)
+    canonical: dict[int, str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)

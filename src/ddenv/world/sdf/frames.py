@@ -15,6 +15,8 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 # Nothing stands farther from the origin of its frame: numbers beyond lose their millimetres, m.
 FARTHEST = 1e6
 OWN = ("", "__model__")
+WORLD = "world"
+HERE = Pose()
 
 
 class Scope:
@@ -25,7 +27,6 @@ class Scope:
         self.parts = parts(element, files, context)
         self._context = context
         self._poses: dict[str, Pose] = {}
-        self._open: list[str] = []
 
     def inside(self, part: Part) -> Scope:
         """The frames inside one of the `parts`; models included from one file share them."""
@@ -36,7 +37,8 @@ class Scope:
         return scopes[key]
 
     @cached_property
-    def _named(self) -> dict[str, Element | Part]:
+    def named(self) -> dict[str, Element | Part]:
+        """Everything that has a name here."""
         # Where names stand twice, the first of these kinds wins.
         named: dict[str, Element | Part] = {}
         for tag in ("joint", "link", "frame"):
@@ -46,116 +48,97 @@ class Scope:
 
     def pose(self, name: str, asker: Element) -> Pose:
         """The pose of the frame called `name`; complaints are about `asker`. Raises UserError."""
-        if name in OWN or (name == "world" and self.element.tag != "model"):
-            return Pose()
-        if name in self._poses:
-            return self._poses[name]
-        thing = self._find(name, asker)
-        if name in self._open:
-            circle = " -> ".join((*self._open[self._open.index(name) :], name))
-            raise complain(asker, f"frames are given relative to each other in a circle: {circle}")
-        self._open.append(name)
-        pose = self._resolve(name, thing, asker)
-        self._open.pop()
-        self._poses[name] = pose
+        # Step by step instead of a call for each: rows of frames may be longer than Python's stack.
+        way: dict[str, Element | Part] = {}
+        at, asked_by = name, asker
+        while not self._is_known(at):
+            if at in way:
+                names = [*way, at][list(way).index(at) :]
+                raise complain(asker, f"frames are given relative to each other in a circle: {shown(names)}")
+            way[at] = self._find(at, asked_by)
+            at, asked_by = self._base(at, way[at])
+        pose = self._poses.get(at, HERE)
+        for each, thing in reversed(way.items()):
+            pose = pose @ self._local(each, thing, asker)
+            self._poses[each] = pose
         return pose
 
     def place(self, holder: Element, default: str = "") -> Pose:
         """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
         element = holder.find("pose")
-        return self._place(element, default, holder if element is None else element)
+        return self._at(_base_of(element, default), element, holder)
 
     def placed(self, part: Part) -> Pose:
         """The pose of one of the `parts`."""
         element = part.pose
-        pose = self._place(element, "", part.at if element is None else element)
+        pose = self._at(_base_of(element, ""), element, part.at)
         frame = part.placement_frame
         return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
 
-    def link_of(self, name: str, asker: Element) -> str | None:
-        """The link that the frame `name` is attached to, such as `link` or `inner::link`; None where there is none."""
-        seen: list[str] = []
-        while True:
-            if name in seen:
-                raise complain(asker, f"frames are attached to each other in a circle: {' -> '.join((*seen, name))}")
-            seen.append(name)
-            if name in OWN:
-                return self._canonical(asker)
-            thing = self._named.get(name)
-            if thing is None and "::" in name:
-                return self._link_inside(name, asker)
-            if thing is None:
-                return None
-            if isinstance(thing, Part):
-                inside = self.inside(thing).link_of("", asker)
-                return None if inside is None else f"{name}::{inside}"
-            if thing.tag == "link":
-                return name
-            name = text_of(thing.find("child")) if thing.tag == "joint" else thing.get("attached_to") or ""
+    def _at(self, base: str, element: Element | None, holder: Element) -> Pose:
+        local = HERE if element is None else pose_of(element)
+        return local if base in OWN else self.pose(base, holder if element is None else element) @ local
 
-    def _link_inside(self, name: str, asker: Element) -> str | None:
-        first, rest = name.split("::", 1)
-        thing = self._named.get(first)
-        if not isinstance(thing, Part):
-            return None
-        inside = self.inside(thing).link_of(rest, asker)
-        return None if inside is None else f"{first}::{inside}"
-
-    def _canonical(self, asker: Element) -> str | None:
-        """The link that the model's own frame is attached to: the one it names, else its first."""
-        named = self.element.get("canonical_link")
-        if named:
-            return self.link_of(named, asker) if named not in OWN else None
-        first = self.element.find("link")
-        if first is not None:
-            return name_of(first)
-        for part in self.parts:
-            inside = self.inside(part).link_of("", asker)
-            if inside is not None:
-                return f"{part.name}::{inside}"
-        return None
+    def _is_known(self, name: str) -> bool:
+        return name in OWN or name in self._poses or (name == WORLD and self.element.tag != "model")
 
     def _find(self, name: str, asker: Element) -> Element | Part:
         """What is called `name`; of `a::b` the part `a`."""
-        thing = self._named.get(name)
+        thing = self.named.get(name)
         if thing is not None:
             return thing
-        first = self._named.get(name.split("::", 1)[0]) if "::" in name else None
+        first = self.named.get(name.split("::", 1)[0]) if "::" in name else None
         if isinstance(first, Part):
             return first
-        near = difflib.get_close_matches(name, self._named, n=1)
-        hint = f" (did you mean '{near[0]}'?)" if near else ""
+        # Looking for the nearest of thousands of names would take longer than reading them.
+        near = difflib.get_close_matches(name[:80], list(self.named)[:500], n=1)
+        hint = f" (did you mean '{near[0][:80]}'?)" if near else ""
         raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
 
-    def _resolve(self, name: str, thing: Element | Part, asker: Element) -> Pose:
+    def _base(self, name: str, thing: Element | Part) -> tuple[str, Element]:
+        """The frame that `thing` is placed relative to, and the element that says so; of `a::b` that is `a`."""
         if isinstance(thing, Part):
-            if name != thing.name:
-                return self.pose(thing.name, asker) @ self.inside(thing).pose(name.split("::", 1)[1], asker)
-            return self.placed(thing)
-        if thing.tag == "joint":
-            return self.place(thing, text_of(thing.find("child")))
-        return self.place(thing, (thing.get("attached_to") or "") if thing.tag == "frame" else "")
+            element, holder = thing.pose, thing.at
+            base = _base_of(element, "") if name == thing.name else thing.name
+        else:
+            element, holder = thing.find("pose"), thing
+            default = {"joint": text_of(thing.find("child")), "frame": thing.get("attached_to") or ""}
+            base = _base_of(element, default.get(thing.tag, ""))
+        return base, holder if element is None else element
 
-    def _place(self, element: Element | None, default: str, asker: Element) -> Pose:
-        if element is None:
-            return self.pose(default, asker)
-        base = element.get("relative_to") or element.get("frame") or default
-        pose = pose_of(element)
-        return pose if base in OWN else self.pose(base, asker) @ pose
+    def _local(self, name: str, thing: Element | Part, asker: Element) -> Pose:
+        """The pose of `thing` in the frame that it is placed relative to."""
+        if isinstance(thing, Part) and name != thing.name:
+            return self.inside(thing).pose(name.split("::", 1)[1], asker)
+        element = thing.pose if isinstance(thing, Part) else thing.find("pose")
+        pose = HERE if element is None else pose_of(element)
+        frame = thing.placement_frame if isinstance(thing, Part) else ""
+        return pose @ self.inside(thing).pose(frame, thing.at).inverse() if frame else pose
 
     def references(self) -> set[str]:
-        """The first names of all frames of this world that poses and frames directly inside it are given relative to."""
+        """The names of everything in this world that poses and frames directly inside it are given relative to."""
         holders = [*self.element.findall("frame"), *(part.at for part in self.parts)]
         named = [holder.get("attached_to") or "" for holder in holders]
         for pose in (holder.find("pose") for holder in holders):
-            named += [] if pose is None else [pose.get("relative_to") or pose.get("frame") or ""]
-        return {name.split("::", 1)[0] for name in named if name}
+            named.append(_base_of(pose, ""))
+        # A model's name may itself hold colons.
+        return {name for each in named for name in (each, each.split("::", 1)[0]) if name}
+
+
+def shown(names: list[str]) -> str:
+    """A row of names, short enough for one line."""
+    cut = [name[:40] for name in names]
+    return " -> ".join(cut if len(cut) <= 6 else [*cut[:4], f"... ({len(cut) - 5} more)", cut[-1]])
+
+
+def _base_of(pose: Element | None, default: str) -> str:
+    return default if pose is None else pose.get("relative_to") or pose.get("frame") or default
 
 
 def pose_of(element: Element) -> Pose:
     """The numbers of a `<pose>`: roll, pitch and yaw, or a quaternion, in rad or degrees. Raises UserError."""
     if not text_of(element):
-        return Pose()
+        return HERE
     if (element.get("rotation_format") or "euler_rpy") == "quat_xyzw":
         x, y, z, *turn = numbers(element, 7)
         pose = Pose((x, y, z), _unit(element, (turn[3], turn[0], turn[1], turn[2])))

@@ -11,11 +11,11 @@ from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.polyline import read_polyline
 from ddenv.world.sdf.resources import Missing, Unusable
-from ddenv.world.sdf.standin import HOW
+from ddenv.world.sdf.standin import SIZES
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "mesh", "polyline")
-LARGEST = 1e6  # m
+SMALLEST, LARGEST = 1e-6, 1e6  # m
 ONE: Vector = (1.0, 1.0, 1.0)
 HERE = Pose()
 
@@ -47,11 +47,14 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
     if geometry is None or not len(geometry):
         raise complain(parent, "has no <geometry>")
     element = next((child for child in geometry if child.tag in SHAPES), geometry[0])
+    for other in geometry:
+        if other is not element and (other.tag, element.tag) != ("polyline", "polyline"):
+            context.note("ignored", other, f"a <geometry> has one shape: its <{element.tag}> counts")
     match element.tag:
         case "mesh":
             return _mesh(element, parent, context, scale)
         case "polyline":
-            return Placed(_scaled(read_polyline(geometry, context), scale))
+            return Placed(_checked(_scaled(read_polyline(geometry, context), scale), element))
         case "plane":
             return _plane(element)
         case "empty":
@@ -64,15 +67,15 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
 def _primitive(element: Element, scale: Vector) -> Shape:
     match element.tag:
         case "box":
-            return Box(_times(_sizes(element, "size", 3), scale))
+            return Box(_sizes(element, "size", scale))
         case "cylinder":
-            return Cylinder(_radius(element, scale), _length(element, scale))
+            return Cylinder(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
         case "sphere":
-            return Sphere(_sizes(element, "radius", 1)[0] * max(scale))
+            return Sphere(*_sizes(element, "radius", (max(scale),)))
         case "capsule":
-            return Capsule(_radius(element, scale), _length(element, scale))
+            return Capsule(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
         case "ellipsoid":
-            return Ellipsoid(_times(_sizes(element, "radii", 3), scale))
+            return Ellipsoid(_sizes(element, "radii", scale))
     raise complain(element, f"<{element.tag}> is no shape that is known; use one of {', '.join(SHAPES)}")
 
 
@@ -86,7 +89,7 @@ def _left_out(element: Element, parent: Element, context: Context) -> None:
 
 
 def _plane(element: Element) -> Placed:
-    size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", 2)
+    size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
     normal = element.find("normal")
     if normal is None:
         return Placed(Plane(size))
@@ -129,16 +132,17 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
     except (Missing, Unusable) as error:
         return Lost(element, uri, str(error))
-    return Placed(_scaled(mesh, _times(own, scale)))
+    return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
     """What can be done about a collision mesh that cannot be had; `siblings` are the kinds of other shapes in its link."""
     package = "/".join(lost.uri.split("/")[:3]) if "://" in lost.uri else lost.uri
-    also = "".join(f", or '{lost.uri}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
+    others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
+    also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
     return (
-        f"mesh '{lost.uri[:200]}' cannot be had: {lost.reason}; name its folder with --model-path, or a shape with --stand-in "
-        f"'{package}=cylinder:radius,length' ({HOW.split(', visual')[0]}){also}, or leave it out with --ignore mesh"
+        f"mesh '{lost.uri[:200]}' cannot be had: {lost.reason}; name its folder with --model-path, or a shape in m with "
+        f"--stand-in '{package[:200]}=cylinder:radius,length' (or {others}){also}, or leave it out with --ignore mesh"
     )
 
 
@@ -167,21 +171,33 @@ def _times(vector: Vector, scale: Vector) -> Vector:
     return (vector[0] * scale[0], vector[1] * scale[1], vector[2] * scale[2])
 
 
-def _radius(element: Element, scale: Vector) -> float:
-    return _sizes(element, "radius", 1)[0] * max(scale[:2])
-
-
-def _length(element: Element, scale: Vector) -> float:
-    return _sizes(element, "length", 1)[0] * scale[2]
-
-
-def _sizes(parent: Element, tag: str, count: int) -> tuple[float, ...]:
+def _sizes(parent: Element, tag: str, scale: tuple[float, ...]) -> tuple[float, ...]:
+    """The sizes in the child `tag`, one for each factor of `scale`, and multiplied by it. Raises UserError."""
     element = parent.find(tag)
     if element is None:
         raise complain(parent, f"has no <{tag}>")
-    values = numbers(element, count)
-    if min(values) <= 0 or max(values) > LARGEST:
+    values = tuple(value * factor for value, factor in zip(numbers(element, len(scale)), scale, strict=True))
+    if min(values) < SMALLEST or max(values) > LARGEST:
         raise complain(
-            element, f"sizes must be above zero (and at most {LARGEST:g} m), found '{text_of(element)[:60]}'"
+            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found '{text_of(element)[:60]}'{_by(scale)}"
         )
     return values
+
+
+def _by(scale: tuple[float, ...]) -> str:
+    return (
+        ""
+        if all(factor == 1.0 for factor in scale)
+        else f" times the saved scale {' '.join(f'{each:g}' for each in scale)}"
+    )
+
+
+def _checked(shape: Shape, element: Element) -> Shape:
+    """A mesh of a size that can be. Raises UserError."""
+    assert isinstance(shape, Mesh)
+    size, reach = np.ptp(shape.vertices, axis=0).max(), np.abs(shape.vertices).max()
+    if size < SMALLEST or reach > LARGEST:
+        raise complain(
+            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found {max(size, reach):g} m after scaling"
+        )
+    return shape

@@ -17,8 +17,9 @@ WATER = 1000.0  # kg/m^3, SDF's default for a link whose mass is to be computed
 DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
 # A link without shapes is taken as a ball of this radius, m.
 BARE = 0.05
-HEAVIEST = 1e9  # kg
-DENSEST = 1e6  # kg/m^3
+LIGHTEST, HEAVIEST = 1e-9, 1e9  # kg
+THINNEST, DENSEST = 1e-3, 1e6  # kg/m^3
+LEAST_MOMENT = 1e-15  # kg m^2
 
 
 def read_inertia(
@@ -32,7 +33,7 @@ def read_inertia(
     if (element.get("auto") or "").strip().lower() in ("1", "true"):
         return spread(collisions, density, link_pose, None)
     mass = _number(element, "mass", DEFAULT_MASS)
-    if not 0 < mass <= HEAVIEST:
+    if not LIGHTEST <= mass <= HEAVIEST:
         computed = spread(collisions, density, link_pose, None)
         why = f"mass {mass:g} kg cannot be: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
         context.note("replaced", element, why)
@@ -53,8 +54,10 @@ def read_inertia(
 def read_density(parent: Element, default: float) -> float:
     """The `<density>` in `parent`, kg/m^3. Raises UserError."""
     density = number(parent, "density", default)
-    if not 0 < density <= DENSEST:
-        raise complain(parent.find("density"), f"a density must be above zero (kg/m^3), found {density:g}")
+    if not THINNEST <= density <= DENSEST:
+        raise complain(
+            parent.find("density"), f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}"
+        )
     return density
 
 
@@ -76,7 +79,7 @@ def is_possible(moments: Sequence[float], products: Sequence[float]) -> bool:
     if not np.isfinite(tensor).all() or np.abs(tensor).max() > HEAVIEST:
         return False
     low, middle, high = np.linalg.eigvalsh(tensor)
-    return bool(low > 0 and high <= (low + middle) * (1 + 1e-6))
+    return bool(low > LEAST_MOMENT and high <= low + middle)
 
 
 def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose: Pose, mass: float | None) -> Inertia:
@@ -87,7 +90,7 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     solids = [(*solid(one.shape), one.pose, each) for one, each in pairs]
     masses = np.array([volume * each for volume, _, _, _, each in solids])
     centers = np.array([np.array(pose.position) + pose.rotation() @ center for _, center, _, pose, _ in solids])
-    total = float(masses.sum())
+    total = max(float(masses.sum()), LIGHTEST)
     middle = masses @ centers / total
     tensor = np.zeros((3, 3))
     for (_, _, unit, pose, _), each, center in zip(solids, masses, centers, strict=True):
@@ -97,6 +100,8 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     tensor *= factor
     moments = tuple(float(tensor[axis, axis]) for axis in range(3))
     products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
+    if not is_possible(moments, products):
+        return _ball(link_pose, total * factor)
     place = Pose(tuple(float(part) for part in middle))  # type: ignore[arg-type]
     return Inertia(total * factor, place, moments, products)  # type: ignore[arg-type]
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from ddenv.world.model import Joint
 from ddenv.world.pose import Pose, Vector
+from ddenv.world.sdf.attachment import link_of
 from ddenv.world.sdf.context import Context, refuse, version
-from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.frames import WORLD, Scope, shown
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
@@ -16,7 +17,6 @@ WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
 LIMITED = ("revolute", "prismatic")
 # An unlimited value is written by simulators as a huge number or as -1; SDF's own default for both limits is infinite.
 UNLIMITED = 1e15
-WORLD = "world"
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,14 @@ class Stand:
 
 def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand], context: Context) -> list[Joint]:
     """The joints directly inside a model at the nominal `pose`; `stands` are its links by full name. Raises UserError."""
-    joints = []
+    joints, names = [], set()
     for element in scope.element.findall("joint"):
+        if name_of(element) in names:
+            raise complain(element, "this name stands twice; every joint of a model needs a name of its own")
+        names.add(name_of(element))
         kind = element.get("type", "")
         if kind in KINDS:
-            joints.append(_joint(element, kind, scope, pose, prefix, stands))
+            joints.append(_joint(element, kind, scope, pose, prefix, stands, context))
         elif context.ignores("joint"):
             context.note("ignored", element, f"a '{kind}' joint is left out as asked: its links move freely")
         else:
@@ -41,11 +44,20 @@ def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand],
     return joints
 
 
-def _joint(element: Element, kind: str, scope: Scope, model_pose: Pose, prefix: str, stands: dict[str, Stand]) -> Joint:
-    parent, child = (_end(element, tag, scope, prefix, stands) for tag in ("parent", "child"))
+def _joint(
+    element: Element,
+    kind: str,
+    scope: Scope,
+    model_pose: Pose,
+    prefix: str,
+    stands: dict[str, Stand],
+    context: Context,
+) -> Joint:
+    parent, child = (_end(element, tag, scope, prefix, stands, context) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
-    nominal = model_pose @ scope.pose(name_of(element), element)
+    # By its own element: something else in the model may have the same name.
+    nominal = model_pose @ scope.place(element, text_of(element.find("child")))
     moved = stands[child].actual @ stands[child].nominal.inverse()
     axis = element.find("axis")
     if kind in ("revolute", "prismatic", "universal") and axis is None:
@@ -68,18 +80,18 @@ def _joint(element: Element, kind: str, scope: Scope, model_pose: Pose, prefix: 
         damping=0.0 if dynamics is None else _damping(dynamics),
         axis2=None if second is None else moved.rotate(second),
     )
-    if joint.lower > joint.upper:
+    if joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf:
         raise complain(limit, f"the lower limit {joint.lower:g} is above the upper one, {joint.upper:g}")
     return _counted_from_here(joint, first, stands)
 
 
-def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand]) -> str:
+def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand], context: Context) -> str:
     """The full name of the link at one end of a joint, or `world`."""
     child = element.find(tag)
     name = text_of(child)
     if tag == "parent" and name == WORLD:
         return WORLD
-    link = scope.link_of(name, element) if name else None
+    link = link_of(scope, name, element, context) if name else None
     if link is None or prefix + link not in stands:
         raise complain(element if child is None else child, f"<{tag}> names no link of this model: '{name[:80]}'")
     return prefix + link
@@ -158,11 +170,14 @@ def check_tree(joints: list[Joint], element: Element) -> None:
                 element, f"link '{joint.child}' is the child of two joints; only trees of links are supported"
             )
         parents[joint.child] = joint.parent
+    # Every link has one parent, so that each way upwards ends in a link that was seen before: in a safe one, or in a loop.
+    safe: set[str] = set()
     for start in parents:
-        chain = [start]
-        while (above := parents.get(chain[-1])) is not None:
-            if above == start:
-                raise complain(element, f"joints close a loop: {' -> '.join(reversed((*chain, above)))}")
-            if above in chain:
-                break
-            chain.append(above)
+        way: dict[str, None] = {}
+        at: str | None = start
+        while at is not None and at not in safe:
+            if at in way:
+                raise complain(element, f"joints close a loop: {shown([*way, at][list(way).index(at) :])}")
+            way[at] = None
+            at = parents.get(at)
+        safe.update(way)

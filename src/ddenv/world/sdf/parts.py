@@ -11,8 +11,6 @@ from ddenv.world.sdf.resources import Missing
 from ddenv.world.sdf.standin import SIZES, StandIn
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
-# Files that include each other can ask for more models than any machine holds.
-MOST_INCLUDES = 20_000
 # What an included file may hold in place of a model, which nothing can touch.
 UNTOUCHABLE = ("actor", "light")
 
@@ -63,9 +61,6 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
         raise complain(include, "has no <uri>")
     if (include.get("merge") or "").strip().lower() in ("true", "1"):
         raise refuse(include, "merge='true' is not supported")
-    context.includes += 1
-    if context.includes > MOST_INCLUDES:
-        raise complain(include, f"more than {MOST_INCLUDES} models are included")
     root = _root(include, uri, context)
     if root is None:
         return None
@@ -94,8 +89,8 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
             return None
         raise complain(
             include,
-            f"'{uri}' was not found ({error}); name its folder with --model-path, or a shape for it with --stand-in "
-            f"'{uri}=box:x,y,z' (or cylinder, sphere, ...), or leave it out with --ignore include",
+            f"'{uri[:200]}' was not found ({error}); name its folder with --model-path, or a shape for it with --stand-in "
+            f"'{uri[:200]}=box:x,y,z' (or cylinder, sphere, ...), or leave it out with --ignore include",
         ) from None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 
 from ddenv.world.model import Mesh
@@ -23,18 +25,20 @@ def read_polyline(geometry: Element, context: Context) -> Mesh:
     filled = abs(polygon_area(outlines[0]))
     if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
         context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
-    return prism(corners, height, f"polyline {elements[0].source}:{elements[0].line}")
+    return prism(corners, height)
 
 
 def _height(element: Element) -> float:
     child = element.find("height")
     height = 1.0 if child is None else numbers(child, 1)[0]
-    if not 0 < height <= 1e6:
-        raise complain(element if child is None else child, f"the height must be above zero, found {height:g}")
+    if not 1e-6 <= height <= 1e6:
+        raise complain(
+            element if child is None else child, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
+        )
     return height
 
 
-def prism(corners: np.ndarray, height: float, origin: str) -> Mesh:
+def prism(corners: np.ndarray, height: float) -> Mesh:
     """The convex outline `corners` (N, 2), anticlockwise, extruded from z = 0 to `height`, m."""
     count = len(corners)
     low = np.column_stack([corners, np.zeros(count)])
@@ -42,4 +46,6 @@ def prism(corners: np.ndarray, height: float, origin: str) -> Mesh:
     walls = [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
     fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
     faces = np.vstack([*walls, fan[:, ::-1], fan + count])
+    # Equal outlines make equal meshes, wherever they stand.
+    origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
     return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))

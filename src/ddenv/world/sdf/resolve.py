@@ -170,7 +170,7 @@ def _configured(text: bytes) -> str:
     except ElementTree.ParseError as error:
         raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
     except DefusedXmlException:
-        raise Unusable("model.config: XML entities are refused") from None
+        raise Unusable("model.config: DOCTYPE is refused") from None
     except (LookupError, ValueError):
         raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
     entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 
 from ddenv.world.model import Mesh
 from ddenv.world.sdf.files import Missing, Unusable, is_folder, read, size_of
-from ddenv.world.sdf.meshes import build, origin, pack, read_parts, unpack
+from ddenv.world.sdf.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
 from ddenv.world.sdf.resolve import find, model_file, search_folders
 from ddenv.world.sdf.triangles import Part
 
@@ -81,7 +81,7 @@ class Disk:
     def _parts(self, path: Path) -> list[Part]:
         if self._last is None or self._last[0] != path:
             size = size_of(path)
-            if size > SLOW_MESH:
+            if SLOW_MESH < size <= MESH_LIMIT:
                 self._tell(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
             self._last = None
             self._last = (path, read_parts(path))

@@ -67,6 +67,6 @@ def _pose(holder: Element) -> Pose | None:
 
 def _scale(element: Element) -> Vector:
     values = numbers(element, 3)
-    if min(values) <= 0 or max(values) > 1e6:
-        raise complain(element, f"a scale must be above zero, found '{text_of(element)[:60]}'")
+    if min(values) < 1e-6 or max(values) > 1e6:
+        raise complain(element, f"a scale must be from 1e-06 to 1e+06, found '{text_of(element)[:60]}'")
     return values  # type: ignore[return-value]

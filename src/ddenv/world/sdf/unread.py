@@ -17,6 +17,9 @@ QUIET: dict[str, frozenset[str]] = {
         "visual": "pose geometry material cast_shadows transparency laser_retro meta visibility_flags",
     }.items()
 }
+ONCE = frozenset(
+    ["pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"]
+)
 REASONS = {
     "plugin": "plugins do not run here",
     "sensor": "only the robot's own sensors are simulated",
@@ -36,7 +39,12 @@ REASONS = {
 def note_unread(element: Element, context: Context) -> None:
     """Notes every child of `element` that is neither read nor without meaning here."""
     quiet = QUIET[element.tag]
+    once: set[str] = set()
     for child in element:
+        if child.tag in ONCE:
+            if child.tag in once:
+                context.note("ignored", child, f"only the first <{child.tag}> counts")
+            once.add(child.tag)
         if child.tag not in quiet:
             extension = "}" in child.tag or ":" in child.tag
             context.note("ignored", child, REASONS.get(child.tag, _unknown(extension)))

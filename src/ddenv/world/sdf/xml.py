@@ -51,9 +51,12 @@ class _Builder(ElementTree.TreeBuilder):
         return element
 
     def end(self, tag):
-        # For `<a/>` expat reports the end at the element's own start: either way the next `>` outside quotes closes it.
-        found = _TAG_END.match(self.text, self.expat.CurrentByteIndex)
-        self.open.pop().end = found.end() if found else len(self.text)
+        element = self.open.pop()
+        # Where expat says that `<a/>` ends depends on its version, so such elements are told by their own tag.
+        found = _TAG_END.match(self.text, element.start)
+        if found and not found.group().endswith(b"/>"):
+            found = _TAG_END.match(self.text, self.expat.CurrentByteIndex)
+        element.end = found.end() if found else len(self.text)
         return super().end(tag)
 
 
@@ -64,7 +67,7 @@ def parse(text: bytes, path: Path) -> Element:
     if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
         raise UserError(f"{path}: is UTF-16 or UTF-32, or no text at all; save it as UTF-8")
     builder = _Builder(text, path)
-    parser = DefusedXMLParser(target=builder, forbid_dtd=False, forbid_entities=True, forbid_external=True)
+    parser = DefusedXMLParser(target=builder, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     builder.expat = parser.parser
     try:
         parser.feed(text)
@@ -74,7 +77,8 @@ def parse(text: bytes, path: Path) -> Element:
         raise UserError(f"{path}:{error.position[0]}: not well-formed XML: {reason}") from None
     except DefusedXmlException:
         line = builder.expat.CurrentLineNumber
-        raise UserError(f"{path}:{line}: XML entities are refused (they can read other files); remove them") from None
+        why = "its entities can read other files and fill the memory"
+        raise UserError(f"{path}:{line}: a DOCTYPE is refused ({why}); remove it") from None
     except (LookupError, ValueError) as error:
         raise UserError(f"{path}: cannot be decoded: {error}; save it as UTF-8") from None
 
@@ -115,8 +119,12 @@ def name_of(element: Element) -> str:
 
 def floats(element: Element) -> tuple[float, ...]:
     """All numbers in the text of `element`, which may be infinite or NaN; none at all if one of the words is no number."""
+    text = element.text or ""
+    # Python would also take 1_000, and the digits of other scripts.
+    if "_" in text or not text.isascii():
+        return ()
     try:
-        return tuple([float(word) for word in (element.text or "").split()])
+        return tuple([float(word) for word in text.split()])
     except ValueError:
         return ()
 

@@ -2,18 +2,17 @@ import math
 
 import numpy as np
 import pytest
-from fake_run import box, world_text
 
-from ddenv.workbench.footprints import convex_hull, footprints
-from ddenv.workbench.raster import EMPTY, View, arrow, braille, fit, heading, masks, owners
-from ddenv.world.read import parse_world
+from ddenv.map.footprints import footprints
+from ddenv.map.raster import EMPTY, View, arrow, braille, fit, heading, masks, owners
+from ddenv.world.outline import convex_hull
+from tests.map.worlds import GROUND, box, world_of
 
 VIEW = View(0.0, 0.0, 0.5, 20, 8)
 
 
 def prints_of(*models: str):
-    text = f'<sdf version="1.9"><world name="w">{"".join(models)}</world></sdf>'.encode()
-    return footprints(parse_world(text, "w.sdf"))
+    return footprints(world_of(*models))
 
 
 def grid_of(*models: str, view: View = VIEW):
@@ -54,9 +53,8 @@ def test_a_model_smaller_than_a_pixel_still_shows():
 
 
 def test_the_ground_is_not_drawn():
-    names = [each.name for each in footprints(parse_world(world_text(), "w.sdf"))]
-    assert "ground_plane" not in names
-    assert names[0] == "floor"
+    names = [each.name for each in prints_of(GROUND, box("crate", 0, 0), box("floor", 0, 0, size=(15, 8, 0.02)))]
+    assert names == ["floor", "crate"]
 
 
 @pytest.mark.parametrize(

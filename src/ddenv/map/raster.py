@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.workbench.footprints import Footprint
+from ddenv.map.footprints import Footprint
 
 EMPTY = -1
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
@@ -57,9 +57,17 @@ def fit(
     rows: int,
     margin: float = 1.0,
 ) -> View:
-    """A view of everything that matters: all `points`, and the models, except huge ones, which are clipped.
+    """A view of everything that matters (see `extent`), with `margin` m around it."""
+    low, high = extent(prints, points)
+    low, high = low - margin, high + margin
+    scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
+    return View(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2, float(scale), columns, rows)
 
-    Huge is a model several times larger than the area that the points and the other models span. `margin` in m.
+
+def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner of all `points` and of the models, but of huge ones, m. Of nothing it is 10 m around zero.
+
+    Huge is a model several times larger than the area that the points and the other models span.
     """
     low, high = np.array([math.inf] * 2), np.array([-math.inf] * 2)
     for point in points:
@@ -71,10 +79,8 @@ def fit(
             break
         low, high = np.minimum(low, each.low), np.maximum(high, each.high)
     if not np.isfinite(low).all():
-        low, high = np.array([-5.0, -5.0]), np.array([5.0, 5.0])
-    low, high = low - margin, high + margin
-    scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
-    return View(float(low[0] + high[0]) / 2, float(low[1] + high[1]) / 2, float(scale), columns, rows)
+        return np.array([-5.0, -5.0]), np.array([5.0, 5.0])
+    return low, high
 
 
 def masks(prints: Sequence[Footprint], view: View) -> list[np.ndarray]:
@@ -100,6 +106,24 @@ def owners(filled: Sequence[np.ndarray], view: View, drawn: Iterable[int] | None
     for index in range(len(filled)) if drawn is None else drawn:
         grid[filled[index]] = index
     return grid.reshape(2 * view.rows, view.columns)
+
+
+def label_cells(grid: np.ndarray, centers: np.ndarray) -> list[tuple[int, int] | None]:
+    """The cell for each model's letter: of those it fills, the one nearest to its centre (pixels); None if none is free."""
+    owned = np.where(grid[0::2] == grid[1::2], grid[0::2], EMPTY)
+    loose = grid[0::2]
+    cells: list[tuple[int, int] | None] = []
+    for index in range(len(centers)):
+        rows, columns = np.nonzero(owned == index)
+        if not len(rows):
+            rows, columns = np.nonzero(loose == index)
+        if not len(rows):
+            cells.append(None)
+            continue
+        away = (columns + 0.5 - centers[index, 0]) ** 2 + (2 * rows + 1 - centers[index, 1]) ** 2
+        best = int(np.argmin(away))
+        cells.append((int(rows[best]), int(columns[best])))
+    return cells
 
 
 def _fill(grid: np.ndarray, corners: np.ndarray) -> None:

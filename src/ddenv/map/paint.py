@@ -1,15 +1,12 @@
-"""Layers of a map as arrays of cells: characters and colours, put on top of each other, then cut into lines of text."""
+"""Layers of a map as arrays of cells: characters and colours, put on top of each other, then cut into runs."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from rich.color import Color
-from rich.segment import Segment
-from rich.style import Style
-from textual.strip import Strip
 
 RGB = tuple[int, int, int]
 # Eight hues that stay apart for colour-blind eyes as far as eight can; parts beyond H repeat them, their letters do not.
@@ -40,6 +37,16 @@ def readable(back: int) -> int:
     """Black or white, whichever reads better on a packed colour."""
     luminance = 0.3 * (back >> 16) + 0.59 * (back >> 8 & 255) + 0.11 * (back & 255)
     return 0x000000 if luminance > 110 else 0xFFFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Neighbouring characters of one row that look alike; `fore` and `back` are packed colours."""
+
+    text: str
+    fore: int
+    back: int
+    bold: bool
 
 
 class Canvas:
@@ -90,23 +97,15 @@ class Canvas:
         )
         return [row for row in rows if not same[row].all()]
 
-    def strip(self, row: int) -> Strip:
+    def text(self, row: int) -> str:
+        """A row without its colours."""
+        return self.chars[row].tobytes().decode("utf-32-le")
+
+    def runs(self, row: int) -> Iterator[Run]:
         """A row as text, cut where the style changes."""
         fore, back, bold = self.fore[row], self.back[row], self.bold[row]
-        text = self.chars[row].tobytes().decode("utf-32-le")
+        text = self.text(row)
         differs = (np.diff(fore) != 0) | (np.diff(back) != 0) | (bold[1:] != bold[:-1])
         cuts = [0, *(np.flatnonzero(differs) + 1).tolist(), len(text)]
-        segments = [
-            Segment(text[start:end], _style(int(fore[start]), int(back[start]), bool(bold[start])))
-            for start, end in pairwise(cuts)
-        ]
-        return Strip(segments, len(text))
-
-
-@lru_cache(maxsize=4096)
-def _style(fore: int, back: int, bold: bool) -> Style:
-    return Style(color=_color(fore), bgcolor=_color(back), bold=bold)
-
-
-def _color(value: int) -> Color:
-    return Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)
+        for start, end in pairwise(cuts):
+            yield Run(text[start:end], int(fore[start]), int(back[start]), bool(bold[start]))

@@ -1,0 +1,99 @@
+"""Drives through a field of loose boards, with and without letting those sleep that nobody comes near.
+
+    python benchmarks/sleeping.py [--boards N] [--seconds S]
+
+Each world has N boards (2 kg, 0.9 m long): every tenth lies across the robot's way, the others are piled up in threes beside it,
+two with a third across them. The first run in a world also rehearses how each pile settles alone; later runs reuse that.
+"""
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+from ddenv.robot.template import Template
+from ddenv.world.bundled import SDF
+from ddenv.world.load import validate
+from ddenv.world.model import World
+from ddenv.world.read import parse_world, read_model
+
+SIZE = (0.9, 0.09, 0.04)  # m
+MASS = 2.0  # kg
+GROUND = (
+    '<model name="ground"><static>true</static><link name="link"><collision name="c"><geometry><plane>'
+    "<normal>0 0 1</normal></plane></geometry></collision></link></model>"
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--boards", type=int, default=60)
+    parser.add_argument("--seconds", type=float, default=12.0)
+    arguments = parser.parse_args()
+    print("| boards | first run, s a simulated s | later runs, s a simulated s | without sleeping | faster |")
+    print("|---|---|---|---|---|")
+    for boards in sorted({10, 30, arguments.boards}):
+        print(row(boards, arguments.seconds), flush=True)
+
+
+def row(boards: int, seconds: float) -> str:
+    template = template_of(field(boards), seconds)
+    everything = frozenset(f"board_{number}" for number in range(boards))
+    first, later = (cost(template, everything) for _ in range(2))
+    template._sleeping = False
+    without = cost(template, everything)
+    return f"| {boards} | {first:.3f} | {later:.3f} | {without:.3f} | {without / later:.1f} |"
+
+
+def cost(template: Template, keep: frozenset[str]) -> float:
+    """Wall time (s) for each simulated second of a run, with the rehearsals it needs."""
+    started = time.perf_counter()
+    result = template.run(keep, seed=1)
+    return (time.perf_counter() - started) / result.simulated_seconds
+
+
+def template_of(world: World, seconds: float) -> Template:
+    scenario = validate(
+        {
+            "name": "boards",
+            "world": "boards.sdf",
+            "robot": {"model": "husky.sdf", "spawn": {"x": -2, "y": 0, "z": 0.14}},
+            "goal": {"x": 40, "y": 0},
+            "failure": {"timeout": seconds},
+        },
+        "sleeping",
+    )
+    return Template(world, read_model(SDF / "robots" / "husky.sdf"), scenario)
+
+
+def field(boards: int) -> World:
+    """A flat world with `boards` boards along the x axis."""
+    models = [board(number, *place(number)) for number in range(boards)]
+    text = f'<sdf version="1.9"><world name="boards">{GROUND}{"".join(models)}</world></sdf>'
+    return parse_world(text.encode(), Path("boards.sdf"))
+
+
+def place(number: int) -> tuple[float, float, float, float]:
+    """x, y, z (m) and yaw (rad) of a board."""
+    if number % 10 == 0:
+        return 0.15 * number, 0.0, SIZE[2] / 2, math.pi / 2
+    pile, storey = divmod(number, 3)
+    x, y = 0.6 * pile, 2.0 if pile % 2 else -2.0
+    if storey == 2:
+        return x, y + 0.15, SIZE[2] * 1.5, math.pi / 2
+    return x, y + 0.3 * storey, SIZE[2] / 2, 0.0
+
+
+def board(number: int, x: float, y: float, z: float, yaw: float) -> str:
+    a, b, c = SIZE
+    inertia = [MASS * (b * b + c * c) / 12, MASS * (a * a + c * c) / 12, MASS * (a * a + b * b) / 12]
+    moments = "".join(f"<{name}>{value}</{name}>" for name, value in zip(("ixx", "iyy", "izz"), inertia, strict=True))
+    return (
+        f'<model name="board_{number}"><pose>{x} {y} {z} 0 0 {yaw}</pose><link name="link"><inertial><mass>{MASS}</mass>'
+        f'<inertia>{moments}</inertia></inertial><collision name="c"><geometry><box><size>{a} {b} {c}</size></box></geometry>'
+        "</collision></link></model>"
+    )
+
+
+if __name__ == "__main__":
+    main()

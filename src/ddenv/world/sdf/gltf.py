@@ -1,0 +1,138 @@
+"""glTF 2.0 files (.gltf, .glb) through trimesh, in the axes of the file.
+
+glTF is Y-up, but Gazebo takes its coordinates as they are, as it does for every format: the `<pose>` in the SDF turns the mesh
+up. So do we. trimesh is given a header with nothing but the shape: it would decode images, drop what stands below a camera,
+and read as zeros, or as something else, what it does not know.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from ddenv.world.sdf.files import Unusable, read
+from ddenv.world.sdf.triangles import MOST_FACES, MOST_PARTS, Part, parts_of
+
+# How positions are stored (32-bit floats), and numbers of vertices (8, 16 and 32 bits).
+_POSITIONS = ("VEC3", (5126,))
+_INDICES = ("SCALAR", (5121, 5123, 5125))
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_PLACE = ("children", "matrix", "translation", "rotation", "scale")
+# What takes the place of an accessor that is not read.
+_NOTHING = {"componentType": 5126, "count": 0, "type": "SCALAR"}
+
+
+def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
+    """Every mesh of every node in the scene, named by its node and its mesh.
+
+    Buffers beside the file, in `folder`, are read too, of up to `limit` bytes. Raises ValueError or Unusable, and for files of
+    the wrong structure whatever trimesh trips over.
+    """
+    import trimesh
+
+    is_binary = data.startswith(b"glTF")
+    # A .glb has its header in a first chunk, after 12 bytes, the size of the chunk and its type.
+    end = 20 + int.from_bytes(data[12:16], "little")
+    header = json.loads(data[20:end] if is_binary else data)
+    text = json.dumps(_shape(header, limit), allow_nan=False).encode()
+    if is_binary:
+        text = data[:12] + len(text).to_bytes(4, "little") + data[16:20] + text + data[end:]
+    uris = {each["uri"] for each in header["buffers"] if "base64," not in each.get("uri", "base64,")}
+    buffers = {uri: _buffer(uri, folder, limit) for uri in uris}
+    scene = trimesh.load_scene(BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False)
+    # trimesh adds random letters to the numbers of nodes with several primitives.
+    placed = [(int(mesh.metadata["node"].partition("_")[0]), mesh) for mesh in scene.dump()]
+    nodes, meshes = header["nodes"], header["meshes"]
+    return parts_of(
+        ((str(nodes[number].get("name", "")), str(meshes[nodes[number]["mesh"]].get("name", ""))), mesh)
+        for number, mesh in sorted(placed, key=lambda pair: pair[0])
+    )
+
+
+def _buffer(uri: str, folder: Path, limit: int) -> bytes:
+    """The bytes of a buffer in a file of the same folder."""
+    name = os.path.normpath(unquote(uri, errors="surrogateescape"))
+    if ":" in name or name.startswith(("/", "..")) or "\0" in name:
+        raise ValueError(f"buffer '{uri[:60]}' is outside the file's folder")
+    try:
+        return read(folder / name, limit)
+    except Unusable as error:
+        raise Unusable(f"buffer '{uri[:60]}' {error}") from None
+
+
+def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
+    """The header of the triangles and their places alone; nodes are called by their numbers."""
+    if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
+        raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
+    accessors, views, nodes = header["accessors"], header["bufferViews"], header["nodes"]
+    # numpy counts those below zero from the end, and trimesh leaves out such a mesh.
+    counts = ("byteOffset", "byteLength", "count", "mesh")
+    if any(each.get(key, 0) < 0 for each in (*accessors, *views, *nodes) for key in counts):
+        raise ValueError("has numbers below zero")
+    # Each view becomes a copy of its bytes.
+    if sum(each["byteLength"] for each in views) > limit:
+        raise ValueError("its buffer views are larger than its buffers")
+    meshes = [list(_primitives(mesh, accessors)) for mesh in header["meshes"]]
+    # Primitives may share their numbers, so a small file can have any number of triangles.
+    placed = [primitive for node in nodes if "mesh" in node for primitive in meshes[node["mesh"]]]
+    for primitives in (placed, [primitive for mesh in meshes for primitive in mesh]):
+        if sum(_size(each, accessors) for each in primitives) > MOST_FACES or len(primitives) > MOST_PARTS:
+            raise ValueError(f"has more than {MOST_FACES} triangles")
+    used = {
+        number for mesh in meshes for each in mesh for number in (*each["attributes"].values(), each.get("indices"))
+    }
+    return {
+        "asset": {"version": header["asset"]["version"]},
+        "scenes": [{"nodes": _roots(header)}],
+        "nodes": [_node(number, node, meshes) for number, node in enumerate(nodes)],
+        "meshes": [{"primitives": mesh} for mesh in meshes],
+        "accessors": [each if number in used else _NOTHING for number, each in enumerate(accessors)],
+        "bufferViews": views,
+        "buffers": header["buffers"],
+    }
+
+
+def _primitives(mesh: dict[str, Any], accessors: list[dict]) -> Iterator[dict[str, Any]]:
+    """The triangles of a mesh, without points and lines, normals, colors and materials."""
+    for primitive in mesh["primitives"]:
+        mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
+        if mode == _FAN:
+            raise ValueError("triangle fans are not supported")
+        if mode not in (_TRIANGLES, _STRIP) or position is None:
+            continue
+        indices = {"indices": primitive["indices"]} if "indices" in primitive else {}
+        for number, (kind, codes) in ((position, _POSITIONS), *((number, _INDICES) for number in indices.values())):
+            accessor = accessors[number]
+            plain = "bufferView" in accessor and "sparse" not in accessor
+            if not plain or accessor["type"] != kind or accessor["componentType"] not in codes:
+                raise ValueError(f"accessor {number} is of a kind that is not supported")
+        yield {"mode": mode, "attributes": {"POSITION": position}, **indices}
+
+
+def _size(primitive: dict[str, Any], accessors: list[dict]) -> int:
+    """The number of its vertices or of its triangles, at most, whichever is more."""
+    corners = accessors[primitive["indices"]]["count"] if "indices" in primitive else 0
+    faces = corners // 3 if primitive["mode"] == _TRIANGLES else corners
+    return max(accessors[primitive["attributes"]["POSITION"]]["count"], faces)
+
+
+def _roots(header: dict[str, Any]) -> list[int]:
+    """The topmost nodes of the scene. Raises ValueError where a node is met twice."""
+    nodes = header["nodes"]
+    roots = header["scenes"][header.get("scene", 0)]["nodes"]
+    listed = [*roots, *(child for node in nodes for child in node.get("children", []))]
+    # glTF demands a tree; of a node with two parents, trimesh keeps one.
+    if len(set(listed)) < len(listed) or not set(listed) <= {*range(len(nodes))} or len(nodes) > MOST_PARTS:
+        raise ValueError("its nodes are no tree")
+    return roots
+
+
+def _node(number: int, node: dict[str, Any], meshes: list[list[dict]]) -> dict[str, Any]:
+    """trimesh forgets the place of a node whose mesh has no triangles, and with it all below."""
+    mesh = {"mesh": node["mesh"]} if "mesh" in node and meshes[node["mesh"]] else {}
+    return {"name": str(number), **{key: node[key] for key in _PLACE if key in node}, **mesh}

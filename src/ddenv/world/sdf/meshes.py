@@ -1,0 +1,167 @@
+"""Mesh files (obj, stl, dae, gltf, glb) as `Mesh` of the world model, and a compact form of those to keep in a run file.
+
+The coordinates are those that Gazebo gives a mesh: the axes of the file whatever it says of "up", `<unit>` of a .dae applied, all
+instances of a scene placed and joined. Nothing but the mesh file (and the buffers of a .gltf) is opened.
+
+Limits, most of them trimesh's: a .dae is read with 32-bit numbers, and refused if it has no scene, if its positions are stored
+with gaps or without the names of their axes, or if a texture's or normal's numbers are missing. A .gltf is refused if it has no
+scene, triangle fans, or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.world.model import Mesh
+from ddenv.world.sdf.dae import read_dae
+from ddenv.world.sdf.files import Unusable, read
+from ddenv.world.sdf.gltf import read_gltf
+from ddenv.world.sdf.hull import convex_hull
+from ddenv.world.sdf.obj_stl import read_obj, read_stl
+from ddenv.world.sdf.triangles import MOST_FACES, Part, chosen, joined
+
+SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
+MESH_LIMIT = 200_000_000
+# Above this a visual is drawn as its hull: a browser would stall on the triangles.
+MOST_DRAWN = 50_000
+FARTHEST = 1e6
+_MAGIC = b"ddmesh1\0"
+_HEADER = struct.Struct("<8sIII")
+
+
+def read_parts(path: Path) -> list[Part]:
+    """The named parts of a mesh file, as triangles. Raises Unusable, with a reason in one line."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise Unusable(f"meshes of type '{suffix[:20]}' are not supported; use one of {', '.join(SUFFIXES)}")
+    data = read(path, MESH_LIMIT)
+    try:
+        with _quiet():
+            return _read(suffix, data, path.parent)
+    except Unusable:
+        raise
+    except MemoryError:
+        raise Unusable("needs more memory than there is") from None
+    except RecursionError:
+        reason = "it is nested too deeply"
+    except KeyError as error:
+        reason = f"it has no {error}"
+    # Whatever a reader trips over, the file is to blame: it may hold anything.
+    except Exception as error:
+        reason = str(error) or "its numbers do not fit together"
+    raise Unusable(f"is not a valid {suffix[1:].upper()} file: {_line(reason)}") from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Nothing on the terminal from the libraries, and an error where an older numpy stops amid numbers with a warning only."""
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", message="string or file could not be read")
+        yield
+
+
+def _read(suffix: str, data: bytes, folder: Path) -> list[Part]:
+    if suffix == ".obj":
+        return read_obj(data)
+    if suffix == ".stl":
+        return read_stl(data)
+    if suffix == ".dae":
+        return read_dae(data)
+    return read_gltf(data, folder, MESH_LIMIT)
+
+
+def _line(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 200 else text[:199] + "…"
+
+
+def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
+    """The mesh of all `parts`, or of those called `submesh`.
+
+    `center` moves the middle of its bounding box to the origin. A `convex` mesh is the hull, of at most 256 vertices, and so is one
+    of more than 50,000 faces. `name` begins its `origin`. Raises Unusable.
+    """
+    try:
+        vertices, faces = _checked(*joined(chosen(parts, submesh)))
+        if center:
+            vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        # Adding zero makes -0.0 the same as 0.0.
+        vertices = vertices + 0.0
+        vertices, faces = convex_hull(vertices) if convex or len(faces) > MOST_DRAWN else _merged(vertices, faces)
+    except ValueError as error:
+        raise Unusable(_line(str(error))) from None
+    return _mesh(name, pack(vertices, faces))
+
+
+def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every place once."""
+    unique, places = np.unique(vertices, axis=0, return_inverse=True)
+    return unique, places.reshape(-1)[faces]
+
+
+def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same, with sound numbers. Raises ValueError."""
+    if not len(faces):
+        raise ValueError("has no triangles")
+    if len(faces) > MOST_FACES:
+        raise ValueError(f"has more than {MOST_FACES} triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError("has faces with vertices that are not there")
+    if not np.isfinite(vertices).all():
+        raise ValueError("has vertices that are no finite numbers")
+    if np.abs(vertices).max() > FARTHEST:
+        raise ValueError(f"has vertices farther than {FARTHEST:.0f} m from its origin")
+    return vertices, faces
+
+
+def pack(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+    """Header, vertices and faces, little-endian; vertices in 32 bits where that loses nothing, as for most files."""
+    short = vertices.astype("<f4")
+    kept = short if np.array_equal(short.astype("<f8"), vertices) else vertices.astype("<f8")
+    header = _HEADER.pack(_MAGIC, kept.itemsize, len(vertices), len(faces))
+    return header + kept.tobytes() + faces.astype("<u4").tobytes()
+
+
+def unpack(name: str, packed: bytes) -> Mesh:
+    """The mesh that was packed: equal to the one that `build` gave. Raises Unusable for anything else than a sound mesh."""
+    size, vertices, faces = (0, 0, 0)
+    if len(packed) >= _HEADER.size and packed.startswith(_MAGIC):
+        _, size, vertices, faces = _HEADER.unpack_from(packed)
+    if size not in (4, 8) or len(packed) != _HEADER.size + 3 * size * vertices + 12 * faces:
+        raise Unusable("its stored mesh is damaged")
+    try:
+        _checked(*_arrays(packed))
+    except ValueError as error:
+        raise Unusable(f"its stored mesh is damaged: {error}") from None
+    return _mesh(name, packed)
+
+
+def _arrays(packed: bytes) -> tuple[np.ndarray, np.ndarray]:
+    _, size, vertices, faces = _HEADER.unpack_from(packed)
+    start = _HEADER.size + 3 * size * vertices
+    points = np.frombuffer(packed, f"<f{size}", 3 * vertices, _HEADER.size).reshape(-1, 3).astype(np.float64)
+    return points, np.frombuffer(packed, "<u4", 3 * faces, start).reshape(-1, 3).astype(np.uint32)
+
+
+def _mesh(name: str, packed: bytes) -> Mesh:
+    """A mesh with arrays that cannot be written to; the digest of its content tells files of one name apart."""
+    vertices, faces = _arrays(packed)
+    vertices.flags.writeable = False
+    faces.flags.writeable = False
+    return Mesh(f"{name} {hashlib.blake2b(packed, digest_size=8).hexdigest()}", vertices, faces)
+
+
+def origin(uri: str, submesh: str, center: bool, convex: bool) -> str:
+    """What a mesh is called, before its content is added."""
+    return json.dumps([uri, submesh, center, convex])

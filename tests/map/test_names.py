@@ -1,0 +1,47 @@
+"""Numbers and names fit for a map."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.map.names import padded, shortened, width
+from ddenv.map.ticks import tick_step, tick_text, ticks
+
+
+@given(st.text(max_size=60), st.integers(0, 40))
+def test_a_name_fits_and_steers_nothing(name, columns):
+    short = shortened(name, columns)
+    assert width(short) <= columns
+    assert short.isprintable()
+    assert width(padded(short, columns)) == columns
+
+
+def test_copies_of_a_model_stay_apart():
+    assert shortened("frc2016_roughterrain_clone_12", 13) == "frc201…one_12"
+    assert shortened("crate", 5) == "crate"
+
+
+def test_wide_characters_take_two_columns():
+    assert width("日本") == 4
+    assert shortened("日本語の名前", 7) == "日本…前"
+
+
+@given(st.floats(0.001, 1e6), st.integers(1, 40))
+def test_a_step_is_round_and_not_too_small(span, most):
+    step = tick_step(span, most)
+    assert f"{step:e}"[0] in "125"
+    assert len(ticks(0, span, step)) - 1 <= most
+    assert tick_step(span, most) <= 2.5 * span / most * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "step", "texts"),
+    [(-1, 1, 0.5, ["-1.0", "-0.5", "0.0", "0.5", "1.0"]), (3, 21, 5, ["5", "10", "15", "20"]), (0.1, 0.3, 1, [])],
+)
+def test_numbers_along_an_axis(low, high, step, texts):
+    assert [tick_text(value, step) for value in ticks(low, high, step)] == texts
+
+
+@pytest.mark.parametrize("span", [0.0, float("inf"), float("nan")])
+def test_a_span_that_is_none_has_a_step_too(span):
+    assert tick_step(span, 5) == 1

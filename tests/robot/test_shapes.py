@@ -1,0 +1,101 @@
+"""Shapes of collisions: the robot runs into them, and moving ones lie where they should without creeping."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ddenv.robot.shapes import CORNER_RADIUS, corners_of
+from ddenv.robot.template import Template, lowest
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
+from ddenv.world.pose import Pose
+from tests.robot.conftest import link_of, model_of, wedge
+
+CUBE = np.array([(x, y, z) for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)])
+SQUARES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+HULL = Mesh("cube", CUBE, np.array([face for a, b, c, d in SQUARES for face in ((a, b, c), (a, c, d))]))
+ACROSS = Pose.from_rpy(0, 0, 0, np.pi / 2, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("shape", "turn", "front"),
+    [
+        (Mesh("wall", CUBE * (1, 10, 5), HULL.faces), Pose(), 0.2),
+        (Capsule(0.3, 3.0), ACROSS, 0.3),
+        (Ellipsoid((0.2, 2.0, 1.5)), Pose(), 0.2),
+        (Cylinder(0.3, 3.0), ACROSS, 0.3),
+    ],
+    ids=["mesh", "capsule", "ellipsoid", "cylinder"],
+)
+def test_the_robot_is_stopped(world_of, add, husky, scenario_of, shape, turn, front):
+    wall = model_of("wall", link_of("link", shape, Pose((2.0, 0.0, 0.35)) @ turn, mass=None))
+    template = Template(add(world_of(), wall), husky, scenario_of(failure={"timeout": 5.0}))
+    blocked = template.run(frozenset({"wall"}), seed=1)
+    assert (blocked.outcome, blocked.failure) == ("failed", "timeout")
+    # The robot reaches 0.5 m ahead of its frame; it comes up to the wall, and not through it.
+    assert 2.0 - front - 0.7 < blocked.trajectory[:, 1].max() < 2.0 - front - 0.3
+    assert template.run(frozenset(), seed=1).outcome == "pass"
+
+
+def test_the_robot_drives_up_a_mesh(world_of, add, husky, scenario_of):
+    ramp = model_of("ramp", link_of("link", wedge(3.0, 3.0, 0.5), Pose((2.5, 0.0, 0.25)), mass=None, mu=1.5))
+    template = Template(add(world_of(), ramp), husky, scenario_of(goal={"x": 3.0, "y": 0.0, "tolerance": 0.3}))
+    end = template.run(frozenset({"ramp"}), seed=1)
+    assert end.outcome == "pass"
+    assert end.end_position[2] > 0.4
+
+
+@pytest.mark.parametrize(
+    ("shape", "turn", "height"),
+    [
+        (Box((0.4, 0.4, 0.4)), Pose(), 0.2),
+        (Cylinder(0.2, 0.3), Pose(), 0.15),
+        (Sphere(0.2), Pose(), 0.2),
+        (Capsule(0.2, 0.4), ACROSS, 0.2),
+        (Ellipsoid((0.3, 0.2, 0.1)), Pose(), 0.1),
+        (HULL, Pose(), 0.2),
+    ],
+    ids=["box", "cylinder", "sphere", "capsule", "ellipsoid", "mesh"],
+)
+def test_a_moving_shape_falls_and_then_rests_on_the_ground(world_of, add, husky, scenario_of, shape, turn, height):
+    thing = model_of("thing", link_of("link", shape, Pose((0.0, 3.0, height + 0.02)) @ turn))
+    template = Template(add(world_of(), thing), husky, scenario_of(failure={"timeout": 3.0}, goal={"x": 9, "y": 0}))
+    template._sleeping = False
+    rows = template.run(frozenset({"thing"}), seed=1).motions["thing"]
+    assert rows[-1, 1:4] == pytest.approx([0.0, 3.0, height], abs=0.003)
+    # Where it came to rest it stays, although nothing lets it sleep here.
+    assert np.linalg.norm(rows[-1, 1:4] - rows[10, 1:4]) < 0.002
+
+
+@pytest.mark.parametrize("shape", [Box((0.4, 0.3, 0.2)), Cylinder(0.2, 0.3), HULL, wedge(0.4, 0.5, 0.3)])
+def test_corner_spheres_lie_just_inside(shape):
+    low, high = shape_bounds(shape, Pose())
+    corners = np.array(corners_of(shape))
+    assert (corners.min(axis=0) - CORNER_RADIUS >= low - 1e-9).all()
+    assert (corners.max(axis=0) + CORNER_RADIUS <= high + 1e-9).all()
+    assert corners.min(axis=0) - CORNER_RADIUS == pytest.approx(low, abs=0.007)
+    assert corners.max(axis=0) + CORNER_RADIUS == pytest.approx(high, abs=0.007)
+
+
+def test_a_mesh_of_many_corners_gets_32_spread_over_it():
+    turns = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    rim = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
+    vertices = np.vstack([rim, rim + np.array([0, 0, 1])])
+    number = np.arange(100)
+    after = (number + 1) % 100
+    sides = [np.column_stack(three) for three in ((number, after, after + 100), (number, after + 100, number + 100))]
+    caps = [np.column_stack([np.full(98, 0), number[2:], number[1:-1]])]
+    caps += [np.column_stack([np.full(98, 100), number[1:-1] + 100, number[2:] + 100])]
+    corners = np.array(corners_of(Mesh("drum", vertices, np.vstack([*sides, *caps]))))
+    assert len(corners) == 32
+    assert np.linalg.norm(corners[:, :2], axis=1) == pytest.approx(np.ones(32), abs=0.01)
+    for end in (corners[corners[:, 2] < 0.5], corners[corners[:, 2] > 0.5]):
+        angles = np.sort(np.arctan2(end[:, 1], end[:, 0]))
+        assert np.diff([*angles, angles[0] + 2 * np.pi]).max() < 1.0
+
+
+def test_nothing_of_a_world_is_lower_than_its_lowest_surface(world_of, add):
+    pit = model_of("pit", link_of("link", wedge(1.0, 1.0, 1.0), Pose((0.0, 0.0, -4.0)), mass=None))
+    assert lowest(add(world_of(), pit)) == pytest.approx(-4.5)
+    assert lowest(world_of()) == 0.0
