@@ -13,10 +13,10 @@ from ddenv.errors import UserError
 from ddenv.launch.scenarios import load_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
+from ddenv.world.files.resources import Stored
 from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world, read_bytes
 from ddenv.world.scenario import Scenario
-from ddenv.world.sdf.resources import Stored
 from ddenv.world.write import without, write_file
 
 SUFFIX = ".ddenv"

@@ -179,7 +179,7 @@ class World:
     """An SDF world. `text` is the file as it was read; `models` are in the file's order; `gravity` is in m/s^2.
 
     `anchors` names models that others are placed relative to: without them the file could not be read any more. `resources`
-    holds what was read of other files (`ddenv.world.sdf.resources`), so that `text` can be read again without them.
+    holds what was read of other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
     """
 
     path: Path

@@ -12,13 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.world.files.resources import Disk, Resources
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import assemble
 from ddenv.world.sdf.context import Context, sdf_root
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.resources import Disk, Resources
 from ddenv.world.sdf.state import Saved, read_state
 from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ddenv.errors import UserError
+from ddenv.world.files.resources import Resources, Unusable
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
-from ddenv.world.sdf.resources import Resources, Unusable
 from ddenv.world.sdf.standin import StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, parse, place
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv.world.files.resources import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.polyline import read_polyline
-from ddenv.world.sdf.resources import Missing, Unusable
 from ddenv.world.sdf.standin import SIZES
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 

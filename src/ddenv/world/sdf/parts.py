@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ddenv.world.files.resources import Missing
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from ddenv.world.sdf.context import Context, refuse, sdf_root
-from ddenv.world.sdf.resources import Missing
 from ddenv.world.sdf.standin import SIZES, StandIn
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 

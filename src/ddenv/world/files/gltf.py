@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ddenv.world.sdf.files import Unusable, read
-from ddenv.world.sdf.triangles import MOST_FACES, MOST_PARTS, Part, parts_of
+from ddenv.world.files.access import Unusable, read
+from ddenv.world.files.triangles import MOST_FACES, MOST_PARTS, Part, parts_of
 
 # How positions are stored (32-bit floats), and numbers of vertices (8, 16 and 32 bits).
 _POSITIONS = ("VEC3", (5126,))

@@ -11,7 +11,7 @@ import math
 from io import BytesIO
 from xml.etree.ElementTree import Element, ParseError, SubElement, tostring
 
-from ddenv.world.sdf.triangles import Part, parts_of
+from ddenv.world.files.triangles import Part, parts_of
 
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 TRANSFORMS = ("matrix", "translate", "scale")

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from ddenv.world.sdf.files import Unusable
-from ddenv.world.sdf.meshes import read_parts
-from tests.world.sdf.mesh_files import bounds, dae, mesh_of, solid
+from ddenv.world.files.access import Unusable
+from ddenv.world.files.meshes import read_parts
+from tests.world.files.mesh_files import bounds, dae, mesh_of, solid
 
 
 @pytest.mark.parametrize("axis", ["X_UP", "Y_UP", "Z_UP"])

@@ -10,8 +10,8 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ddenv.world.sdf import fuel
-from ddenv.world.sdf.files import Missing, Unusable, is_folder, read, reason, without_tilde
+from ddenv.world.files import fuel
+from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason, without_tilde
 
 ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 # The newest SDF that is understood: a model's folder may hold one file for each version.
@@ -170,7 +170,7 @@ def _configured(text: bytes) -> str:
     except ElementTree.ParseError as error:
         raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
     except DefusedXmlException:
-        raise Unusable("model.config: DOCTYPE is refused") from None
+        raise Unusable("model.config: a DOCTYPE is refused (its entities can read other files)") from None
     except (LookupError, ValueError):
         raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
     entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]

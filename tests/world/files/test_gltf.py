@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from ddenv.world.sdf.files import Unusable
-from tests.world.sdf.mesh_files import BOX, bounds, gltf, mesh_of, solid
+from ddenv.world.files.access import Unusable
+from tests.world.files.mesh_files import BOX, bounds, gltf, mesh_of, solid
 
 
 def test_gltf_keeps_its_axes_and_places_instances(tmp_path):
@@ -136,7 +136,7 @@ def test_hostile_gltf(tmp_path, case, capfd):
 
 
 def test_triangles_shared_by_many_primitives_are_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr("ddenv.world.sdf.gltf.MOST_FACES", 1000)
+    monkeypatch.setattr("ddenv.world.files.gltf.MOST_FACES", 1000)
     primitive = {"attributes": {"POSITION": 0}, "indices": 1}
     with pytest.raises(Unusable, match="more than 1000 triangles"):
         mesh_of(tmp_path / "a.gltf", gltf(meshes=[{"primitives": [primitive] * 500}])[0])

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddenv.world.sdf.files import Missing, Unusable, read
-from ddenv.world.sdf.resolve import ENVIRONMENT, find, model_file, search_folders
+from ddenv.world.files.access import Missing, Unusable, read
+from ddenv.world.files.resolve import ENVIRONMENT, find, model_file, search_folders
 
 
 @pytest.fixture(autouse=True)

@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from ddenv.world.files.access import Missing, Unusable, is_folder, read, size_of
+from ddenv.world.files.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
+from ddenv.world.files.resolve import find, model_file, search_folders
+from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
-from ddenv.world.sdf.files import Missing, Unusable, is_folder, read, size_of
-from ddenv.world.sdf.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
-from ddenv.world.sdf.resolve import find, model_file, search_folders
-from ddenv.world.sdf.triangles import Part
 
 __all__ = ["Disk", "Missing", "Resources", "Stored", "Unusable"]
 
 SDF_LIMIT = 50_000_000
 # A mesh of more bytes takes long enough to be announced.
-SLOW_MESH = 1_000_000
+SLOW_MESH = 3_000_000
 
 Answer = TypeVar("Answer")
 

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import trimesh
 
-from ddenv.world.sdf.meshes import build, read_parts
+from ddenv.world.files.meshes import build, read_parts
 
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)]

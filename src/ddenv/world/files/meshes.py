@@ -21,13 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.world.files.access import Unusable, read
+from ddenv.world.files.dae import read_dae
+from ddenv.world.files.gltf import read_gltf
+from ddenv.world.files.hull import convex_hull
+from ddenv.world.files.obj_stl import read_obj, read_stl
+from ddenv.world.files.triangles import MOST_FACES, Part, chosen, joined
 from ddenv.world.model import Mesh
-from ddenv.world.sdf.dae import read_dae
-from ddenv.world.sdf.files import Unusable, read
-from ddenv.world.sdf.gltf import read_gltf
-from ddenv.world.sdf.hull import convex_hull
-from ddenv.world.sdf.obj_stl import read_obj, read_stl
-from ddenv.world.sdf.triangles import MOST_FACES, Part, chosen, joined
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 MESH_LIMIT = 200_000_000

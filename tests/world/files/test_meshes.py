@@ -8,10 +8,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddenv.world.sdf import meshes
-from ddenv.world.sdf.files import Unusable
-from ddenv.world.sdf.meshes import SUFFIXES, read_parts
-from tests.world.sdf.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
+from ddenv.world.files import meshes
+from ddenv.world.files.access import Unusable
+from ddenv.world.files.meshes import SUFFIXES, read_parts
+from tests.world.files.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
 
 
 @pytest.mark.parametrize("suffix", ["obj", "stl", "stl_ascii", "glb"])
@@ -228,7 +228,7 @@ def test_same_bytes_in_every_process(tmp_path):
     (tmp_path / "c.gltf").write_text(gltf(meshes=[{"primitives": [triangles] * 4}], nodes=nodes)[0])
     text = f"""
 from pathlib import Path
-from ddenv.world.sdf.meshes import build, read_parts
+from ddenv.world.files.meshes import build, read_parts
 for path in sorted(Path({str(tmp_path)!r}).iterdir()):
     print([build(read_parts(path), "", convex=convex).origin for convex in (False, True)])
 """
@@ -238,8 +238,8 @@ for path in sorted(Path({str(tmp_path)!r}).iterdir()):
 def test_nothing_slow_is_imported_before_it_is_needed():
     text = """
 import sys, numpy
-from ddenv.world.sdf.meshes import origin, pack
-from ddenv.world.sdf.resources import Stored, _key
+from ddenv.world.files.meshes import origin, pack
+from ddenv.world.files.resources import Stored, _key
 points, faces = numpy.eye(3), numpy.array([[0, 1, 2]])
 stored = Stored({_key(("mesh", "a.obj", "/", "", False, True)): pack(points, faces)})
 assert stored.mesh("a.obj", "/", convex=True).faces.tolist() == faces.tolist()

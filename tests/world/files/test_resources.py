@@ -5,9 +5,9 @@ import time
 import numpy as np
 import pytest
 
-from ddenv.world.sdf import resources
-from ddenv.world.sdf.meshes import pack
-from ddenv.world.sdf.resources import Disk, Missing, Stored, Unusable
+from ddenv.world.files import resources
+from ddenv.world.files.meshes import pack
+from ddenv.world.files.resources import Disk, Missing, Stored, Unusable
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]
@@ -108,12 +108,12 @@ def test_limits(world, monkeypatch):
 
 def test_tells_before_something_slow(world):
     told = []
-    (world / "big.obj").write_text(CUBE + "\n#" + "x" * 2_500_000)
+    (world / "big.obj").write_text(CUBE + "\n#" + "x" * 3_500_000)
     disk = Disk(world, tell=told.append)
     disk.mesh("cube.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=False)
-    assert told == ["reading mesh big.obj (3 MB)"]
+    assert told == ["reading mesh big.obj (4 MB)"]
 
 
 def damaged(packed: bytes):

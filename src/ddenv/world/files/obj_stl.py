@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 
-from ddenv.world.sdf.triangles import Part, parts_of
+from ddenv.world.files.triangles import Part, parts_of
 
 
 def read_obj(data: bytes) -> list[Part]:

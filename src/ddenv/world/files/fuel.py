@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from ddenv.world.sdf.files import without_tilde
+from ddenv.world.files.access import without_tilde
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
