@@ -45,11 +45,11 @@ class Session:
 
 
 class Opened:
-    def __init__(self, size=(120, 36)):
-        self.size = size
+    def __init__(self, size=(120, 36), reading=None):
+        self.size, self.reading = size, reading
 
     async def __aenter__(self):
-        app = Workbench()
+        app = Workbench(reading=self.reading)
         self._context = app.run_test(size=self.size)
         pilot = await self._context.__aenter__()
         await pilot.pause()
@@ -248,3 +248,26 @@ async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
 async def test_too_small(scenarios):
     async with Opened((40, 10)) as session:
         assert session.screen.query_one("#small").display
+
+
+LOST = (
+    "<model name='barrel'><static>1</static><pose>3 0 0 0 0 0</pose><link name='l'><collision name='c'><geometry><mesh>"
+    "<uri>model://barrel/barrel.dae</uri></mesh></geometry></collision></link></model>"
+)
+
+
+async def test_what_cannot_be_found_is_told_with_the_remedy_that_the_workbench_takes(scenarios, tmp_path, started):
+    path = tmp_path / "depot.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>{LOST}</world></sdf>")
+    async with Opened() as session:
+        session.screen._opened(path)
+        await session.settle()
+        assert "--stand-in 'model://barrel=cylinder:radius,length'" in session.screen.query_one(WorldMap).notice
+        assert str(session.screen.query_one("#preview").border_title) == "depot.world"
+    async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",)}) as session:
+        session.screen._opened(path)
+        await session.settle()
+        assert "1 model. 1 part replaced or ignored" in session.screen.query_one("#about", Static).render().plain
+        session.fill(spawn_x="0", spawn_y="0", spawn_z="0.2", spawn_yaw="0", goal_x="6", goal_y="0")
+        await session.press("ctrl+s")
+        assert len(started) == 1

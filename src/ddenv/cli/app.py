@@ -21,13 +21,22 @@ from ddenv.errors import UserError, printable
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
+@reading_options
 @click.pass_context
-def app(context: click.Context) -> None:
-    """Finds the few models of a world that make a robot fail. Without a command: the workbench."""
+def app(context: click.Context, **reading) -> None:
+    """Finds the few models of a world that make a robot fail. Without a command: the workbench.
+
+    The options are on how the workbench reads worlds; commands that read worlds have them, too.
+    """
     if context.invoked_subcommand is None:
+        from ddenv.launch.scenarios import reading_of
         from ddenv.workbench.app import run_workbench
 
-        context.exit(run_workbench())
+        # What is wrong with them is told before the screen is taken.
+        reading_of(**reading)
+        context.exit(run_workbench(reading=reading))
+    if any(reading.values()):
+        raise UserError(f"options on how to read worlds go behind the command: ddenv {context.invoked_subcommand} ...")
 
 
 @app.command()

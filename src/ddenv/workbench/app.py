@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from textual.app import App
 from textual.binding import Binding
@@ -31,7 +32,10 @@ DARK = Theme(
 
 
 class Workbench(App[int]):
-    """Without a run it begins at the setup screen, else attached to that run. Raises UserError for what is no run file."""
+    """Without a run it begins at the setup screen, else attached to that run. Raises UserError for what is no run file.
+
+    `reading` holds the command line's options on how to read worlds.
+    """
 
     TITLE = "ddenv"
     # Notifications leave the status line and the keys free.
@@ -44,8 +48,9 @@ class Workbench(App[int]):
         Binding("ctrl+z", "suspend_process", "suspend", id="app.suspend", tooltip="suspend; fg comes back", show=False),
     ]
 
-    def __init__(self, run: Path | None = None) -> None:
+    def __init__(self, run: Path | None = None, reading: Mapping[str, Any] | None = None) -> None:
         super().__init__()
+        self._reading = reading
         self.register_theme(DARK)
         self.theme = DARK.name
         # Opened before the screen is taken, so that a wrong file is told in the terminal as one line.
@@ -57,11 +62,10 @@ class Workbench(App[int]):
 
         return RunScreen(run)
 
-    @staticmethod
-    def _setup() -> Screen:
+    def _setup(self) -> Screen:
         from ddenv.workbench.screens.setup import SetupScreen
 
-        return SetupScreen()
+        return SetupScreen(self._reading)
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and nothing would be drawn before it changes.
@@ -93,8 +97,8 @@ class Workbench(App[int]):
         self.action_leave()
 
 
-def run_workbench(run: Path | None = None) -> int:
+def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None) -> int:
     """Runs the workbench until it is left; returns the exit code. Raises UserError if `run` is no run file."""
-    app = Workbench(run)
+    app = Workbench(run, reading)
     result = app.run()
     return result if isinstance(result, int) else app.return_code or 0

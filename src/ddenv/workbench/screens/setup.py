@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
 from textual import on, work
@@ -16,24 +17,17 @@ from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.workbench import form
+from ddenv.workbench.chosen import Chosen, read_choice
 from ddenv.workbench.place import place_of
 from ddenv.workbench.processes import Engine
 from ddenv.workbench.recent import Recent, recent_runs
 from ddenv.workbench.screens.dialogs import Help, OpenFile
 from ddenv.workbench.widgets.map import Place, WorldMap
 from ddenv.workbench.widgets.options import OptionsForm
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.wording import plain, shorten
 
 if TYPE_CHECKING:
-    from ddenv.world.model import World
     from ddenv.world.scenario import Scenario
-
-
-class Chosen:
-    """What was picked on the left and read from disk: a world, and its scenario unless a bare world was picked."""
-
-    def __init__(self, path: Path, world: World, scenario: Scenario | None) -> None:
-        self.path, self.world, self.scenario = path, world, scenario
 
 
 class SetupScreen(Screen[None]):
@@ -52,8 +46,10 @@ class SetupScreen(Screen[None]):
         Binding("ctrl+q,q", "app.leave", "quit", id="setup.quit", tooltip="leave", key_display="q"),
     ]
 
-    def __init__(self) -> None:
+    def __init__(self, reading: Mapping[str, Any] | None = None) -> None:
+        """`reading` holds the command line's options on how to read worlds."""
         super().__init__()
+        self._reading = reading or {}
         self._chosen: Chosen | None = None
         self._files: dict[str, Path] = {}
         self._runs: dict[str, Recent] = {}
@@ -161,6 +157,8 @@ class SetupScreen(Screen[None]):
     def _choose(self, path: Path) -> None:
         self._chosen = None
         self._form.tell("")
+        self.query_one("#preview").border_title = Text(shorten(plain(path.name), 40))
+        self.query_one("#preview").border_subtitle = ""
         self.query_one("#about", Static).update("")
         self.query_one(WorldMap).set_place(Place(), "reading the world ...")
         self._read(path)
@@ -169,14 +167,10 @@ class SetupScreen(Screen[None]):
     def _read(self, path: Path) -> None:
         from textual.worker import get_current_worker
 
-        from ddenv.world.load import load_scenario
-        from ddenv.world.read import read_world
-
         worker = get_current_worker()
         try:
-            scenario = load_scenario(path) if path.suffix.lower() in (".yaml", ".yml") else None
-            world = read_world(scenario.world if scenario else path)
-            answer = Chosen(path, world, scenario), place_of(world, scenario), ""
+            chosen = read_choice(path, self._reading)
+            answer = chosen, place_of(chosen.world, chosen.scenario), ""
         except UserError as error:
             answer = None, Place(), str(error)
         if not worker.is_cancelled:
@@ -191,19 +185,13 @@ class SetupScreen(Screen[None]):
         self.query_one(WorldMap).set_place(place, wrong)
         if chosen is None:
             return
-        scenario, world = chosen.scenario, chosen.world
+        scenario = chosen.scenario
         self._form.ask_for_places(scenario is None)
-        self.query_one("#preview").border_title = Text(
-            shorten(plain(scenario.name if scenario else world.path.name), 40)
-        )
-        models = count(len(world.elements(frozenset(scenario.protected) if scenario else frozenset())), "model")
-        what = (
-            scenario.description if scenario else "A world without a scenario: give the robot a spawn and a goal below."
-        )
-        self.query_one("#about", Static).update(Text(f"{models}. {plain(what)}"))
+        self.query_one("#preview").border_title = Text(shorten(plain(chosen.name), 40))
+        self.query_one("#about", Static).update(Text(chosen.about))
         if scenario is not None:
             self._form.show_settings(scenario)
-        self._form.suggest_name(free_run_path(scenario.name if scenario else world.path.stem).stem)
+        self._form.suggest_name(free_run_path(scenario.name if scenario else chosen.path.stem).stem)
 
     @on(OptionsForm.PlaceEdited)
     def _mark_places(self) -> None:
@@ -261,7 +249,7 @@ class SetupScreen(Screen[None]):
         path = find_run(name)
         if path.exists():
             raise form.FieldError("name", f"run name: {path} exists already; choose another name")
-        return with_options(scenario, pair=self._form.pair, **options), jobs, path
+        return with_options(scenario, pair=self._form.pair, reading=self._chosen.reading, **options), jobs, path
 
     @work(thread=True, group="start", exclusive=True)
     def _create(self, scenario: Scenario, jobs: int, path: Path, mode: str) -> None:
