@@ -64,7 +64,7 @@ def test_any_deterministic_oracle_leaves_a_one_minimal_environment(world, salt, 
         return crc32(f"{salt} {sorted(models)}".encode()) % 3 == 0
 
     kept, _ = reduce(evidence(count, seed), ("model2model", "failure-proximal"), is_similar, complement_order=order)
-    assert len(kept) == 1 or not any(is_similar(kept - {name}) for name in kept)
+    assert not any(is_similar(kept - {name}) for name in kept)
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="/".join)
@@ -82,7 +82,7 @@ def test_partitions_are_disjoint_not_empty_and_cover_the_environment(pair, world
         keeps = [one.models for one in round.candidates]
         assert len(set(keeps)) == len(keeps)
         assert frozenset(round.environment) not in keeps
-        assert frozenset() not in keeps
+        assert frozenset() not in keeps or len(round.environment) == 1
 
 
 def test_a_world_of_six_models_step_by_step():

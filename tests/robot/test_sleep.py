@@ -55,7 +55,7 @@ FAR = {
             link_of("b", Sphere(0.2), Pose((2.0, 7.0, 0.5))),
         ),
     ),
-    "out of the world": (cube("far", 2.0, 130.0, 0.5),),
+    "out of the world": (cube("far", 2.0, 6.0, -3.0),),
 }
 
 

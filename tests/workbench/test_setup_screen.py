@@ -262,7 +262,7 @@ async def test_what_cannot_be_found_is_told_with_the_remedy_that_the_workbench_t
     async with Opened() as session:
         session.screen._opened(path)
         await session.settle()
-        assert "--stand-in 'model://barrel=cylinder:radius,length'" in session.screen.query_one(WorldMap).notice
+        assert "--stand-in 'model://barrel=cylinder:0.3,1.0'" in session.screen.query_one(WorldMap).notice
         assert str(session.screen.query_one("#preview").border_title) == "depot.world"
     async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",)}) as session:
         session.screen._opened(path)

@@ -6,6 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
+from ddenv.errors import UserError
 from ddenv.world.bundled import SDF
 from ddenv.world.convert import convert, write_converted
 from ddenv.world.read import parse_world, read_world
@@ -88,5 +89,28 @@ def test_reading_what_was_written_gives_the_same_world(tmp_path):
     for link, twin in zip(world.models[0].links, again.models[0].links, strict=True):
         assert twin.pose.position == pytest.approx(link.pose.position, abs=1e-9)
     for one, twin in zip(world.models[0].joints, again.models[0].joints, strict=True):
-        assert twin.axis == pytest.approx(one.axis, abs=1e-9)
+        assert twin.pose.position == pytest.approx(one.pose.position, abs=1e-9)
+        assert one.kind == "ball" or twin.axis == pytest.approx(one.axis, abs=1e-9)
         assert (twin.kind, twin.lower, twin.upper) == (one.kind, one.lower, one.upper)
+
+
+def test_the_world_itself_is_never_overwritten(tmp_path):
+    path = tmp_path / "w.sdf"
+    path.write_bytes((DATA / "wall.sdf").read_bytes())
+    with pytest.raises(UserError, match="is the world itself"):
+        write_converted(read_world(path), tmp_path / "." / "w.sdf")
+    assert path.read_bytes() == (DATA / "wall.sdf").read_bytes()
+
+
+def test_the_ground_stays_a_ground(tmp_path):
+    world = read_world(DATA / "wall.sdf")
+    write_converted(world, tmp_path / "clean.sdf")
+    assert read_world(tmp_path / "clean.sdf").elements() == world.elements()
+
+
+def test_turned_universal_joints_keep_their_right_angle(tmp_path):
+    axes = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"
+    bent = joint("universal", f"<pose>0 0 0 0.3 0.2 0.5</pose>{axes}")
+    world = of_text(f"<model name='m'><pose>0 0 0 0.1 0.2 0.3</pose>{LINKS}{bent}</model>", tmp_path)
+    write_converted(world, tmp_path / "clean.sdf")
+    assert_same_in_drake(world, tmp_path / "clean.sdf")

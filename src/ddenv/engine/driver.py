@@ -63,8 +63,8 @@ class Driver:
 
     def _finish(self, kept: Keep) -> None:
         # Each model must have been left out, in tests and without success; a veto or a reject leaves that open.
-        untried = [] if len(kept) == 1 else [name for name in kept if not self._is_dissimilar(kept - {name})]
-        reason = "no single model can be removed"
+        untried = [name for name in kept if not self._is_dissimilar(kept - {name})]
+        reason = "no single model can be removed" if kept else "f needs none of the models that can be removed"
         if untried:
             why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
             reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"

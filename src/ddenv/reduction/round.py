@@ -42,8 +42,9 @@ def make_round(
     candidates: str = "both",
     complement_order: str = "paper",
 ) -> Round:
-    """The candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself, the empty set, and repetitions.
+    """The candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself and repetitions.
 
+    Nothing at all is a candidate only where E is a single model.
     With `complement_order` "far-first" the complements come in the opposite order: what is farthest is left out first.
     """
     count = len(ranked)
@@ -56,6 +57,8 @@ def make_round(
             found.setdefault(part, Candidate("partition", near, part))
         if candidates != "partitions":
             found.setdefault(rest, Candidate("complement", other, rest))
-    worth = tuple(one for models, one in found.items() if models and models != everything)
+    worth = tuple(
+        one for models, one in found.items() if models != everything and (models or len(everything) == 1)
+    )
     partitions, scores = zip(*ranked, strict=True)
     return Round(n_partitions, environment, tuple(partitions), tuple(scores), worth)

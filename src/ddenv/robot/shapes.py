@@ -14,25 +14,17 @@ from pydrake.geometry import Shape as DrakeShape
 from pydrake.geometry import Sphere as DrakeSphere
 
 from ddenv.world.extent import Bounds, shape_bounds
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
-GROUND_SIZE = (200.0, 200.0, 1.0)  # m; a half space crashes Drake in worlds of hundreds of boxes
 CORNER_RADIUS = 0.002  # m
 RIM_CORNERS = 8
 MESH_CORNERS = 32
 
 
-def solid(collision: Collision) -> tuple[Shape, Pose]:
-    """The shape of `collision` and its pose, with a box in place of an infinite plane."""
-    if isinstance(collision.shape, Plane):
-        return Box(GROUND_SIZE), collision.pose @ Pose((0.0, 0.0, -GROUND_SIZE[2] / 2))
-    return collision.shape, collision.pose
-
-
 def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | None:
     """The box around `collisions` along the axes of `frame` (the world seen from it); None if there are none."""
-    boxes = [shape_bounds(shape, frame @ pose) for shape, pose in map(solid, collisions)]
+    boxes = [shape_bounds(one.shape, frame @ one.pose) for one in collisions]
     if not boxes:
         return None
     lows, highs = zip(*boxes, strict=True)
@@ -44,7 +36,7 @@ def drake_shapes(collision: Collision, corners: bool) -> list[tuple[DrakeShape, 
 
     A face that rests on one point of contact alone would creep.
     """
-    shape, pose = solid(collision)
+    shape, pose = collision.shape, collision.pose
     shapes = [(drake_shape(shape), pose)]
     if corners:
         shapes += [(DrakeSphere(CORNER_RADIUS), pose @ Pose(corner)) for corner in corners_of(shape)]

@@ -17,6 +17,7 @@ from ddenv.robot.result import RunResult
 from ddenv.robot.run import Run
 from ddenv.robot.sleep import Sleep
 from ddenv.world.extent import shape_bounds
+from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
@@ -117,7 +118,9 @@ class Template:
 
 def _build(world: World, robot: Model, scenario: Scenario) -> Built:
     try:
-        built = build(world, robot, scenario.simulation, scenario.controller.motor_gain)
+        spawn, goal = scenario.robot.spawn, scenario.goal
+        places = [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
+        built = build(with_ground_boxes(world, places), robot, scenario.simulation, scenario.controller.motor_gain)
     except (ValueError, RuntimeError, SystemExit) as error:
         raise UserError(f"{world.path}: cannot be simulated: {error}") from error
     if not built.robot.base.is_floating_base_body():

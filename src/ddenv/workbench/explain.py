@@ -235,8 +235,11 @@ def _finished(state: RunState) -> Explanation:
         return Explanation(None, (_reason(state, "The run ended in the baseline."),))
     if not state.minimal:
         return Explanation(21, (_reason(state, "The run ended early."), f"{kept} left: {_names(state)}."))
+    if not state.environment:
+        none = "f is seen without any of the models that can be removed: look at the robot, its goal and what always stays."
+        return Explanation(21, ("Minimal: no model left.", none, baseline_sentence(state, options.iterations)))
     single = len(state.environment) == 1
-    proof = "a single model cannot be split" if single else "without any one of them f is not seen again"
+    proof = f"without {'it' if single else 'any one of them'} f is not seen again"
     return Explanation(
         21,
         (

@@ -17,6 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ddenv.errors import UserError
+from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -34,12 +35,11 @@ from ddenv.world.model import (
     Visual,
     World,
 )
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, Vector
 from ddenv.world.write import write_file
 
 DRAKE = "http://drake.mit.edu"
-GROUND = Box((200.0, 200.0, 1.0))
-BELOW = Pose((0.0, 0.0, -0.5))
+RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
 
 
 @dataclass
@@ -59,7 +59,7 @@ def convert(world: World, mesh_folder: str) -> Converted:
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
     names = _unique(model.name for model in world.models)
-    for name, model in zip(names, world.models, strict=True):
+    for name, model in zip(names, with_ground_boxes(world).models, strict=True):
         _model(inside, name, model, files, mesh_folder)
     for mesh, name in files.items():
         out.meshes[name] = obj(mesh)
@@ -70,6 +70,8 @@ def convert(world: World, mesh_folder: str) -> Converted:
 
 def write_converted(world: World, path: Path) -> list[Path]:
     """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns what was written. Raises UserError."""
+    if path.resolve() == world.path.resolve():
+        raise UserError(f"{path}: is the world itself; give another file to write")
     folder = path.with_name(f"{path.stem}_meshes")
     converted = convert(world, folder.name)
     if converted.meshes:
@@ -115,9 +117,8 @@ def _link(parent: Element, name: str, link: Link, model: Model, files: dict[Mesh
 
 def _collision(parent: Element, name: str, one: Collision, back: Pose, files: dict[Mesh, str], folder: str) -> None:
     element = SubElement(parent, "collision", name=name)
-    endless = isinstance(one.shape, Plane)
-    _pose(element, back @ one.pose @ BELOW if endless else back @ one.pose)
-    _geometry(element, GROUND if endless else one.shape, files, folder)
+    _pose(element, back @ one.pose)
+    _geometry(element, one.shape, files, folder)
     friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
     for tag in ("mu", "mu2"):
         SubElement(friction, tag).text = repr(one.mu)
@@ -178,17 +179,42 @@ def _inertia(parent: Element, inertia: Inertia, link_pose: Pose) -> None:
 
 def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: Pose, names: dict[str, str]) -> None:
     element = SubElement(parent, "joint", name=name, type=joint.kind)
-    _pose(element, child_pose.inverse() @ joint.pose)
+    # Its axes lie along those of its frame: rounded, those of a universal joint would not be at right angles any more.
+    frame = Pose(joint.pose.position, _turned(joint.axis, joint.axis2 or _across(joint.axis)))
+    _pose(element, child_pose.inverse() @ frame)
     SubElement(element, "parent").text = names.get(joint.parent, joint.parent)
     SubElement(element, "child").text = names[joint.child]
     if joint.kind in ("fixed", "ball"):
         return
-    turn = Pose(quaternion=model.pose.inverse().quaternion)
-    for tag, axis in (("axis", joint.axis), ("axis2", joint.axis2)):
-        if axis is not None:
-            holder = SubElement(element, tag)
-            SubElement(holder, "xyz", expressed_in="__model__").text = _numbers(turn.rotate(axis))
-            _limits(holder, joint)
+    for tag, axis in (("axis", "1 0 0"), ("axis2", "0 1 0"))[: 2 if joint.axis2 else 1]:
+        holder = SubElement(element, tag)
+        SubElement(holder, "xyz").text = axis
+        _limits(holder, joint)
+
+
+def _across(axis: Vector) -> Vector:
+    """A unit vector at right angles to the unit vector `axis`."""
+    other = np.eye(3)[int(np.abs(axis).argmin())]
+    across = np.cross(axis, other)
+    x, y, z = (across / np.linalg.norm(across)).tolist()
+    return x, y, z
+
+
+def _turned(x_axis: Vector, y_axis: Vector) -> tuple[float, float, float, float]:
+    """The quaternion (w, x, y, z) of the frame whose x and y axes are these unit vectors."""
+    matrix = np.column_stack([x_axis, y_axis, np.cross(x_axis, y_axis)])
+    # The quaternion is the eigenvector of this matrix to its greatest eigenvalue (Bar-Itzhack, 2000).
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    symmetric = np.array(
+        [
+            [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+            [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+            [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+        ]
+    )
+    w, x, y, z = np.linalg.eigh(symmetric)[1][:, -1].tolist()
+    return w, x, y, z
 
 
 def _limits(holder: Element, joint: Joint) -> None:
@@ -221,7 +247,7 @@ def _numbers(values: Iterable[float]) -> str:
 def _clean(name: str) -> str:
     """`name` without what SDF keeps for itself."""
     name = "".join(char if char.isprintable() else "_" for char in name).replace("::", "_")
-    reserved = name == "world" or (name.startswith("__") and name.endswith("__"))
+    reserved = name in RESERVED or (name.startswith("__") and name.endswith("__"))
     return f"{name.strip('_') or 'a'}_" if reserved else name
 
 

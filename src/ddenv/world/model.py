@@ -204,6 +204,17 @@ class World:
         return tuple(model.name for model in self.models if model.name not in stay and not is_ground(model))
 
 
+# A box of this length and width that is shown as an infinite plane is one, m.
+ENDLESS = 200.0
+
+
 def is_ground(model: Model) -> bool:
-    """A model with an infinite plane carries everything else: it is never an element."""
-    return any(isinstance(collision.shape, Plane) for collision in model.collisions)
+    """A model with an infinite plane carries everything else: it is never an element.
+
+    So is a box that stands for one: that which `ddenv.world.convert` writes.
+    """
+    if any(isinstance(collision.shape, Plane) for collision in model.collisions):
+        return True
+    shown = any(isinstance(visual.shape, Plane) for link in model.links for visual in link.visuals)
+    boxes = (one.shape.size for one in model.collisions if isinstance(one.shape, Box)) if shown else ()
+    return any(min(size[:2]) >= ENDLESS for size in boxes)

@@ -79,3 +79,7 @@ class Pose:
         )
         x, y, z = self.position
         return Pose((x + px, y + py, z + pz), quaternion)
+
+
+HERE = Pose()
+ONE: Vector = (1.0, 1.0, 1.0)

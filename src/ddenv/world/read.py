@@ -63,7 +63,9 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
     if len(scope.parts) != 1:
         raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")
     try:
-        return assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
+        model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
+        context.complain_of_missing()
+        return model
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
@@ -105,6 +107,7 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     note_unread(world, context)
     scope = Scope(world, (path,), context)
     models = _models(scope, read_state(world, context), context)
+    context.complain_of_missing()
     context.model = ""
     _note_unused(context, root)
     anchors = scope.references()
@@ -128,7 +131,7 @@ def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tu
     models = []
     for part, name in zip(scope.parts, names, strict=True):
         saved = left.get(part.name) or [None]
-        if counts[part.name] > 1:
+        if name != part.name:
             context.model = name
             context.note("replaced", part.at, f"its name, which stands {counts[part.name]} times, by '{name}'")
         models.append(assemble(part, name, scope, saved.pop(0), context))

@@ -135,3 +135,28 @@ def test_old_joint_axes_are_in_the_frame_of_the_model(read):
     assert read(inside.format(across), "1.6").models[0].joints[0].axis == pytest.approx((1, 0, 0))
     named = inside.replace("<xyz>", "<xyz expressed_in='a'>")
     assert read(named.format(""), "1.9").models[0].joints[0].axis == pytest.approx((1, 0, 0))
+
+
+def test_booleans_of_attributes_are_read_in_any_case(read):
+    model = read("<model name='m'><pose degrees='True'>0 0 0 0 0 90</pose><link name='a'/></model>").models[0]
+    assert model.pose.yaw() == pytest.approx(math.pi / 2)
+
+
+def test_an_unknown_way_to_write_turns_is_refused(read):
+    with pytest.raises(UserError, match="rotation_format 'rpy' is unknown"):
+        read("<model name='m'><pose rotation_format='rpy'>0 0 0 0 0 0</pose><link name='a'/></model>")
+
+
+def test_the_old_frame_attribute_means_nothing_in_new_files(read):
+    two = "<link name='a'><pose>3 0 0 0 0 0</pose></link><link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link>"
+    world = read(f"<model name='m'><static>1</static>{two}</model>", "1.8")
+    assert world.models[0].links[1].pose.position == (1, 0, 0)
+    assert "means nothing since SDF 1.7" in world.notes[0].why
+
+
+def test_rows_of_frames_may_be_long(read):
+    frames = "".join(
+        f"<frame name='f{n}'><pose relative_to='f{n - 1}'>1 0 0 0 0 0</pose></frame>" for n in range(1, 3000)
+    )
+    world = read(f"<model name='m'><frame name='f0'/>{frames}<link name='a'><pose relative_to='f2999'/></link></model>")
+    assert world.models[0].links[0].pose.position == (2999, 0, 0)

@@ -176,3 +176,80 @@ def test_gravity_of_old_and_new_files(read):
     assert read("<physics type='ode'><gravity>0 0 -3.7</gravity></physics>", "1.4").gravity == (0, 0, -3.7)
     light = read("<model name='m'><link name='l'><gravity>0</gravity></link></model>").models[0]
     assert not light.gravity
+
+
+def test_an_includes_pose_is_that_of_the_models_own_placement_frame(read, table):
+    frame = "<frame name='foot'><pose>0 0 -1 0 0 0</pose></frame>"
+    text = TABLE.replace("<model name='table'>", f"<model name='table' placement_frame='foot'>{frame}")
+    (table / "table" / "model.sdf").write_text(text)
+    assert read(included("<pose>1 0 0 0 0 0</pose>"), model_path=(table,)).models[0].pose.position == (1, 0, 1)
+    with pytest.raises(UserError, match="a <placement_frame> needs a <pose>"):
+        read(included("<placement_frame>foot</placement_frame>"), model_path=(table,))
+
+
+def test_all_files_that_are_nowhere_are_told_at_once(read):
+    mesh = "<collision name='c'><geometry><mesh><uri>model://lamp/lamp.dae</uri></mesh></geometry></collision>"
+    with pytest.raises(UserError, match=r"'model://table' was not found .*; also missing: 'model://lamp/lamp.dae'$"):
+        read(included() + included() + f"<model name='lamp'><static>1</static><link name='l'>{mesh}</link></model>")
+
+
+def test_a_merged_include_can_be_left_out(read):
+    merged = "<include merge='true'><uri>model://table</uri></include>"
+    with pytest.raises(UserError, match="--ignore include"):
+        read(merged)
+    assert read(merged, ignore=("include",)).models == ()
+
+
+def test_a_stand_in_is_called_as_what_it_replaces(read):
+    uris = ("model://table", "https://fuel.gazebosim.org/1.0/Open/models/Construction%20Barrel")
+    world = read("".join(included(uri=uri) for uri in uris), stand_ins=dict.fromkeys(uris, "sphere:1"))
+    assert [model.name for model in world.models] == ["table", "Construction Barrel"]
+    assert [note.model for note in world.notes] == ["table", "Construction Barrel"]
+
+
+def test_a_static_model_may_have_no_link(read):
+    world = read("<model name='m'><static>1</static><plugin name='p' filename='f'/></model>")
+    assert world.models[0].collisions == ()
+    assert any("no <link>" in note.why for note in world.notes)
+
+
+SILENT = {
+    "a misspelt limit": "<joint name='j' type='revolute'>{ends}<axis><xyz>0 0 1</xyz><limits/></axis></joint>",
+    "a limit outside its axis": "<joint name='j' type='fixed'>{ends}<limit/></joint>",
+    "two axes": "<joint name='j' type='revolute'>{ends}<axis/><axis/></joint>",
+    "a spring": "<joint name='j' type='revolute'>{ends}<axis><dynamics><spring_stiffness>9</spring_stiffness></dynamics>"
+    "</axis></joint>",
+    "dry friction": "<joint name='j' type='revolute'>{ends}<axis><dynamics><friction>9</friction></dynamics></axis></joint>",
+    "limits that are not simulated": "<joint name='j' type='continuous'>{ends}<axis><limit><lower>0</lower></limit></axis></joint>",
+    "a joint's sensor": "<joint name='j' type='fixed'>{ends}<sensor name='s'/></joint>",
+    "drag": "<velocity_decay><linear>0.1</linear></velocity_decay>",
+    "a misspelt mass": "<inertial><Mass>5</Mass></inertial>",
+    "misplaced friction": "<collision name='c'>{box}<surface><friction><mu>0.1</mu></friction></surface></collision>",
+    "bounce": "<collision name='c'>{box}<surface><bounce><restitution_coefficient>1</restitution_coefficient></bounce></surface>"
+    "</collision>",
+    "a bitmask": "<collision name='c'>{box}<surface><contact><collide_bitmask>2</collide_bitmask></contact></surface></collision>",
+}
+
+
+@pytest.mark.parametrize("text", SILENT.values(), ids=SILENT.keys())
+def test_what_is_not_simulated_is_noted(read, text):
+    text = text.format(
+        ends="<parent>a</parent><child>b</child>", box="<geometry><box><size>1 1 1</size></box></geometry>"
+    )
+    mass = "<inertial><mass>1</mass><inertia/></inertial>"
+    inside = "" if text.startswith("<joint") else text
+    first = f"<link name='a'>{inside if '<inertial' in inside else mass + inside}</link>"
+    world = read(f"<model name='m'>{first}<link name='b'>{mass}</link>{'' if inside else text}</model>")
+    assert any(note.kind == "ignored" for note in world.notes)
+
+
+def test_links_collide_with_their_own_model_as_they_say(read):
+    def model(own, *links):
+        texts = (f"<link name='{n}'>{text}</link>" for n, text in enumerate(links))
+        return read(f"<model name='m'>{own}{''.join(texts)}</model>").models[0].self_collide
+
+    yes, no = "<self_collide>1</self_collide>", "<self_collide>0</self_collide>"
+    assert not model("", "", "")
+    assert model(yes, "", "")
+    assert model(no, yes, "")
+    assert not model(yes, no, no)

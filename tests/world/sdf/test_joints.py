@@ -192,3 +192,36 @@ def test_what_makes_an_inertia_possible():
     assert not is_possible((1, 1, 0), (0, 0, 0))
     assert not is_possible((1, 1, 1), (1.1, 0, 0))
     assert not is_possible((math.nan, 1, 1), (0, 0, 0))
+
+
+def test_limits_may_be_written_as_infinite(read):
+    (one,) = joints_of(read, joint("revolute", "<axis><limit><lower>-inf</lower><upper>inf</upper></limit></axis>"))
+    assert (one.lower, one.upper) == (-math.inf, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("limits", "angle", "left"),
+    [
+        ((0, 3.5), 3.4, (-3.4, 0.1)),
+        ((0, 6.28), 6, (-6, 0.28)),
+        ((-4, 0), -3.3, (-0.7, 3.3)),
+        ((-1, 1), 0.5, (-1.5, 0.5)),
+    ],
+)
+def test_a_joint_that_was_saved_beyond_half_a_turn_is_within_its_limits(read, limits, angle, left):
+    limit = f"<axis><xyz>0 0 1</xyz><limit><lower>{limits[0]}</lower><upper>{limits[1]}</upper></limit></axis>"
+    state = f"<state><model name='m'><link name='b'><pose>0 0 1 0 0 {angle}</pose></link></model></state>"
+    (one,) = read(f"<model name='m'>{LINKS}{joint('revolute', limit)}</model>{state}", "1.6").models[0].joints
+    assert (one.lower, one.upper) == pytest.approx(left)
+
+
+def test_a_given_mass_is_spread_by_automatic_inertia(read):
+    auto = "<inertial auto='true'><mass>7</mass></inertial>"
+    assert read(moving(auto), "1.11").models[0].links[0].inertia.mass == pytest.approx(7)
+
+
+def test_a_thin_plate_in_round_figures_is_kept(read):
+    plate = "<inertia><ixx>0.083333</ixx><iyy>0.083333</iyy><izz>0.166667</izz></inertia>"
+    world = read(moving(f"<inertial><mass>1</mass>{plate}</inertial>"))
+    assert world.notes == ()
+    assert world.models[0].links[0].inertia.moments == pytest.approx((0.083333, 0.083333, 0.166667), rel=1e-4)

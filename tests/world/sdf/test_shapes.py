@@ -89,11 +89,7 @@ def test_a_collision_mesh_that_is_nowhere_is_refused_with_all_remedies(read):
         read(model("<mesh><uri>model://barrel/meshes/a.dae</uri></mesh>"))
     said = str(caught.value)
     assert "/geometry/mesh: mesh 'model://barrel/meshes/a.dae'" in said
-    assert (
-        "--model-path" in said
-        and "--stand-in 'model://barrel=cylinder:radius,length'" in said
-        and "--ignore mesh" in said
-    )
+    assert "--model-path" in said and "--stand-in 'model://barrel=cylinder:0.3,1.0'" in said and "--ignore mesh" in said
 
 
 def test_a_stand_in_stands_on_the_frame_of_what_it_replaces(read):
@@ -190,3 +186,20 @@ def test_shapes_that_cannot_be_are_refused_with_their_place(read, geometry, word
     with pytest.raises(UserError, match=words) as caught:
         read(model(geometry))
     assert "here.sdf:1: /sdf/world/model[@name='m']/link[@name='l']/collision[@name='c']" in str(caught.value)
+
+
+def test_one_coefficient_of_friction_alone_does_not_hide_the_other(read):
+    surface = "<surface><friction><ode><mu>50</mu></ode></friction></surface>"
+    assert read(model("<box><size>1 1 1</size></box>", surface)).models[0].collisions[0].mu == 1
+
+
+def test_a_cone_stands_on_its_base(read):
+    shape = shape_of(read(model("<cone><radius>1</radius><length>3</length></cone>", "", "collision")))
+    solid = trimesh.Trimesh(shape.vertices, shape.faces)
+    assert solid.is_watertight and solid.volume == pytest.approx(np.pi, rel=0.01)
+    assert shape.vertices[:, 2].max() == 1.5
+
+
+def test_a_hull_in_place_of_a_mesh_is_noted(read, tmp_path):
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / "a.obj")
+    assert [note.why for note in read(model("<mesh><uri>a.obj</uri></mesh>")).notes] == ["'a.obj' by its convex hull"]

@@ -95,3 +95,14 @@ def test_what_cannot_be_is_refused_with_its_place(read, inside, words):
 def test_what_moved_when_it_was_saved_begins_at_rest(read):
     saved = "<model name='m'><link name='l'><pose>0 0 0 0 0 0</pose><velocity>1 0 0 0 0 0</velocity></link></model>"
     assert "every run begins at rest" in [note.why for note in read(MODEL + state(saved), "1.6").notes]
+
+
+def test_a_model_that_was_only_turned_is_noted(read):
+    saved = "<model name='m'><pose>9 9 9 0 0 0</pose><link name='l'><pose>10 9 9 0 0 1</pose></link></model>"
+    assert [note.detail for note in read(MODEL + state(saved), "1.6").notes] == ["turned"]
+
+
+def test_entries_for_links_that_are_not_there_are_noted(read):
+    saved = "<model name='m'><link name='lnik'><pose>1 1 1 0 0 0</pose></link><model name='no'/></model>"
+    told = [note.why for note in read(MODEL + state(saved), "1.6").notes]
+    assert told == ["the model has no 'lnik' for it", "the model has no 'no' for it"]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ddenv.world.model import Joint, Link, Model, is_ground
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import WORLD, Scope
-from ddenv.world.sdf.geometry import ONE
 from ddenv.world.sdf.joints import Stand, check_tree, read_joints
 from ddenv.world.sdf.links import Site, read_link
 from ddenv.world.sdf.parts import Part
@@ -17,28 +16,39 @@ from ddenv.world.sdf.state import Saved
 from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, truth
 
-# A model that `<state>` has less than this from its own pose has not been moved, m.
+# What `<state>` has less than this from its own pose has not been moved, m and as a part of half a turn.
 MOVED = 0.001
 # A few files that include each other many times can ask for more models than any machine holds.
 MOST_MODELS = 50_000
 
 
+@dataclass(frozen=True)
+class Spot:
+    """Where a model, or one nested in it, is assembled: its frame in the world as its file has it, and as it is after `<state>`.
+
+    `prefix` begins the names of its links; `saved` is what `<state>` says of it; `scale` multiplies its sizes.
+    """
+
+    nominal: Pose
+    actual: Pose
+    prefix: str = ""
+    saved: Saved | None = None
+    scale: Vector = ONE
+
+
 def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
     """The model of `part`, under the unique `name`. Raises UserError."""
     context.model = name
-    scope = outer.inside(part)
     nominal = outer.placed(part)
-    static = truth(part.element, "static", False) if part.static is None else part.static
-    builder = _Builder(static, context)
     actual = nominal if saved is None or saved.pose is None else saved.pose
-    builder.add(scope, nominal, actual, "", saved)
+    static = _is_static(part)
+    builder = _Builder(static, context)
+    builder.add(outer.inside(part), Spot(nominal, actual, saved=saved))
     if not builder.links:
-        raise complain(part.element, "has no <link>")
-    _note_move(next(iter(builder.stands.values())), saved, context)
-    spans = [(part.at.start, part.at.end)]
+        builder.links.append(_nothing(part.element, actual, static, context))
     if saved is not None:
-        spans.append((saved.element.start, saved.element.end))
-    elements = builder.elements
+        _note_move(list(builder.stands.values()), saved, context)
+    spans = [(one.start, one.end) for one in (part.at, None if saved is None else saved.element) if one is not None]
     model = Model(
         name=name,
         pose=actual,
@@ -47,18 +57,33 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
         joints=tuple(builder.joints),
         spans=tuple(spans),
         line=part.at.line,
-        gravity=static or any(truth(link, "gravity", True) for link in elements),
-        self_collide=truth(part.element, "self_collide", any(truth(link, "self_collide", False) for link in elements)),
+        gravity=static or any(truth(link, "gravity", True) for link in builder.elements),
+        self_collide=any(builder.self_collide),
     )
     if static:
         return model
     check_tree(builder.joints, part.element)
-    _note_gravity(elements, context)
+    _note_differences(builder, part.element, context)
     return _held(model, part.element, context) if is_ground(model) else model
 
 
+def _is_static(part: Part) -> bool:
+    return truth(part.element, "static", False) if part.static is None else part.static
+
+
+def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Link:
+    """A static model may have no link, such as one that only holds a plugin."""
+    if not static:
+        raise complain(element, "has no <link>")
+    context.note("ignored", element, "it has no <link>: nothing can touch it")
+    return Link("link", pose, None, (), ())
+
+
 class _Builder:
-    """Collects the links and joints of a model from its `<model>` and those inside it."""
+    """Collects the links and joints of a model from its `<model>` and those inside it.
+
+    `elements` and `self_collide` are those of the links, in their order.
+    """
 
     def __init__(self, static: bool, context: Context) -> None:
         self.static = static
@@ -66,72 +91,82 @@ class _Builder:
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.elements: list[Element] = []
+        self.self_collide: list[bool] = []
         self.stands: dict[str, Stand] = {}
 
-    def add(
-        self, scope: Scope, nominal: Pose, actual: Pose, prefix: str, saved: Saved | None, scale: Vector = ONE
-    ) -> None:
-        """Adds what is in `scope`, whose frame is nominally at one pose in the world and actually at another."""
+    def add(self, scope: Scope, spot: Spot) -> None:
+        """Adds what is in `scope`, whose frame is at `spot`. Raises UserError."""
         self.context.assembled += 1
         if self.context.assembled > MOST_MODELS:
-            raise complain(
-                scope.element, f"there are more than {MOST_MODELS} models, with those that are nested or included"
-            )
+            why = f"there are more than {MOST_MODELS} models, with those that are nested or included"
+            raise complain(scope.element, why)
         note_unread(scope.element, self.context)
-        scale = scale if saved is None or saved.scale == ONE else saved.scale
+        if spot.saved is not None and spot.saved.scale != ONE:
+            spot = replace(spot, scale=spot.saved.scale)
+        collide = truth(scope.element, "self_collide", False)
         for element in scope.element.findall("link"):
-            self._add_link(element, scope, nominal, actual, prefix, saved, scale)
+            self._add_link(element, scope, spot)
+            self.self_collide.append(truth(element, "self_collide", collide))
         for part in scope.parts:
-            self._add_part(part, scope, nominal, actual, prefix, saved, scale)
+            self._add_part(part, scope, spot)
         if not self.static:
-            self.joints += read_joints(scope, nominal, prefix, self.stands, self.context)
+            self.joints += read_joints(scope, spot.nominal, spot.prefix, self.stands, self.context)
+        if spot.saved is not None:
+            self._note_unknown(scope, spot.saved)
 
-    def _add_link(self, element, scope, nominal, actual, prefix, saved, scale) -> None:
+    def _add_link(self, element: Element, scope: Scope, spot: Spot) -> None:
         own = name_of(element)
-        name = prefix + own
+        name = spot.prefix + own
         if own == WORLD:
             raise complain(element, "'world' is a name that SDF keeps for the world itself; give it another")
         if name in self.stands:
             raise complain(element, "this name stands twice; every link of a model needs a name of its own")
         local = scope.place(element)
-        stand = Stand(nominal @ local, actual @ local)
-        if saved is not None and own in saved.links:
-            stand = Stand(stand.nominal, saved.links[own])
+        stand = Stand(spot.nominal @ local, spot.actual @ local)
+        if spot.saved is not None and own in spot.saved.links:
+            stand = Stand(stand.nominal, spot.saved.links[own])
         self.stands[name] = stand
         self.elements.append(element)
-        site = Site(name, stand.actual, local, scale, not self.static)
+        site = Site(name, stand.actual, local, spot.scale, not self.static)
         self.links.append(read_link(element, scope, site, self.context))
 
-    def _add_part(self, part, scope, nominal, actual, prefix, saved, scale) -> None:
+    def _add_part(self, part: Part, scope: Scope, spot: Spot) -> None:
         local = scope.placed(part)
-        inner = None if saved is None else saved.models.get(part.name)
-        there = actual @ local if inner is None or inner.pose is None else inner.pose
+        saved = None if spot.saved is None else spot.saved.models.get(part.name)
+        there = spot.actual @ local if saved is None or saved.pose is None else saved.pose
         before = len(self.links)
-        self.add(scope.inside(part), nominal @ local, there, f"{prefix}{part.name}::", inner, scale)
-        fixed = truth(part.element, "static", False) if part.static is None else part.static
-        if fixed and not self.static:
-            self._hold(self.links[before:], part)
+        prefix = f"{spot.prefix}{part.name}::"
+        self.add(scope.inside(part), Spot(spot.nominal @ local, there, prefix, saved, spot.scale))
+        if _is_static(part) and not self.static:
+            self._hold(self.links[before:])
 
-    def _hold(self, links: list[Link], part: Part) -> None:
+    def _hold(self, links: list[Link]) -> None:
         """Welds the links of a static model, nested in one that moves, to the world."""
-        self.joints = [joint for joint in self.joints if joint.child not in {link.name for link in links}]
-        free = float("inf")
-        for link in links:
-            self.joints.append(
-                Joint(
-                    f"{link.name} (static)",
-                    "fixed",
-                    WORLD,
-                    link.name,
-                    link.pose,
-                    (0.0, 0.0, 1.0),
-                    -free,
-                    free,
-                    free,
-                    free,
-                    0.0,
-                )
-            )
+        held = {link.name for link in links}
+        self.joints = [joint for joint in self.joints if joint.child not in held]
+        self.joints += [_weld(link) for link in links]
+
+    def _note_unknown(self, scope: Scope, saved: Saved) -> None:
+        known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
+        for name in (*saved.links, *saved.models):
+            if name not in known:
+                self.context.note("ignored", saved.element, f"the model has no '{name[:80]}' for it")
+
+
+def _weld(link: Link) -> Joint:
+    return Joint(
+        name=f"{link.name} (static)",
+        kind="fixed",
+        parent=WORLD,
+        child=link.name,
+        pose=link.pose,
+        axis=(0.0, 0.0, 1.0),
+        lower=-math.inf,
+        upper=math.inf,
+        effort=math.inf,
+        velocity=math.inf,
+        damping=0.0,
+    )
 
 
 def _held(model: Model, element: Element, context: Context) -> Model:
@@ -141,19 +176,29 @@ def _held(model: Model, element: Element, context: Context) -> Model:
     return replace(model, static=True, links=links, joints=())
 
 
-def _note_move(first_link: Stand, saved: Saved | None, context: Context) -> None:
-    if saved is None:
-        return
-    way = math.dist(first_link.nominal.position, first_link.actual.position)
-    if way > MOVED:
-        context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{way:.2f} m away")
+def _note_move(stands: list[Stand], saved: Saved, context: Context) -> None:
+    ways = [math.dist(stand.nominal.position, stand.actual.position) for stand in stands]
+    turns = [abs(_half_turn(stand.nominal.inverse() @ stand.actual)) for stand in stands]
+    farthest = max(ways, default=0.0)
+    if farthest > MOVED:
+        context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{farthest:.2f} m away")
+    elif max(turns, default=0.0) > MOVED:
+        context.note("replaced", saved.element, "its own <pose> by the one in <state>", "turned")
     if saved.scale != ONE:
         scale = " ".join(f"{part:g}" for part in saved.scale)
         context.note("replaced", saved.element, f"its sizes by those that <scale> {scale} gives")
 
 
-def _note_gravity(elements: list[Element], context: Context) -> None:
-    pulled = [truth(link, "gravity", True) for link in elements]
+def _half_turn(pose: Pose) -> float:
+    """How far a pose is turned: the sine of half its angle."""
+    return math.hypot(*pose.quaternion[1:])
+
+
+def _note_differences(builder: _Builder, element: Element, context: Context) -> None:
+    """Of some things there is one for all links of a model."""
+    pulled = [truth(link, "gravity", True) for link in builder.elements]
     if any(pulled) and not all(pulled):
-        light = elements[pulled.index(False)]
+        light = builder.elements[pulled.index(False)]
         context.note("ignored", light.find("gravity"), "gravity acts on all links of a model, or on none")
+    if any(builder.self_collide) and not all(builder.self_collide):
+        context.note("replaced", element, "the links that collide with others of the model by all of them")

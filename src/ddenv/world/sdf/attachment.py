@@ -25,7 +25,7 @@ def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | 
             return _joined(name, _canonical(scope.inside(thing), asker, context))
         if thing.tag == "link":
             return name
-        name = text_of(thing.find("child")) if thing.tag == "joint" else thing.get("attached_to") or ""
+        name = text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
     return _canonical(scope, asker, context)
 
 

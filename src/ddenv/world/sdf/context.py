@@ -28,6 +28,7 @@ class Context:
     used: set[str] = field(default_factory=set)
     includes: int = 0
     assembled: int = 0
+    missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
     scopes: dict[int, Any] = field(default_factory=dict)
     canonical: dict[int, str | None] = field(default_factory=dict)
@@ -38,6 +39,19 @@ class Context:
     def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
         """Remembers that `element` was not taken as it is."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
+
+    def miss(self, uri: str, error: UserError) -> None:
+        """Remembers a complaint about a file that is nowhere, so that all of them can be told at once."""
+        self.missing.setdefault(uri, error)
+
+    def complain_of_missing(self) -> None:
+        """Raises the first complaint about a file that is nowhere, with the names of the others."""
+        if not self.missing:
+            return
+        (_, first), *others = self.missing.items()
+        names = ", ".join(f"'{uri[:100]}'" for uri, _ in others[:5])
+        more = f" and {len(others) - 5} more" if len(others) > 5 else ""
+        raise UserError(f"{first}; also missing: {names}{more}") if others else first
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore

@@ -7,8 +7,8 @@ import math
 from functools import cached_property
 from pathlib import Path
 
-from ddenv.world.pose import Pose
-from ddenv.world.sdf.context import Context
+from ddenv.world.pose import HERE, Pose
+from ddenv.world.sdf.context import Context, version
 from ddenv.world.sdf.parts import Part, parts
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
@@ -16,7 +16,6 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 FARTHEST = 1e6
 OWN = ("", "__model__")
 WORLD = "world"
-HERE = Pose()
 
 
 class Scope:
@@ -66,17 +65,19 @@ class Scope:
     def place(self, holder: Element, default: str = "") -> Pose:
         """The pose in the `<pose>` of `holder`, which is relative to the frame `default` unless it names one."""
         element = holder.find("pose")
-        return self._at(_base_of(element, default), element, holder)
+        return self._at(_named_in(element) or default, element, holder)
 
     def placed(self, part: Part) -> Pose:
         """The pose of one of the `parts`."""
         element = part.pose
-        pose = self._at(_base_of(element, ""), element, part.at)
+        pose = self._at(_named_in(element), element, part.at)
         frame = part.placement_frame
         return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
 
     def _at(self, base: str, element: Element | None, holder: Element) -> Pose:
         local = HERE if element is None else pose_of(element)
+        if element is not None and element.get("frame") and version(element) >= (1, 7):
+            self._context.note("ignored", element, "the attribute 'frame' means nothing since SDF 1.7, use relative_to")
         return local if base in OWN else self.pose(base, holder if element is None else element) @ local
 
     def _is_known(self, name: str) -> bool:
@@ -99,11 +100,11 @@ class Scope:
         """The frame that `thing` is placed relative to, and the element that says so; of `a::b` that is `a`."""
         if isinstance(thing, Part):
             element, holder = thing.pose, thing.at
-            base = _base_of(element, "") if name == thing.name else thing.name
+            base = _named_in(element) if name == thing.name else thing.name
         else:
             element, holder = thing.find("pose"), thing
-            default = {"joint": text_of(thing.find("child")), "frame": thing.get("attached_to") or ""}
-            base = _base_of(element, default.get(thing.tag, ""))
+            default = {"joint": text_of(thing.find("child")), "frame": (thing.get("attached_to") or "").strip()}
+            base = _named_in(element) or default.get(thing.tag, "")
         return base, holder if element is None else element
 
     def _local(self, name: str, thing: Element | Part, asker: Element) -> Pose:
@@ -120,7 +121,7 @@ class Scope:
         holders = [*self.element.findall("frame"), *(part.at for part in self.parts)]
         named = [holder.get("attached_to") or "" for holder in holders]
         for pose in (holder.find("pose") for holder in holders):
-            named.append(_base_of(pose, ""))
+            named.append(_named_in(pose))
         # A model's name may itself hold colons.
         return {name for each in named for name in (each, each.split("::", 1)[0]) if name}
 
@@ -131,20 +132,27 @@ def shown(names: list[str]) -> str:
     return " -> ".join(cut if len(cut) <= 6 else [*cut[:4], f"... ({len(cut) - 5} more)", cut[-1]])
 
 
-def _base_of(pose: Element | None, default: str) -> str:
-    return default if pose is None else pose.get("relative_to") or pose.get("frame") or default
+def _named_in(pose: Element | None) -> str:
+    """The frame that a `<pose>` says it is relative to; empty where it names none."""
+    if pose is None:
+        return ""
+    old = pose.get("frame") if pose.get("frame") and version(pose) < (1, 7) else ""
+    return (pose.get("relative_to") or old or "").strip()
 
 
 def pose_of(element: Element) -> Pose:
     """The numbers of a `<pose>`: roll, pitch and yaw, or a quaternion, in rad or degrees. Raises UserError."""
     if not text_of(element):
         return HERE
-    if (element.get("rotation_format") or "euler_rpy") == "quat_xyzw":
+    form = (element.get("rotation_format") or "euler_rpy").strip()
+    if form not in ("euler_rpy", "quat_xyzw"):
+        raise complain(element, f"rotation_format '{form[:40]}' is unknown; use euler_rpy or quat_xyzw")
+    if form == "quat_xyzw":
         x, y, z, *turn = numbers(element, 7)
         pose = Pose((x, y, z), _unit(element, (turn[3], turn[0], turn[1], turn[2])))
     else:
         x, y, z, *angles = numbers(element, 6)
-        scale = math.pi / 180 if (element.get("degrees") or "").strip() in ("1", "true") else 1.0
+        scale = math.pi / 180 if (element.get("degrees") or "").strip().lower() in ("1", "true") else 1.0
         pose = Pose.from_rpy(x, y, z, *(angle * scale for angle in angles)) if any(angles) else Pose((x, y, z))
     if max(abs(x), abs(y), abs(z)) > FARTHEST:
         raise complain(element, f"is farther than {FARTHEST:g} m away")

@@ -8,16 +8,14 @@ import numpy as np
 
 from ddenv.world.files.resources import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector
 from ddenv.world.sdf.context import Context, refuse
-from ddenv.world.sdf.polyline import read_polyline
+from ddenv.world.sdf.faceted import cone, read_polyline
 from ddenv.world.sdf.standin import SIZES
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 
-SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "mesh", "polyline")
+SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
-ONE: Vector = (1.0, 1.0, 1.0)
-HERE = Pose()
 
 
 @dataclass(frozen=True)
@@ -61,6 +59,9 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
             return None
         case "heightmap" | "image":
             return _left_out(element, parent, context)
+    if element.tag == "cone":
+        (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
+        return Placed(cone(radius, length))
     return Placed(_primitive(element, scale))
 
 
@@ -132,17 +133,20 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
     except (Missing, Unusable) as error:
         return Lost(element, uri, str(error))
+    if convex:
+        context.note("replaced", element, f"'{uri}' by its convex hull")
     return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
     """What can be done about a collision mesh that cannot be had; `siblings` are the kinds of other shapes in its link."""
-    package = "/".join(lost.uri.split("/")[:3]) if "://" in lost.uri else lost.uri
+    # Of model://barrel/meshes/barrel.dae the model is named: what stands in for one of its meshes does for all.
+    package = "/".join(lost.uri.split("/")[:3]) if lost.uri.startswith(("model://", "package://")) else lost.uri
     others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
     also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
     return (
         f"mesh '{lost.uri[:200]}' cannot be had: {lost.reason}; name its folder with --model-path, or a shape in m with "
-        f"--stand-in '{package[:200]}=cylinder:radius,length' (or {others}){also}, or leave it out with --ignore mesh"
+        f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, or leave it out with --ignore mesh"
     )
 
 

@@ -30,9 +30,10 @@ def read_inertia(
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
         return spread(collisions, density, link_pose, DEFAULT_MASS)
-    if (element.get("auto") or "").strip().lower() in ("1", "true"):
-        return spread(collisions, density, link_pose, None)
     mass = _number(element, "mass", DEFAULT_MASS)
+    if (element.get("auto") or "").strip().lower() in ("1", "true"):
+        given = element.find("mass") is not None and LIGHTEST <= mass <= HEAVIEST
+        return spread(collisions, density, link_pose, mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
         computed = spread(collisions, density, link_pose, None)
         why = f"mass {mass:g} kg cannot be: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
@@ -41,11 +42,14 @@ def read_inertia(
     tensor = element.find("inertia")
     place = element.find("pose")
     pose = Pose() if place is None else pose_of(place)
+    if place is not None and (place.get("relative_to") or place.get("frame")):
+        context.note("ignored", place, "a centre of mass is given in the frame of its link")
     if tensor is not None:
         moments = tuple(_number(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
         products = tuple(_number(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
-        if is_possible(moments, products):
-            return Inertia(mass, link_pose @ pose, moments, products)  # type: ignore[arg-type]
+        rounded = _rounded_up(moments, products)
+        if is_possible(rounded, products):
+            return Inertia(mass, link_pose @ pose, rounded, products)  # type: ignore[arg-type]
     said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 cannot be"
     context.note("replaced", element, f"{said}: worked out from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
@@ -71,14 +75,29 @@ def _shown(tensor: Element) -> str:
     return " ".join(text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
 
 
-def is_possible(moments: Sequence[float], products: Sequence[float]) -> bool:
-    """Whether a body can have these: its principal moments are above zero, and none exceeds the sum of the others."""
+def _rounded_up(moments: Sequence[float], products: Sequence[float]) -> tuple[float, ...]:
+    """`moments`, a little larger where only the rounding of a thin plate's figures makes them impossible."""
+    low, middle, high = _principal(moments, products)
+    excess = high - low - middle
+    if not -1e-9 * high < excess < 1e-5 * high:
+        return tuple(moments)
+    return tuple(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+
+
+def _principal(moments: Sequence[float], products: Sequence[float]) -> tuple[float, float, float]:
+    """The principal moments, the least first; NaN where there are none."""
     xx, yy, zz = moments
     xy, xz, yz = products
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if not np.isfinite(tensor).all() or np.abs(tensor).max() > HEAVIEST:
-        return False
-    low, middle, high = np.linalg.eigvalsh(tensor)
+        return math.nan, math.nan, math.nan
+    low, middle, high = np.linalg.eigvalsh(tensor).tolist()
+    return low, middle, high
+
+
+def is_possible(moments: Sequence[float], products: Sequence[float]) -> bool:
+    """Whether a body can have these: its principal moments are above zero, and none exceeds the sum of the others."""
+    low, middle, high = _principal(moments, products)
     return bool(low > LEAST_MOMENT and high <= low + middle)
 
 
@@ -100,6 +119,7 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
     tensor *= factor
     moments = tuple(float(tensor[axis, axis]) for axis in range(3))
     products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
+    moments = _rounded_up(moments, products)
     if not is_possible(moments, products):
         return _ball(link_pose, total * factor)
     place = Pose(tuple(float(part) for part in middle))  # type: ignore[arg-type]

@@ -10,7 +10,8 @@ from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.attachment import link_of
 from ddenv.world.sdf.context import Context, refuse, version
 from ddenv.world.sdf.frames import WORLD, Scope, shown
-from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
+from ddenv.world.sdf.unread import note_unread
+from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numbers, text_of, truth
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
@@ -31,6 +32,7 @@ def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand],
     """The joints directly inside a model at the nominal `pose`; `stands` are its links by full name. Raises UserError."""
     joints, names = [], set()
     for element in scope.element.findall("joint"):
+        note_unread(element, context)
         if name_of(element) in names:
             raise complain(element, "this name stands twice; every joint of a model needs a name of its own")
         names.add(name_of(element))
@@ -66,6 +68,7 @@ def _joint(
     second = _second_axis(element, first, scope, model_pose, nominal) if kind == "universal" else None
     limit = None if axis is None or kind not in LIMITED else axis.find("limit")
     dynamics = None if axis is None else axis.find("dynamics")
+    _note_unlimited(element, kind, context)
     joint = Joint(
         name=prefix + name_of(element),
         kind=kind,
@@ -73,8 +76,8 @@ def _joint(
         child=child,
         pose=moved @ nominal,
         axis=moved.rotate(first),
-        lower=-math.inf if limit is None else _bound(number(limit, "lower", -UNLIMITED)),
-        upper=math.inf if limit is None else _bound(number(limit, "upper", UNLIMITED)),
+        lower=_limit_of(limit, "lower", -math.inf),
+        upper=_limit_of(limit, "upper", math.inf),
         effort=_limit(axis, "effort"),
         velocity=_limit(axis, "velocity"),
         damping=0.0 if dynamics is None else _damping(dynamics),
@@ -83,6 +86,16 @@ def _joint(
     if joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf:
         raise complain(limit, f"the lower limit {joint.lower:g} is above the upper one, {joint.upper:g}")
     return _counted_from_here(joint, first, stands)
+
+
+def _note_unlimited(element: Element, kind: str, context: Context) -> None:
+    for axis in (element.find("axis"), element.find("axis2")):
+        limit = None if axis is None else axis.find("limit")
+        bounds = [] if limit is None else [limit.find("lower"), limit.find("upper")]
+        if kind not in LIMITED and any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds):
+            context.note("ignored", limit, f"the limits of a {kind} joint")
+        if axis is not None and axis.find("use_parent_model_frame") is not None and version(axis) >= (1, 7):
+            context.note("ignored", axis.find("use_parent_model_frame"), "it means nothing since SDF 1.7")
 
 
 def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand], context: Context) -> str:
@@ -140,17 +153,32 @@ def _counted_from_here(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> 
     else:
         w, *turn = (seen @ child.nominal.inverse()).quaternion
         here = 2 * math.atan2(sum(a * b for a, b in zip(turn, axis, strict=True)), w)
-        here -= 2 * math.pi * round(here / (2 * math.pi))
+        here = _nearest_turn(here, joint.lower, joint.upper)
     return replace(joint, lower=joint.lower - here, upper=joint.upper - here)
+
+
+def _nearest_turn(angle: float, lower: float, upper: float) -> float:
+    """`angle` or the same a whole number of turns on, whichever is nearest to being within the limits, rad."""
+    turns = (angle + 2 * math.pi * number for number in (0, 1, -1, 2, -2))
+    return min(turns, key=lambda turn: max(lower - turn, turn - upper, 0.0))
 
 
 def _bound(value: float) -> float:
     return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
 
 
+def _limit_of(limit: Element | None, tag: str, default: float) -> float:
+    """A number that may also be infinite. Raises UserError."""
+    child = None if limit is None else limit.find(tag)
+    if child is None:
+        return default
+    values = floats(child)
+    return _bound(values[0]) if len(values) == 1 and math.isinf(values[0]) else _bound(numbers(child, 1)[0])
+
+
 def _limit(axis: Element | None, tag: str) -> float:
     limit = None if axis is None else axis.find("limit")
-    value = -1.0 if limit is None else number(limit, tag, -1.0)
+    value = _limit_of(limit, tag, -1.0)
     return math.inf if value < 0 or value >= UNLIMITED else value
 
 

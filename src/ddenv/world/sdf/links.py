@@ -9,10 +9,10 @@ import numpy as np
 
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.geometry import ONE, Lost, Placed, read_shape, remedies
+from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
 from ddenv.world.sdf.surface import can_be_touched, read_color, read_friction
 from ddenv.world.sdf.unread import note_unread
@@ -89,7 +89,8 @@ def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None
         context.note("ignored", lost.element, f"'{lost.uri}' cannot be had ({lost.reason}): nothing collides with it")
         return None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
-    raise complain(lost.element, remedies(lost, tuple(sorted(kinds))))
+    context.miss(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
+    return None
 
 
 def _box_around(items: list[_Item]) -> Placed | None:

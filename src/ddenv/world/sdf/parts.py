@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote
 
 from ddenv.world.files.resources import Missing
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from ddenv.world.sdf.context import Context, refuse, sdf_root
 from ddenv.world.sdf.standin import SIZES, StandIn
+from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
 # What an included file may hold in place of a model, which nothing can touch.
 UNTOUCHABLE = ("actor", "light")
+# How the names of files begin that stand in for others.
+STAND_IN = "stand-in "
 
 
 @dataclass(frozen=True)
@@ -37,9 +41,8 @@ class Part:
     @property
     def placement_frame(self) -> str:
         """The frame inside the model that the pose is of; empty for the model's own."""
-        if self.at is not self.element and self.at.find("pose") is not None:
-            return text_of(self.at.find("placement_frame"))
-        return self.element.get("placement_frame") or ""
+        given = "" if self.at is self.element else text_of(self.at.find("placement_frame"))
+        return given or (self.element.get("placement_frame") or "").strip()
 
 
 def parts(element: Element, files: tuple[Path, ...], context: Context) -> list[Part]:
@@ -59,8 +62,14 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
     uri = text_of(include.find("uri"))
     if not uri:
         raise complain(include, "has no <uri>")
+    if include.find("placement_frame") is not None and include.find("pose") is None:
+        raise complain(include, "a <placement_frame> needs a <pose>")
+    note_unread(include, context)
     if (include.get("merge") or "").strip().lower() in ("true", "1"):
-        raise refuse(include, "merge='true' is not supported")
+        if not context.ignores("include"):
+            raise refuse(include, "merge='true' is not supported")
+        context.note("ignored", include, "merge='true': left out as asked")
+        return None
     root = _root(include, uri, context)
     if root is None:
         return None
@@ -70,28 +79,38 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
     model = _only_model(root, include, context)
     if model is None:
         return None
-    name = text_of(include.find("name")) or name_of(model)
+    name = text_of(include.find("name")) or (_last_of(uri) if root.source.name.startswith(STAND_IN) else name_of(model))
     static = truth(include, "static", False) if include.find("static") is not None else None
     return Part(model, include, name, (*files, root.source), static)
+
+
+def _last_of(uri: str) -> str:
+    """What a model is called of which only the URI is known."""
+    return unquote(uri).rstrip("/").rsplit("/", 1)[-1].removesuffix(".sdf") or "model"
 
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
     """The included file; None where it is nowhere and the user wants it left out."""
     given = context.stand_in(uri)
     if given is not None:
+        outer = context.model
+        context.model = outer or text_of(include.find("name")) or _last_of(uri)
         context.note("replaced", include, f"'{uri}' by the stand-in {given[0]}")
+        context.model = outer
         return _stand_in_root(include, *given)
     try:
         return context.root(include, uri)
-    except Missing as error:
+    except Missing as missing:
         if context.ignores("include"):
-            context.note("ignored", include, f"'{uri}' was not found: {error}")
+            context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None
-        raise complain(
+        error = complain(
             include,
-            f"'{uri[:200]}' was not found ({error}); name its folder with --model-path, or a shape for it with --stand-in "
-            f"'{uri[:200]}=box:x,y,z' (or cylinder, sphere, ...), or leave it out with --ignore include",
-        ) from None
+            f"'{uri[:200]}' was not found ({missing}); name its folder with --model-path, or a shape for it with --stand-in "
+            f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), or leave it out with --ignore include",
+        )
+        context.miss(uri, error)
+        return None
 
 
 def _only_model(root: Element, include: Element, context: Context) -> Element | None:
@@ -116,7 +135,7 @@ def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
         '<sdf version="1.12"><model name="stand-in"><static>true</static><link name="link">'
         f'<collision name="stand-in">{inside}</collision></link></model></sdf>'
     )
-    return sdf_root(sdf.encode(), include.source.parent / f"stand-in {text}")
+    return sdf_root(sdf.encode(), include.source.parent / f"{STAND_IN}{text}")
 
 
 def _geometry_text(shape: Shape) -> str:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
-from ddenv.world.sdf.geometry import ONE
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, text_of
 
 # A model that moved faster than this when the world was saved did not stand still, m/s and rad/s.

@@ -9,6 +9,8 @@ Color = tuple[float, float, float, float]
 
 # SDF's default for <mu>, and what simulators use where a surface names none.
 DEFAULT_MU = 1.0
+# A collide_bitmask with which a collision touches all others.
+EVERYTHING = 0xFFFF
 # The colours of Gazebo's own materials that worlds name most often.
 GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
     "Black": (0.05, 0.05, 0.05),
@@ -48,7 +50,7 @@ def read_friction(collision: Element, context: Context) -> float:
         return DEFAULT_MU
     both = []
     for name in names:
-        mu = number(engine, name, both[0] if both else DEFAULT_MU)
+        mu = number(engine, name, DEFAULT_MU)
         if mu < 0:
             raise complain(engine.find(name), f"friction must not be negative, found {mu:g}")
         both.append(mu)
@@ -64,9 +66,12 @@ def can_be_touched(collision: Element, context: Context) -> bool:
     if contact is None:
         return True
     mask = text_of(contact.find("collide_bitmask"))
-    if mask and _integer(contact.find("collide_bitmask"), mask) & 0xFFFF == 0:
+    bits = _integer(contact.find("collide_bitmask"), mask) & EVERYTHING if mask else EVERYTHING
+    if bits == 0:
         context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
         return False
+    if bits != EVERYTHING:
+        context.note("ignored", contact.find("collide_bitmask"), "it touches everything")
     if truth(contact, "collide_without_contact", False):
         context.note("ignored", collision, "it collides without contact")
         return False

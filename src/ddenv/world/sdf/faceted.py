@@ -1,8 +1,9 @@
-"""SDF's `<polyline>`: an outline in x and y that is extruded upwards; taken as its convex hull."""
+"""Shapes that are made of flat faces here: `<polyline>`, an outline in x and y extruded upwards, and `<cone>`."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from ddenv.world.model import Mesh
 from ddenv.world.outline import convex_hull, polygon_area
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.xml import Element, complain, numbers
+
+SIDES = 32
 
 
 def read_polyline(geometry: Element, context: Context) -> Mesh:
@@ -49,3 +52,14 @@ def prism(corners: np.ndarray, height: float) -> Mesh:
     # Equal outlines make equal meshes, wherever they stand.
     origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
     return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))
+
+
+def cone(radius: float, length: float) -> Mesh:
+    """A cone about its frame's origin, its tip up, m; with 32 sides."""
+    angles = np.arange(SIDES) * 2 * math.pi / SIDES
+    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, -length / 2)])
+    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
+    walls = np.column_stack([here, after, np.full(SIDES, SIDES)])
+    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
+    vertices = np.vstack([rim, [0.0, 0.0, length / 2]])
+    return Mesh(f"cone {radius!r} {length!r}", vertices, np.vstack([walls, fan[:, ::-1]]).astype(np.uint32))
