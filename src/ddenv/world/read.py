@@ -71,7 +71,10 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
 
 
 def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) -> Disk:
-    """The files around the world `path`, and those in the folders that the user names."""
+    """The files around the world `path`, and those in the folders that the user names. Raises UserError."""
+    for folder in reading.model_path:
+        if not folder.is_dir():
+            raise UserError(f"reading.model_path: there is no folder {folder}")
     return Disk(path.parent, reading.model_path, tell)
 
 
@@ -79,9 +82,9 @@ def read_bytes(path: Path) -> bytes:
     """The whole file. Raises UserError for a file that is missing, unreadable or far too large."""
     try:
         if path.is_dir():
-            raise UserError(f"{path}: is a folder; expected an SDF file")
+            raise UserError(f"{path}: is a folder; expected a file")
         if path.exists() and not path.is_file():
-            raise UserError(f"{path}: is no regular file; expected an SDF file")
+            raise UserError(f"{path}: is no plain file")
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; at most {MAX_BYTES / 1e6:.0f} MB are read")

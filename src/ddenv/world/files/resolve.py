@@ -17,7 +17,7 @@ ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 # The newest SDF that is understood: a model's folder may hold one file for each version.
 NEWEST_SDF = (1, 12)
 MODEL_CONFIG_LIMIT = 1_000_000
-CLIMBS = "climbs out of its folder through '..'"
+CLIMBS = "climbs out of its folder through '..' (the folder it goes to may be named with --model-path)"
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
 # What the file system says of a file that is simply not there.
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
@@ -47,14 +47,14 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
     """
     scheme, rest = _split(uri.strip())
     if scheme in ("model", "package"):
-        return _first(_of_model(_inside(rest), folders), f"not in the model path ({_count(folders)})")
+        return _first(_of_model(_inside(rest), folders), f"looked in {_listed(folders)}")
     if scheme in ("http", "https"):
         return _downloaded(rest, folders)
     if scheme not in ("", "file"):
         raise Unusable(f"scheme '{scheme[:30]}:' is not supported")
     if rest.startswith("/"):
         return _first([Path(os.path.normpath(rest))], "there is no such file")
-    where = f"neither beside the file that names it nor in the model path ({_count(folders)})"
+    where = f"looked beside the file that names it and in {_listed(folders)}"
     return _first(_beside(rest, base, folders), where)
 
 
@@ -109,7 +109,7 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     version = tail.pop(0) if tail and tail[0] != "files" else ""
     path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
     models = (*fuel.in_cache(owner, name, version), *fuel.of_name(name, tuple(folders)))
-    where = f"neither in the Fuel cache nor in the model path ({_count(folders)}), and is not downloaded"
+    where = f"looked in the Fuel cache and in {_listed(folders)}; nothing is downloaded"
     return _first((model / path for model in models), where)
 
 
@@ -130,8 +130,10 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
     raise Missing(where)
 
 
-def _count(folders: Sequence[Path]) -> str:
-    return "1 folder" if len(folders) == 1 else f"{len(folders)} folders"
+def _listed(folders: Sequence[Path]) -> str:
+    """The first folders of the model path by name."""
+    names = ", ".join(str(folder)[:100] for folder in folders[:3])
+    return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
 
 
 def model_file(folder: Path) -> Path:
