@@ -267,3 +267,15 @@ def test_a_newer_run_file_is_refused(reduced, tmp_path):
         database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
     for command in ("open", "resume", "test"):
         _is_one_line(ddenv(command, copy), "written by a newer ddenv")
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(1, "1 part of w.sdf was replaced"), (2, "2 parts of w.sdf were replaced")]
+)
+def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
+    from types import SimpleNamespace
+
+    from ddenv.cli.app import _tell_notes
+
+    _tell_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
+    assert capsys.readouterr().out.startswith(words)

@@ -46,6 +46,13 @@ def test_the_ditch_is_seen_and_explained():
     assert len(set(drawn)) > 40
 
 
+def test_where_the_legend_is_cut_the_way_to_all_is_told():
+    models = [box(f"b{number}", number % 20, number // 20) for number in range(300)]
+    assert re.search(
+        r"\.\.\. and \d+ more \(--svg FILE names them\)", terminal_map(world_of(*models), 80, 24, color=False)
+    )
+
+
 def test_without_colours_models_are_areas_of_their_letters():
     text = terminal_map(world_of(*CRATES), 100, 30, color=False)
     assert "\x1b" not in text

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from ddenv.console.check import lines, report
+from ddenv.map.names import width
 from ddenv.world.read import parse_world
 from tests.conftest import DATA
 
@@ -35,9 +36,82 @@ def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):
     assert "dynamic" in row and "1 box" in row and "1.00 x 2.00 x 4.00" in row and "4.00, 2.00, 3.00" in row
     notes = [line.split("  ", 1)[1].strip() for line in told[told.index("notes") + 1 : -2]]
     moved = next(number for number, note in enumerate(notes, 1) if "<state>" in note)
-    assert f"{moved} (3.00 m away)" in row
+    assert f"{moved} (3.00 m)" in row
     assert any(line.startswith("crate #2") and "none" in line for line in told)
-    assert told[-1] == "3 models, 2 can be removed; 5 replaced, 1 ignored"
+    assert told[-1] == "3 models, 2 can be removed; 4 replaced, 1 ignored"
+
+
+def box(name, pose="0 0 0 0 0 0", relative=""):
+    return (
+        f"<model name='{name}'><static>1</static><pose{relative}>{pose}</pose><link name='l'><collision name='c'><geometry>"
+        "<box><size>1 1 1</size></box></geometry></collision></link></model>"
+    )
+
+
+def world_of(tmp_path, *models, more=""):
+    text = f"<sdf version='1.9'><world name='w'>{''.join(models)}{more}</world></sdf>"
+    return parse_world(text.encode(), tmp_path / "w.sdf")
+
+
+def test_one_is_one(tmp_path):
+    assert lines(world_of(tmp_path, box("a")))[-1].startswith("1 model, 1 can be removed; ")
+
+
+def test_models_that_must_stay_are_named(tmp_path):
+    def following(name):
+        return box(f"on {name}", relative=f" relative_to='{name}'")
+
+    one = lines(world_of(tmp_path, box("a"), following("a")))[-1]
+    assert one.startswith("2 models, 1 can be removed; 1 stays since others are placed relative to it: a; ")
+    many = [part for name in "abcdefg" for part in (box(name), following(name))]
+    told = lines(world_of(tmp_path, *many))[-1]
+    assert "; 7 stay since others are placed relative to them: a, b, c, d, e and 2 more; " in told
+
+
+STATE = "".join(
+    f"<model name='crate {name}'><pose>{number} 9 3 0 0 0</pose></model>" for number, name in enumerate("ab")
+)
+CROWD = (box("crate a"), box("crate b"), box("a model whose name is far longer than all of the others"), box("箱" * 12))
+
+
+def rows_of(told):
+    return told[told.index("") + 1 : len(told) - told[::-1].index("notes") - 2]
+
+
+def test_a_narrow_terminal_gets_the_columns_that_matter_most(tmp_path):
+    world = world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>")
+    heads = {columns: " ".join(rows_of(lines(world, columns))[0].split()) for columns in (None, 200, 110, 100, 90, 80)}
+    full = "model kind links shapes size, m centre x, y, z, m yaw notes"
+    assert heads[None] == heads[200] == full
+    detailed = {columns: any(" m)" in row for row in rows_of(lines(world, columns))) for columns in heads}
+    assert detailed[None] and detailed[200] and not detailed[110]
+    order = [" ".join(rows_of(lines(world, columns))[0].split()) for columns in range(140, 40, -1)]
+    assert list(dict.fromkeys(order))[:4] == [
+        full,
+        full.replace("links ", ""),
+        full.replace("links shapes ", ""),
+        full.replace("links shapes ", "").replace("yaw ", ""),
+    ]
+
+
+@pytest.mark.parametrize("columns", [1, 20, 40, 62, 80, 120])
+def test_no_line_is_wider_than_the_terminal(tmp_path, columns):
+    told = lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>"), columns)
+    assert max(map(width, rows_of(told))) <= columns
+    assert columns < 20 or max(map(width, told)) <= columns
+
+
+def test_notes_hang_below_their_number(tmp_path):
+    told = lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>"), 40)
+    notes = told[told.index("notes") + 1 : told.index("", told.index("notes"))]
+    assert notes[0].startswith("   1  replaced: ")
+    assert any(line.startswith("      ") and line.strip() for line in notes)
+
+
+def test_wide_names_stay_in_their_column(tmp_path):
+    rows = rows_of(lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>")))
+    starts = {width(row[: row.index("static")]) for row in rows[1:]}
+    assert starts == {width(rows[0][: rows[0].index("kind")])}
 
 
 def test_the_object_has_everything(world):

@@ -3,7 +3,8 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.launch.runs import create_run, export_world, read_parts
+from ddenv.launch.export import export_world
+from ddenv.launch.runs import create_run, read_parts
 from ddenv.launch.scenarios import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.runfile.store import RunFile
 from ddenv.world.load import load_scenario

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import fake_run
 import pytest
+import yaml
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.workbench.app import Workbench
@@ -187,6 +188,44 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         session.fill(spawn_z="0.16")
         await session.press("ctrl+s")
         assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic"})]
+
+
+async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, started):
+    own = {
+        "failure": {"timeout": 12, "epsilon": 0.25},
+        "reduction": {"iterations": 9, "n_partitions": 5, "seed": 4, "pair": "timeseg/random"},
+    }
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | own))
+    fields = ("timeout", "epsilon", "iterations", "n_partitions", "seed")
+    async with Opened() as session:
+        assert [session.value(id) for id in fields] == ["12", "0.25", "9", "5", "4"]
+        session.fill(timeout="soon", jobs="many", seed="6")
+        await session.press("ctrl+s")
+        assert session.screen.query_one("#timeout", Input).has_class("-wrong")
+        session.screen._opened(scenarios / "crates.sdf")
+        await session.settle()
+        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.5", "3", "2", "0", "4"]
+        assert session.screen.query_one("#pair", Select).value == "model2model/avg-trajectory-proximal"
+        assert not session.screen.query(".-wrong")
+        assert session.wrong() == ""
+        session.fill(epsilon="near", jobs="2")
+        session.screen.query_one("#scenario-list", OptionList).highlighted = 0
+        await session.pilot.pause()
+        await session.settle()
+        assert [session.value(id) for id in (*fields, "jobs")] == ["12", "0.25", "9", "5", "4", "2"]
+
+
+async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path):
+    other = tmp_path / "other.sdf"
+    other.write_bytes((scenarios / "crates.sdf").read_bytes())
+    async with Opened() as session:
+        session.screen._opened(scenarios / "crates.sdf")
+        await session.settle()
+        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        await session.pilot.pause()
+        session.screen._opened(other)
+        await session.settle()
+        assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
 
 
 async def test_the_file_dialog_can_be_cancelled_and_filters(scenarios, tmp_path, monkeypatch):

@@ -57,9 +57,14 @@ def world_with(shape: Shape, pose: Pose) -> World:
     "shape", [Capsule(0.3, 1.0), Ellipsoid((0.3, 0.3, 0.8)), stone(60)], ids=lambda shape: type(shape).__name__
 )
 def test_round_things_and_meshes_are_in_the_way_too(shape):
-    with pytest.raises(UserError, match="inside model 'thing' by"):
+    with pytest.raises(UserError, match=r"inside .*model 'thing' by"):
         check_spawn(world_with(shape, Pose((0.5, 0.2, 0.3))), HUSKY, Spawn(x=0, y=0, z=0.2))
     check_spawn(world_with(shape, Pose((2.0, 0.2, 0.3))), HUSKY, Spawn(x=0, y=0, z=0.2))
+
+
+def test_a_robot_in_the_hollow_of_a_mesh_is_told_of_the_hull():
+    with pytest.raises(UserError, match="stands inside the convex hull of model 'thing' by"):
+        check_spawn(world_with(stone(60), Pose((0.5, 0.2, 0.3))), HUSKY, Spawn(x=0, y=0, z=0.2))
 
 
 def test_a_slope_is_below_the_robot_where_it_goes_down():

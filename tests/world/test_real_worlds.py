@@ -41,12 +41,18 @@ def test_everything_is_where_its_state_has_it(real):
             assert links[link.get("name")].pose.position == pytest.approx(numbers[:3], abs=1e-3)
 
 
+SCALED = {
+    "frictionpatch6.world": {},
+    "rough_terrain_gap.world": {"asphalt_plane": 1.4296, "asphalt_plane_clone": 1.06472},
+}
+
+
 def test_sizes_are_as_gazebo_scaled_them(real):
-    if real.path.name != "rough_terrain_gap.world":
-        pytest.skip("only the other world has models that were scaled")
-    shape = real.model("asphalt_plane").collisions[0].shape
-    assert isinstance(shape, Box)
-    assert shape.size == pytest.approx((20, 20, 1.4296))
+    state = ElementTree.fromstring(real.text).find("world/state")
+    scaled = {saved.get("name") for saved in state.findall("model") if saved.find("scale").text != "1 1 1"}
+    assert scaled == set(SCALED[real.path.name])
+    for name, height in SCALED[real.path.name].items():
+        assert real.model(name).collisions[0].shape == Box(pytest.approx((20, 20, height)))
 
 
 @settings(max_examples=25)

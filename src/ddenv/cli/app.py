@@ -18,6 +18,9 @@ from ddenv.cli.options import JOBS, reading_options, scenario_options
 from ddenv.cli.world import world_group
 from ddenv.errors import UserError, printable
 
+# Of one URI so many columns are told.
+LONGEST_URI = 80
+
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
@@ -152,12 +155,15 @@ def test(
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     """Writes the world that RUN has left."""
-    from ddenv.launch.runs import export_world, find_run
+    from ddenv.launch.export import export_world
+    from ddenv.launch.runs import find_run
 
     if sdf is None:
         raise UserError("nothing to export: give --sdf FILE")
-    for path in export_world(find_run(run), sdf, scenario):
+    exported = export_world(find_run(run), sdf, scenario)
+    for path in exported.files:
         print(f"wrote {path}")
+    _tell_needs(sdf, exported.needs)
     return 0
 
 
@@ -204,15 +210,27 @@ def _tell(line: str) -> None:
 
 
 def _tell_notes(world: Any, as_json: bool) -> None:
+    from ddenv.console.words import count
+
     if world.notes:
-        line = f"{len(world.notes)} parts of {world.path} were replaced or ignored; 'ddenv world check' tells which and why"
+        were = f"{count(len(world.notes), 'part')} of {world.path} {'was' if len(world.notes) == 1 else 'were'}"
+        line = f"{were} replaced or ignored; 'ddenv world check' tells which and why"
         print(printable(line), file=sys.stderr if as_json else sys.stdout, flush=True)
+
+
+def _tell_needs(sdf: Path, uris: list[str]) -> None:
+    """A written world keeps its text, and with it what that names of other files."""
+    from ddenv.console.words import first_of
+    from ddenv.map.names import shortened
+
+    if uris:
+        _tell(f"{sdf} still needs {first_of([shortened(uri, LONGEST_URI) for uri in uris], 3)}")
 
 
 def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
     from ddenv.console.follow import Interrupted, follow
     from ddenv.console.summary import lines, summary
-    from ddenv.launch.runs import export_world
+    from ddenv.launch.export import export_world
 
     code = 0
     try:
@@ -222,7 +240,7 @@ def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
         state, code = interrupted.state, 130
     print(json.dumps(summary(state, path)) if as_json else "\n".join(lines(state, path)), flush=True)
     if sdf is not None and state.baseline is not None:
-        export_world(path, sdf, None)
+        _tell_needs(sdf, export_world(path, sdf, None).needs)
     if code == 130:
         print(f"interrupted; go on with: ddenv resume {path}", file=sys.stderr)
     return code

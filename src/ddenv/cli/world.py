@@ -28,7 +28,8 @@ def check(file: Path, as_json: bool, **reading) -> int:
     from ddenv.console.check import lines, report
 
     world = _read(file, reading)
-    print(json.dumps(report(world)) if as_json else "\n".join(lines(world)))
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    print(json.dumps(report(world)) if as_json else "\n".join(lines(world, columns)))
     return 0
 
 

@@ -120,11 +120,17 @@ def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
     shown = entries if len(entries) <= room else entries[: room - 1]
     cells = [_cell(entry, widths) for entry in shown]
     if len(shown) < len(entries):
-        cells.append(padded(f"... and {len(entries) - len(shown)} more", wide))
+        cells.append(padded(_more(len(entries) - len(shown), columns), wide))
     stacks = [[_cell(HEADER, widths), *cells[start : start + lines]] for start in range(0, len(cells), lines)]
     height = max(map(len, stacks))
     rows = zip(*([*stack, *[""] * (height - len(stack))] for stack in stacks), strict=True)
     return [shortened((2 * GAP).join(row).rstrip(), columns) for row in rows]
+
+
+def _more(number: int, columns: int) -> str:
+    told = f"... and {number} more"
+    remedy = f"{told} (--svg FILE names them)"
+    return remedy if width(remedy) <= columns else told
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 
 from ddenv.runfile.state import RunState
 
@@ -74,3 +75,9 @@ def iterations(state: RunState) -> str:
 def count(number: int, word: str) -> str:
     """1 model, 2 models."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """a, b and 3 more: not more than `most` of them by name."""
+    left = len(names) - most
+    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")

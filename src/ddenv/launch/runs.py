@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import platformdirs
-import yaml
 
 from ddenv.errors import UserError
 from ddenv.launch.scenarios import load_parts
@@ -17,7 +16,6 @@ from ddenv.world.files.resources import Stored
 from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world, read_bytes
 from ddenv.world.scenario import Scenario
-from ddenv.world.write import without, write_file
 
 SUFFIX = ".ddenv"
 # How the names of documents begin that were read of other files.
@@ -97,25 +95,3 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     if fold(run.events()[:1]).elements != world.elements(frozenset(scenario.protected)):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
-
-
-def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> list[Path]:
-    """Writes the environment that a run has left as an SDF world, and a scenario for it; returns what was written."""
-    with RunFile(run) as file:
-        scenario, world, _ = read_parts(file)
-        robot = file.document("robot")
-        state = fold(file.events())
-    if not state.elements:
-        raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
-    write_file(sdf, without(world, frozenset(state.elements) - frozenset(state.environment)))
-    if scenario_file is None:
-        return [sdf]
-    model = scenario_file.with_suffix(".robot.sdf")
-    write_file(model, robot)
-    data = scenario.model_dump(mode="json")
-    data["world"], data["robot"]["model"] = str(sdf.resolve()), str(model.resolve())
-    if world.resources:
-        # What the world and the robot name relative to themselves is still where they were.
-        data["reading"]["model_path"] += [str(scenario.world.parent), str(scenario.robot.model.parent)]
-    write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
-    return [sdf, model, scenario_file]

@@ -57,8 +57,6 @@ def make_round(
             found.setdefault(part, Candidate("partition", near, part))
         if candidates != "partitions":
             found.setdefault(rest, Candidate("complement", other, rest))
-    worth = tuple(
-        one for models, one in found.items() if models != everything and (models or len(everything) == 1)
-    )
+    worth = tuple(one for models, one in found.items() if models != everything and (models or len(everything) == 1))
     partitions, scores = zip(*ranked, strict=True)
     return Round(n_partitions, environment, tuple(partitions), tuple(scores), worth)

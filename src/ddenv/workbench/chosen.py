@@ -16,12 +16,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Chosen:
-    """A world, how it was read, and its scenario unless a bare world was picked."""
+    """A world, how it was read, and its scenario unless a bare world was picked.
+
+    `settings` has the options that the form starts with: the scenario's own, or the defaults.
+    """
 
     path: Path
     world: World
     reading: Reading
     scenario: Scenario | None
+    settings: Scenario
 
     @property
     def name(self) -> str:
@@ -41,11 +45,12 @@ class Chosen:
 
 def read_choice(path: Path, options: Mapping[str, Any]) -> Chosen:
     """A scenario or a world file; `options` are those of the command line on how to read worlds. Raises UserError."""
-    from ddenv.launch.scenarios import reading_of
+    from ddenv.launch.scenarios import reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
     from ddenv.world.read import read_world
     from ddenv.world.scenario import PLAIN
 
     scenario = load_scenario(path) if path.suffix.lower() in (".yaml", ".yml") else None
     reading = reading_of(scenario.reading if scenario else PLAIN, **options)
-    return Chosen(path, read_world(scenario.world if scenario else path, reading), reading, scenario)
+    settings = scenario or scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    return Chosen(path, read_world(scenario.world if scenario else path, reading), reading, scenario, settings)

@@ -73,6 +73,15 @@ def jobs(number: int) -> int:
     return number
 
 
+def are_jobs(text: str) -> bool:
+    """Whether `text` can stand in the field for jobs."""
+    try:
+        jobs(int(text))
+    except (ValueError, FieldError):
+        return False
+    return True
+
+
 def texts_of(scenario: Scenario) -> dict[str, str]:
     """What a scenario's own settings are, as texts for the fields."""
     reduction, failure = scenario.reduction, scenario.failure

@@ -6,7 +6,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.world.extent import Bounds, shape_bounds
-from ddenv.world.model import Collision, Model, Plane, World
+from ddenv.world.model import Collision, Mesh, Model, Plane, World
 from ddenv.world.overlap import Hull, hull, overlap
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Spawn
@@ -30,10 +30,13 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
     boxes = [shape_bounds(collision.shape, place @ collision.pose) for collision in solid]
     where = f"robot.spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
     for model in world.models:
-        depth = max((_depth(bodies, boxes, collision) for collision in model.collisions), default=0.0)
+        depths = [(_depth(bodies, boxes, collision), collision.shape) for collision in model.collisions]
+        depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))
         if depth > TOLERANCE:
+            # A mesh may be hollow where its hull is not: what is meant is not what is seen.
+            what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
             raise UserError(
-                f"{where}: the robot stands inside model '{model.name}' by {depth:.2f} m; move the spawn or raise its z"
+                f"{where}: the robot stands inside {what} '{model.name}' by {depth:.2f} m; move the spawn or raise its z"
             )
 
 

@@ -189,9 +189,9 @@ class SetupScreen(Screen[None]):
         self._form.ask_for_places(scenario is None)
         self.query_one("#preview").border_title = Text(shorten(plain(chosen.name), 40))
         self.query_one("#about", Static).update(Text(chosen.about))
-        if scenario is not None:
-            self._form.show_settings(scenario)
-        self._form.suggest_name(free_run_path(scenario.name if scenario else chosen.path.stem).stem)
+        self._form.show_settings(chosen.settings)
+        self._form.suggest_name(free_run_path(chosen.settings.name).stem)
+        self._mark_places()
 
     @on(OptionsForm.PlaceEdited)
     def _mark_places(self) -> None:

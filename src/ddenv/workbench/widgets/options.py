@@ -59,7 +59,7 @@ class OptionsForm(Vertical):
         yield Static("", id="wrong", markup=False)
 
     def on_mount(self) -> None:
-        self.query_one("#jobs", Input).value = str(os.cpu_count() or 1)
+        self.query_one("#jobs", Input).value = _default_jobs()
         self.ask_for_places(False)
 
     @property
@@ -88,9 +88,14 @@ class OptionsForm(Vertical):
         self.query_one("#places").display = ask
 
     def show_settings(self, scenario: Scenario) -> None:
-        """Fills in what the scenario says."""
-        for id, text in form.texts_of(scenario).items():
-            self.query_one(f"#{id}", Input).value = text
+        """Fills in what the scenario says, in place of what another one said or was mistyped."""
+        texts = form.texts_of(scenario)
+        if not form.are_jobs(self.texts["jobs"]):
+            texts["jobs"] = _default_jobs()
+        for id, text in texts.items():
+            field = self.query_one(f"#{id}", Input)
+            field.value = text
+            field.remove_class("-wrong")
         self.query_one("#pair", Select).value = scenario.reduction.pair
 
     def suggest_name(self, name: str) -> None:
@@ -120,6 +125,10 @@ class OptionsForm(Vertical):
 
     def tell(self, words: str) -> None:
         self.query_one("#wrong", Static).update(Text(plain(words)))
+
+
+def _default_jobs() -> str:
+    return str(os.cpu_count() or 1)
 
 
 def _field(field: form.Field) -> ComposeResult:
