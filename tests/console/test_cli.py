@@ -132,11 +132,11 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
     _, undisturbed = reduced
     run = home / "killed.ddenv"
     start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2"]
-    for moment in (3, 6, 9):
+    for engines, moment in enumerate((3, 6, 9), start=1):
         process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        _wait(lambda least=moment: run.exists() and len(_finished(run)) >= least)
-        pid = [event.data["pid"] for event in RunFile(run).events() if event.kind == "engine_started"][-1]
-        os.kill(pid, signal.SIGKILL)
+        # The one before may have made more tests than this one waits for.
+        _wait(lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least)
+        os.kill(_engines(run)[-1], signal.SIGKILL)
         _, err = process.communicate(timeout=30)
         assert process.returncode == 2
         assert err.count("\n") == 1
@@ -147,6 +147,12 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
     summary = json.loads(done.stdout)
     assert summary["kept"] == undisturbed["kept"]
     assert len(_finished(run)) == len(set(_finished(run)))
+
+
+def _engines(run):
+    """The processes of all engines so far."""
+    with RunFile(run) as file:
+        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"]
 
 
 def _finished(run):
