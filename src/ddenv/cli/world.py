@@ -43,7 +43,7 @@ def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
     """Draws the map of FILE, from above."""
     from ddenv.console.show import terminal_map
     from ddenv.map.svg import svg_map
-    from ddenv.world.write import write_file
+    from ddenv.world.files.whole import write_file
 
     world = _read(file, reading)
     marks = {"spawn": spawn and (*spawn, 0.0)[:3], "goal": goal}

@@ -15,10 +15,11 @@ from ddenv.runfile.store import RunFile
 from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.files.resolve import find
 from ddenv.world.files.resources import Stored
+from ddenv.world.files.whole import write_file
 from ddenv.world.model import Mesh, World
 from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
-from ddenv.world.write import without, write_file
+from ddenv.world.write import without
 
 
 @dataclass(frozen=True, slots=True)

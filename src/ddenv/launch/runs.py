@@ -13,8 +13,9 @@ from ddenv.launch.scenarios import load_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.world.files.resources import Stored
+from ddenv.world.files.whole import read_bytes
 from ddenv.world.model import Model, World
-from ddenv.world.read import parse_model, parse_world, read_bytes
+from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
 
 SUFFIX = ".ddenv"

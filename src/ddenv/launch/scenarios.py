@@ -8,10 +8,11 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.bundled import SDF
+from ddenv.world.files.whole import read_bytes
 from ddenv.world.load import validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
-from ddenv.world.read import disk_of, parse_model, read_bytes, read_world
+from ddenv.world.read import disk_of, parse_model, read_world
 from ddenv.world.scenario import PLAIN, Reading, Scenario
 from ddenv.world.sdf.standin import parse_option
 

@@ -17,6 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ddenv.errors import UserError
+from ddenv.world.files.whole import write_file
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import (
     Box,
@@ -36,7 +37,6 @@ from ddenv.world.model import (
     World,
 )
 from ddenv.world.pose import Pose, Vector
-from ddenv.world.write import write_file
 
 DRAKE = "http://drake.mit.edu"
 RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")

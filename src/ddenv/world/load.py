@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from ddenv.errors import UserError
 from ddenv.world.bundled import SCENARIOS, bundled_names
-from ddenv.world.read import read_bytes
+from ddenv.world.files.whole import read_bytes
 from ddenv.world.scenario import Scenario
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.files.resources import Disk, Resources
+from ddenv.world.files.whole import read_bytes
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import PLAIN, Reading
@@ -23,7 +24,6 @@ from ddenv.world.sdf.state import Saved, read_state
 from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers
 
-MAX_BYTES = 100_000_000
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # What would put models into the world that this reader does not see.
 REFUSED = {
@@ -76,25 +76,6 @@ def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) ->
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
     return Disk(path.parent, reading.model_path, tell)
-
-
-def read_bytes(path: Path) -> bytes:
-    """The whole file. Raises UserError for a file that is missing, unreadable or far too large."""
-    try:
-        if path.is_dir():
-            raise UserError(f"{path}: is a folder; expected a file")
-        if path.exists() and not path.is_file():
-            raise UserError(f"{path}: is no plain file")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; at most {MAX_BYTES / 1e6:.0f} MB are read")
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
-    except ValueError:
-        raise UserError(f"{path}: cannot be a file's name") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
-from pathlib import Path
 
-from ddenv.errors import UserError
 from ddenv.world.model import World
 
 _LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
@@ -29,27 +25,3 @@ def without(world: World, removed: frozenset[str]) -> bytes:
 
 def _ends_line(text: bytes, end: int) -> bool:
     return text[end : end + 1] in (b"\n", b"\r", b"")
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Writes all of `content` or nothing: a temporary file beside `path`, then a rename. Raises UserError."""
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).chmod(0o666 & ~_umask())
-        Path(name).replace(path)
-    except OSError as error:
-        Path(name).unlink(missing_ok=True)
-        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
