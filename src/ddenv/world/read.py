@@ -150,7 +150,7 @@ def _gravity(world: Element) -> Vector:
 
 def _note_unused(context: Context, root: Element) -> None:
     """A stand-in that nothing asked for is likely to be mistyped."""
-    for uri in context.stand_ins.keys() - context.used:
+    for uri in sorted(context.stand_ins.keys() - context.used):
         context.note(
             "ignored", root, f"the stand-in for '{uri}' was not needed: nothing of that name is included or drawn"
         )

@@ -26,7 +26,6 @@ class Context:
     model: str = ""
     stand_ins: dict[str, StandIn] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
-    includes: int = 0
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
