@@ -43,9 +43,13 @@ def read_world(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None]
 
 def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
     """The world in `text`, the content of `path`; other files come from `resources`, or else from the disk."""
-    resources = resources or disk_of(path, reading, None)
+    context = Context(resources or disk_of(path, reading, None), reading)
     try:
-        return _world(text, path, Context(resources, reading))
+        return _world(text, path, context)
+    except UserError:
+        # What is wrong may only follow from a file that is missing, such as a place relative to a model in it.
+        context.complain_of_missing()
+        raise
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 

@@ -253,3 +253,8 @@ def test_links_collide_with_their_own_model_as_they_say(read):
     assert model(yes, "", "")
     assert model(no, yes, "")
     assert not model(yes, no, no)
+
+
+def test_a_missing_file_is_told_before_what_follows_from_it(read):
+    with pytest.raises(UserError, match="'model://table' was not found"):
+        read(included() + "<model name='cup'><pose relative_to='table'/><link name='l'/></model>")
