@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 Key = TypeVar("Key")
+Similar = Callable[[Key, int], bool | None]
 
 
 @dataclass(frozen=True)
-class Standing(Generic[Key]):
-    """`verdicts` holds "similar", "dissimilar" or "" (open) for each candidate; `evidence` the run that showed the failure.
+class Standing:
+    """`verdicts` holds "similar", "dissimilar" or "" (open) for each candidate that was looked at; `evidence` the run that showed
+    the failure.
 
     `winner` is the first similar candidate with none open before it. `wanted` are the tests still needed, as (candidate,
     run), in the order in which one worker would make them if none of them showed the failure: idle workers may take them
@@ -25,36 +27,43 @@ class Standing(Generic[Key]):
 
 
 def standing(
-    candidates: Sequence[Key],
-    similar: Mapping[tuple[Key, int], bool],
+    candidates: Iterable[Key],
+    similar: Similar,
     iterations: int,
-    skipped: frozenset[int] = frozenset(),
-) -> Standing[Key]:
+    refused: Container[Key] = frozenset(),
+    *,
+    first: int = 0,
+    enough: int | None = None,
+) -> Standing:
     """Where a round stands (paper, Algorithm 1 lines 4 to 13).
 
-    `similar` says of each finished (candidate, run) whether it showed f. A candidate is similar at its first run that did,
-    in the order of runs, and dissimilar when `1 + iterations` runs did not. `skipped` candidates count as dissimilar.
+    `similar(candidate, run)` says of a finished run whether it showed f, None of another. A candidate is similar at its first run
+    that did, in the order of runs, and dissimilar when `1 + iterations` runs did not. `refused` ones count as dissimilar.
+    `candidates` are those from number `first` on. They are looked at up to the first that is sure to be similar, since nothing
+    behind it is worth a test, and no further than `enough` wanted tests.
     """
-    rows = [_row(similar, key, iterations, index in skipped) for index, key in enumerate(candidates)]
-    verdicts = tuple("" if missing else "dissimilar" if shown is None else "similar" for shown, missing in rows)
-    evidence = tuple(None if missing else shown for shown, missing in rows)
-    # Nothing behind a candidate that is sure to be similar is worth a test.
-    sure = next((index for index, (shown, _) in enumerate(rows) if shown is not None), len(rows))
-    wanted = tuple((index, run) for index, (_, missing) in enumerate(rows[: sure + 1]) for run in missing)
-    winner = sure if sure < len(rows) and not wanted else None
-    return Standing(verdicts, evidence, winner, wanted)
+    verdicts, evidence = [], []
+    wanted: list[tuple[int, int]] = []
+    for index, key in enumerate(candidates, first):
+        shown, missing = (None, []) if key in refused else _row(similar, key, iterations)
+        verdicts.append("" if missing else "dissimilar" if shown is None else "similar")
+        evidence.append(None if missing else shown)
+        wanted += [(index, run) for run in missing]
+        if shown is not None:
+            return Standing(tuple(verdicts), tuple(evidence), None if wanted else index, tuple(wanted))
+        if enough is not None and len(wanted) >= enough:
+            break
+    return Standing(tuple(verdicts), tuple(evidence), None, tuple(wanted))
 
 
-def _row(
-    similar: Mapping[tuple[Key, int], bool], candidate: Key, iterations: int, skipped: bool
-) -> tuple[int | None, list[int]]:
+def _row(similar: Similar, candidate: Key, iterations: int) -> tuple[int | None, list[int]]:
     """The first run that showed f, if any, and the runs before it that are not made yet.
 
     A later run that showed it decides nothing while an earlier one is open: the evidence would depend on timing.
     """
     missing = []
-    for run in () if skipped else range(1 + iterations):
-        known = similar.get((candidate, run))
+    for run in range(1 + iterations):
+        known = similar(candidate, run)
         if known:
             return run, missing
         if known is None:

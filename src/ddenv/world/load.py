@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import reprlib
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from ddenv import schemas
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
 from ddenv.world.bundled import SCENARIOS, bundled_names
 from ddenv.world.files.whole import read_bytes
 from ddenv.world.scenario import Scenario
@@ -26,7 +29,7 @@ def find_scenario(name: str) -> Path:
     if re.fullmatch(r"[\w-]+", name) and bundled.is_file():
         return bundled
     names = bundled_names()
-    raise UserError(f"no scenario '{name}'{_nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file")
+    raise UserError(f"no scenario '{name}'{nearest(name, names)}; bundled are {', '.join(names)}; or give a YAML file")
 
 
 def load_scenario(path: Path) -> Scenario:
@@ -54,9 +57,27 @@ def load_scenario(path: Path) -> Scenario:
 def validate(data: dict[str, Any], where: str) -> Scenario:
     """`data` as a scenario. Raises UserError with the first wrong key; `where` names its file."""
     try:
-        return Scenario.model_validate(data)
+        scenario = Scenario.model_validate(data)
     except ValidationError as error:
         raise UserError(f"{where}: {complaint(error.errors()[0], Scenario)}") from None
+    # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
+    _check_schema(where, "algorithm", scenario.reduction.algorithm, partial(schemas.check, "algorithm"))
+    _check_schema(where, "pair", scenario.reduction.pair, schemas.split_pair)
+    return scenario
+
+
+def _check_schema(where: str, key: str, value: str, check: Callable[[str], object]) -> None:
+    try:
+        check(value)
+    except UserError:
+        known, allowed = schemas.names("algorithm"), ", ".join(schemas.names("algorithm"))
+        if key == "pair":
+            parts = (", ".join(schemas.names(kind)) for kind in ("partitioning", "prioritization"))
+            known, allowed = schemas.pairs(), ", then '/', then one of ".join(parts)
+        guess = nearest(value[:100], known)
+        raise UserError(
+            f"{where}: reduction.{key}: {_shown(value)} is not allowed{guess}; use one of {allowed}"
+        ) from None
 
 
 def complaint(error: Any, model: type[BaseModel]) -> str:
@@ -65,14 +86,14 @@ def complaint(error: Any, model: type[BaseModel]) -> str:
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
         known = sorted(_section(model, location[:-1]).model_fields)
-        return f"{key}: unknown key{_nearest(location[-1], known)}; allowed are {', '.join(known)}"
+        return f"{key}: unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if error["type"] == "missing":
         return f"{key}: is missing"
     context = error.get("ctx", {})
     if error["type"] == "literal_error":
         allowed = context["expected"].replace("'", "").replace(" or ", ", ")
-        nearest = _nearest(str(error["input"]), allowed.split(", "))
-        return f"{key}: {_shown(error['input'])} is not allowed{nearest}; use one of {allowed}"
+        near = nearest(str(error["input"]), allowed.split(", "))
+        return f"{key}: {_shown(error['input'])} is not allowed{near}; use one of {allowed}"
     message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
     return f"{key}: {message.replace('input should', 'should')}, found {_shown(error['input'])}"
 
@@ -81,11 +102,6 @@ def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
     for part in location:
         model = model.model_fields[part].annotation
     return model
-
-
-def _nearest(word: str, known: list[str]) -> str:
-    match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f" (did you mean {match[0]}?)" if match else ""
 
 
 def _shown(value: Any) -> str:

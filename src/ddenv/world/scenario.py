@@ -5,6 +5,7 @@ Written as one YAML file, validated here. Lengths are in m, angles in rad, times
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,14 +15,6 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
-Partitioning = Literal["model2model", "timeseg"]
-Prioritization = Literal["failure-proximal", "avg-trajectory-proximal", "sequential", "random"]
-PARTITIONINGS: tuple[str, ...] = Partitioning.__args__
-PRIORITIZATIONS: tuple[str, ...] = Prioritization.__args__
-PAIRS = tuple(
-    f"{partitioning}/{prioritization}" for partitioning in PARTITIONINGS for prioritization in PRIORITIZATIONS
-)
-Pair = Literal[PAIRS]  # type: ignore[valid-type]
 # What a world may have without being refused for it, if the user says so.
 Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
 IGNORABLE: tuple[str, ...] = Ignorable.__args__
@@ -73,7 +66,7 @@ class Goal(Section):
 
 
 class Sensors(Section):
-    """Standard deviations of what is wrong with the robot's measurements.
+    """Standard deviations of what is wrong with the robot's measurements, and the view of its range sensor.
 
     The noise is drawn anew at every reading, a `*_bias` once in a run.
     """
@@ -86,6 +79,10 @@ class Sensors(Section):
     odometry_bias: NotNegative = Field(
         0.0, description="constant error of the wheel speeds, as a fraction of the speed"
     )
+    view_range: NotNegative = Field(
+        0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
+    )
+    view_angle: Positive = Field(math.tau, le=math.tau, description="field of view about its heading, rad")
 
 
 class Controller(Section):
@@ -111,12 +108,20 @@ class FailureSpec(Section):
 class Reduction(Section):
     """How the world is reduced."""
 
-    algorithm: Literal["ddenv"] = "ddenv"
-    pair: Pair = "model2model/avg-trajectory-proximal"
+    algorithm: str = Field("ddenv", description="how the environment is searched; see `ddenv.schemas`")
+    pair: str = Field("model2model/avg-trajectory-proximal", description="partitioning/prioritization")
     n_partitions: int = Field(2, ge=2, description="partitions in the first round")
     iterations: int = Field(3, ge=0, le=1000, description="re-runs of a candidate that did not show the failure")
     candidates: Literal["both", "partitions", "complements"] = "both"
     complement_order: Literal["paper", "far-first"] = "paper"
+    growth: Literal["paper", "steady"] = Field(
+        "paper", description="when n grows: after every round, or after a vain one"
+    )
+    skip: Literal["known", "implied"] = Field(
+        "known", description="what is not tried: judged sets, or also their subsets"
+    )
+    delta: Positive = Field(0.5, description="change of the angular velocity where trajectoryseg cuts, rad/s")
+    prior: Literal["spatial", "uniform"] = Field("spatial", description="where probdd and splitting begin")
     seed: int = Field(0, ge=0, lt=2**31)
     baseline_runs: int = Field(10, ge=1, le=1000, description="runs of the whole world before the first round")
 

@@ -1,0 +1,104 @@
+"""What an algorithm goes by: how to split and rank the environment, and where the needed models are likely to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv import schemas
+from ddenv.errors import UserError
+from ddenv.reduction.chance import spatial_prior, uniform_prior
+from ddenv.reduction.evidence import Evidence, Lacking, Partition
+from ddenv.reduction.round import Candidate, Round
+
+Split = Callable[[Partition, int], list[Partition]]
+Rank = Callable[[Sequence[Partition]], list[float]]
+Chances = Callable[[Partition], np.ndarray]
+Search = Generator[Round, Candidate | None, frozenset[str]]
+
+# What each field of the evidence is called in the words of `ddenv.reduce`.
+_ARGUMENTS = {
+    "positions": "positions",
+    "trajectory": "a trajectory",
+    "failure_position": "a failure_pose",
+    "first_sensed": "first_sensed",
+}
+
+
+@dataclass(frozen=True)
+class Guide:
+    """`split(environment, n)` gives at most n partitions, `rank(partitions)` their scores, the lowest tried first.
+
+    `chances(environment)` is how likely each model is needed, shape (len(environment),), before any test. `n_partitions` is where
+    ddenv begins; `candidates` and `complement_order` are those of `make_round`, `growth` ("paper" or "steady") and `skip` ("known"
+    or "implied") those of ddenv.
+    """
+
+    split: Split
+    rank: Rank
+    chances: Chances
+    n_partitions: int = 2
+    candidates: str = "both"
+    complement_order: str = "paper"
+    growth: str = "paper"
+    skip: str = "known"
+
+
+def make_guide(
+    partitioning: str,
+    prioritization: str,
+    evidence: Callable[[], Evidence],
+    *,
+    prior: str = "spatial",
+    n_partitions: int = 2,
+    candidates: str = "both",
+    complement_order: str = "paper",
+    growth: str = "paper",
+    skip: str = "known",
+) -> Guide:
+    """The schemas by name, looking at what `evidence()` gives at the moment. Raises UserError for unknown names.
+
+    A schema that lacks what it needs raises UserError when it is used. One that is a class is made anew for each guide: it may
+    remember what it has seen. `prior` is "spatial", where positions and the failure's place are known, or "uniform".
+    """
+    split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
+
+    def split_now(environment: Partition, n: int) -> list[Partition]:
+        try:
+            return split(environment, n, evidence())
+        except Lacking as lacking:
+            raise _complaint("partitioning", partitioning, lacking) from None
+
+    def rank_now(partitions: Sequence[Partition]) -> list[float]:
+        try:
+            return rank(partitions, evidence())
+        except Lacking as lacking:
+            raise _complaint("prioritization", prioritization, lacking) from None
+
+    def chances_now(environment: Partition) -> np.ndarray:
+        known = evidence()
+        if prior == "uniform" or known.positions is None or known.failure_position is None:
+            return uniform_prior(environment)
+        return spatial_prior(environment, known)
+
+    return Guide(split_now, rank_now, chances_now, n_partitions, candidates, complement_order, growth, skip)
+
+
+def search(algorithm: str, elements: Iterable[str], guide: Guide) -> Search:
+    """The algorithm by name, at its beginning. Raises UserError for an unknown name."""
+    return schemas.load("algorithm", algorithm)(tuple(elements), guide)
+
+
+def _made(kind: schemas.Kind, name: str) -> Callable:
+    found = schemas.load(kind, name)
+    return found() if isinstance(found, type) else found
+
+
+def _complaint(kind: str, name: str, lacking: Lacking) -> UserError:
+    what = str(lacking)
+    others = [each for each in schemas.names(kind) if each != name]
+    return UserError(
+        f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is not given; or choose another of {', '.join(others)}"
+    )

@@ -1,0 +1,113 @@
+"""Partitionings, prioritizations and algorithms by name: where each is written, and what its author says of it.
+
+Nothing is imported to list or to explain them, so that views know them all without scikit-learn. Another package adds its own
+through entry points in the groups `ddenv.partitionings`, `ddenv.prioritizations` and `ddenv.algorithms`.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import importlib
+import importlib.util
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Literal
+
+from ddenv.errors import UserError
+
+Kind = Literal["partitioning", "prioritization", "algorithm"]
+
+_OURS: dict[str, dict[str, str]] = {
+    "partitioning": {
+        "model2model": "ddenv.reduction.partitionings.model2model:model2model",
+        "timeseg": "ddenv.reduction.partitionings.timeseg:timeseg",
+        "trajectoryseg": "ddenv.reduction.partitionings.trajectoryseg:trajectoryseg",
+        "learner": "ddenv.reduction.partitionings.learner:Learner",
+    },
+    "prioritization": {
+        "failure-proximal": "ddenv.reduction.prioritizations.failure_proximal:failure_proximal",
+        "avg-trajectory-proximal": "ddenv.reduction.prioritizations.avg_trajectory_proximal:avg_trajectory_proximal",
+        "min-trajectory-proximal": "ddenv.reduction.prioritizations.min_trajectory_proximal:min_trajectory_proximal",
+        "timestep": "ddenv.reduction.prioritizations.timestep:timestep",
+        "sequential": "ddenv.reduction.prioritizations.sequential:sequential",
+        "random": "ddenv.reduction.prioritizations.random:random",
+    },
+    "algorithm": {
+        "ddenv": "ddenv.reduction.algorithms.ddenv:ddenv",
+        "ddmin": "ddenv.reduction.algorithms.ddmin:ddmin",
+        "probdd": "ddenv.reduction.algorithms.probdd:probdd",
+        "splitting": "ddenv.reduction.algorithms.splitting:splitting",
+    },
+}
+
+
+def names(kind: Kind) -> tuple[str, ...]:
+    """All known names, ours first."""
+    return tuple(_known(kind))
+
+
+def pairs() -> tuple[str, ...]:
+    """All pairs of a partitioning with a prioritization, written `model2model/failure-proximal`."""
+    orders = names("prioritization")
+    return tuple(f"{partitioning}/{order}" for partitioning in names("partitioning") for order in orders)
+
+
+def split_pair(pair: str) -> tuple[str, str]:
+    """The partitioning and the prioritization of a pair, both known. Raises UserError."""
+    partitioning, slash, prioritization = pair.partition("/")
+    if not slash:
+        raise UserError(f"'{pair}' is no pair{nearest(pair, pairs())}; write partitioning/prioritization")
+    check("partitioning", partitioning)
+    check("prioritization", prioritization)
+    return partitioning, prioritization
+
+
+def check(kind: Kind, name: str) -> None:
+    """Raises UserError for a name that is not known, with the nearest one."""
+    known = names(kind)
+    if name not in known:
+        raise UserError(f"no {kind} '{name}'{nearest(name, known)}; use one of {', '.join(known)}")
+
+
+def load(kind: Kind, name: str) -> Callable:
+    """The function itself. Raises UserError for an unknown name, and where another package's cannot be loaded."""
+    check(kind, name)
+    module, _, attribute = _known(kind)[name].partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except Exception as error:
+        raise UserError(f"{kind} '{name}': {module}:{attribute} cannot be loaded: {error}") from error
+    if not callable(found):
+        raise UserError(f"{kind} '{name}': {module}:{attribute} is not a function")
+    return found
+
+
+@cache
+def explanation(kind: Kind, name: str) -> str:
+    """What its author says of it: the first paragraph of the docstring, as one line; "" where there is none."""
+    module, _, attribute = _known(kind).get(name, "").partition(":")
+    try:
+        origin = importlib.util.find_spec(module).origin
+        tree = ast.parse(Path(origin).read_text(encoding="utf-8"))
+    except Exception:
+        # Another package may be half removed, or not be written in Python.
+        return ""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == attribute:
+            return " ".join((ast.get_docstring(node) or "").split("\n\n")[0].split())
+    return ""
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """A question about the known word that `word` looks like, or ""."""
+    match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {match[0]}?)" if match else ""
+
+
+@cache
+def _known(kind: Kind) -> dict[str, str]:
+    others = {each.name: each.value for each in entry_points(group=f"ddenv.{kind}s")}
+    return others | _OURS[kind]

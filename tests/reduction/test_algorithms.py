@@ -1,0 +1,107 @@
+"""What every algorithm promises, for any world and any oracle."""
+
+from zlib import crc32
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.reduction.worlds import ALGORITHMS, PAIRS, evidence, run, worlds
+
+OPTIONS = st.fixed_dictionaries(
+    {
+        "n_partitions": st.integers(2, 6),
+        "complement_order": st.sampled_from(["paper", "far-first"]),
+        "growth": st.sampled_from(["paper", "steady"]),
+        "skip": st.sampled_from(["known", "implied"]),
+        "prior": st.sampled_from(["spatial", "uniform"]),
+    }
+)
+# Every pair with the paper's algorithm; the others look at less of it.
+SEARCHES = [("ddenv", pair) for pair in PAIRS] + [
+    (algorithm, pair) for algorithm in ALGORITHMS if algorithm != "ddenv" for pair in (PAIRS[0], PAIRS[-1])
+]
+every_search = pytest.mark.parametrize(
+    ("algorithm", "pair"), SEARCHES, ids=[f"{algorithm}-{'/'.join(pair)}" for algorithm, pair in SEARCHES]
+)
+
+
+def any_oracle(salt):
+    """Shows the failure in a third of all environments, without any order in it."""
+    return lambda models: crc32(f"{salt} {sorted(models)}".encode()) % 3 == 0
+
+
+@every_search
+@given(world=worlds, options=OPTIONS)
+@settings(max_examples=25)
+def test_a_monotone_oracle_leaves_exactly_the_needed_models(algorithm, pair, world, options):
+    count, numbers, seed = world
+    needed = {f"m{index}" for index in numbers}
+    kept, _ = run(evidence(count, seed), needed.issubset, pair, algorithm, **options)
+    assert kept == needed
+
+
+@every_search
+@given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
+@settings(max_examples=25)
+def test_any_deterministic_oracle_leaves_a_one_minimal_environment(algorithm, pair, world, salt, options):
+    count, _, seed = world
+    is_similar = any_oracle(salt)
+    kept, _ = run(evidence(count, seed), is_similar, pair, algorithm, **options)
+    assert not any(is_similar(kept - {name}) for name in kept)
+
+
+@every_search
+@given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
+@settings(max_examples=15)
+def test_partitions_are_disjoint_not_empty_and_cover_the_environment(algorithm, pair, world, salt, options):
+    count, _, seed = world
+    for round, _ in run(evidence(count, seed), any_oracle(salt), pair, algorithm, **options)[1]:
+        models = [name for partition in round.partitions for name in partition]
+        assert sorted(models) == sorted(round.environment)
+        assert all(round.partitions)
+        assert len(round.partitions) <= round.n_partitions or round.exhaustive
+        keeps = [one.models for one in round.candidates]
+        assert keeps
+        assert len(set(keeps)) == len(keeps)
+        assert frozenset(round.environment) not in keeps
+        assert frozenset() not in keeps or len(round.environment) == 1
+        assert [one.size for one in round.candidates] == [len(keep) for keep in keeps]
+
+
+@every_search
+@given(world=worlds, salt=st.integers(0, 10**6))
+@settings(max_examples=15)
+def test_the_environment_only_ever_becomes_a_winner(algorithm, pair, world, salt):
+    count, _, seed = world
+    known = evidence(count, seed)
+    left = frozenset(known.elements)
+    kept, rounds = run(known, any_oracle(salt), pair, algorithm)
+    for round, winner in rounds:
+        assert frozenset(round.environment) == left
+        left = left if winner is None else winner.models
+    assert kept == left
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_world_that_f_does_not_need_is_left_empty(algorithm):
+    assert run(evidence(9, 1), lambda _: True, algorithm=algorithm)[0] == frozenset()
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_an_empty_world_needs_no_round(algorithm):
+    assert run(evidence(0, 1), lambda _: True, algorithm=algorithm) == (frozenset(), [])
+
+
+@given(world=worlds, salt=st.integers(0, 10**6))
+@settings(max_examples=60)
+def test_what_is_implied_lacks_all_that_was_missed_before(world, salt):
+    """With `skip: implied`, a subset of an environment without f is tried only to prove that a single model is needed."""
+    count, _, seed = world
+    failed = []
+    for round, winner in run(evidence(count, seed), any_oracle(salt), skip="implied")[1]:
+        for one in round.candidates:
+            if one is winner:
+                break
+            assert len(round.environment) - one.size == 1 or not any(one.models <= models for models in failed)
+            failed.append(one.models)

@@ -1,0 +1,114 @@
+"""How the environment is split."""
+
+import time
+
+import numpy as np
+import pytest
+
+from ddenv.reduction.evidence import Evidence
+from ddenv.reduction.geometry import nearest_on_path, to_segments
+from ddenv.reduction.guide import make_guide
+from ddenv.reduction.partitionings.model2model import model2model
+from ddenv.reduction.partitionings.timeseg import timeseg
+from ddenv.reduction.partitionings.trajectoryseg import cuts, trajectoryseg
+from ddenv.reduction.round import make_round, one_model_partitions
+from ddenv.schemas import names
+from tests.reduction.worlds import evidence
+
+STILL = np.array([[0.0, 0, 0, 0, 0]])
+
+
+def known(positions, trajectory):
+    return Evidence(tuple(positions), positions, np.array(trajectory, dtype=float), tuple(trajectory[-1][1:4]))
+
+
+def test_model2model_finds_clusters_in_space():
+    positions = {"a": (0.0, 0, 0), "b": (9.0, 0, 0), "c": (0.1, 0, 0), "d": (9.0, 0.1, 0), "e": (0.0, 5, 0)}
+    found = model2model(tuple("abcde"), 3, known(positions, STILL))
+    assert sorted(found) == [("a", "c"), ("b", "d"), ("e",)]
+
+
+def test_models_at_one_place_fall_back_to_one_model_partitions():
+    positions = dict.fromkeys("abcd", (1.0, 1.0, 0.0))
+    assert model2model(tuple("abcd"), 3, known(positions, STILL)) == one_model_partitions(tuple("abcd"))
+
+
+def test_timeseg_groups_models_by_when_the_robot_was_near():
+    path = [[0.0, 0, 0, 0, 0], [1.0, 10, 0, 0, 0], [2.0, 10, 10, 0, 0]]
+    positions = {"early": (2.0, 1, 0), "late": (11.0, 8, 0), "soon": (7.0, -1, 0)}
+    assert timeseg(tuple(positions), 2, known(positions, path)) == [("early", "soon"), ("late",)]
+
+
+def test_timeseg_measures_to_the_path_and_not_only_to_its_samples():
+    path = np.array([[0.0, 0, 0], [10, 0, 0], [10, 4.2, 0]])
+    # 4 m from the middle of the first stretch, whose ends are 6.4 m away; 5 m from the end of the second.
+    distance, fraction = to_segments(np.array([[5.0, 4.0, 0.0]]), path)
+    assert distance[0] == pytest.approx([4.0, 5.0])
+    assert fraction[0, 0] == pytest.approx(0.5)
+    assert nearest_on_path(np.array([[5.0, 4.0, 0.0]]), np.arange(3.0), path)[1] == pytest.approx([0.5])
+
+
+def test_of_two_times_at_one_place_the_first_counts():
+    path = np.array([[0.0, 0, 0], [5, 0, 0], [0, 0, 0]])
+    assert nearest_on_path(np.array([[1.0, 1, 0]]), np.arange(3.0), path)[1] == pytest.approx([0.2])
+
+
+def test_many_models_are_measured_as_few():
+    rng = np.random.default_rng(1)
+    places, path, times = rng.normal(size=(700, 3)), rng.normal(size=(30, 3)), np.arange(30.0)
+    whole = nearest_on_path(places, times, path)
+    alone = [nearest_on_path(places[index : index + 1], times, path) for index in range(len(places))]
+    assert whole[0] == pytest.approx(np.concatenate([distance for distance, _ in alone]))
+    assert whole[1] == pytest.approx(np.concatenate([moment for _, moment in alone]))
+
+
+@pytest.mark.parametrize("split", [timeseg, trajectoryseg])
+def test_a_robot_that_never_moved_still_splits(split):
+    positions = {"a": (0.0, 0, 0), "b": (1.0, 0, 0)}
+    assert split(("a", "b"), 2, known(positions, STILL)) == [("a", "b")]
+
+
+def turning(*rates):
+    """A robot that turns at so many rad/s in one second after the other, looked at each 0.1 s."""
+    yaw = np.concatenate([[0.0], np.cumsum(np.repeat(rates, 10)) / 10])
+    times = np.arange(len(yaw)) / 10
+    return np.column_stack([times, np.cos(yaw), np.sin(yaw), np.zeros(len(yaw)), np.angle(np.exp(1j * yaw))])
+
+
+def test_trajectoryseg_cuts_where_the_turning_changes():
+    # From 0 to 2 rad/s at 1 s, to -2 at 3 s; the heading passes pi on its way.
+    assert cuts(turning(0, 2, 2, -2, -2), 0.5, 3) == pytest.approx([1.0, 3.0])
+
+
+def test_changes_up_to_delta_are_no_cuts_and_long_spans_are_halved():
+    trajectory = turning(0, 1.0, 1.0, 1.4)
+    assert cuts(trajectory, 0.5, 2) == pytest.approx([1.0])
+    # The change of 0.4 at 3 s counts with a smaller delta only; otherwise the longest span, from 1 to 4 s, is halved.
+    assert cuts(trajectory, 0.5, 3) == pytest.approx([1.0, 2.5])
+    assert cuts(trajectory, 0.3, 3) == pytest.approx([1.0, 3.0])
+
+
+def test_of_too_many_cuts_the_sharpest_stay():
+    trajectory = turning(0, 3, 2, 0, 4, 3)
+    assert cuts(trajectory, 0.5, 3) == pytest.approx([1.0, 4.0])
+
+
+def test_trajectoryseg_groups_models_by_manoeuvre():
+    straight = [[t / 10, t / 10, 0, 0, 0] for t in range(21)]
+    turn = [[2 + t / 10, 2 + np.sin(t / 10), 1 - np.cos(t / 10), 0, t / 10] for t in range(1, 11)]
+    positions = {"on the way": (1.0, 0.5, 0), "in the turn": (3.0, 0.2, 0), "at the start": (-1.0, 0, 0)}
+    found = trajectoryseg(tuple(positions), 2, known(positions, straight + turn))
+    assert found == [("on the way", "at the start"), ("in the turn",)]
+
+
+@pytest.mark.parametrize("partitioning", names("partitioning"))
+@pytest.mark.parametrize("n", [2, 60, 700, 4999])
+def test_five_thousand_models_are_split_in_the_end(partitioning, n):
+    """Not a timing, but a second more than planning takes in earnest would show here."""
+    facts = evidence(5000, 1)
+    guide = make_guide(partitioning, "min-trajectory-proximal", lambda: facts)
+    started = time.process_time()
+    partitions = guide.split(facts.elements, n)
+    round = make_round(n, facts.elements, list(zip(partitions, guide.rank(partitions), strict=True)))
+    assert sorted(name for part in round.partitions for name in part) == sorted(facts.elements)
+    assert time.process_time() - started < 30

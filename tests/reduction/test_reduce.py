@@ -1,0 +1,169 @@
+"""The reduction as a function, without Drake."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ddenv
+from ddenv.schemas import names
+from tests.conftest import ROOT
+
+ELEMENTS = tuple("abcdefgh")
+POSITIONS = {name: (float(index), 0.5, 0.0) for index, name in enumerate(ELEMENTS)}
+TRAJECTORY = np.array([[0.1 * step, 8 - 0.1 * step, 0.0, 0.0, np.pi] for step in range(81)])
+SENSED = {"a": 3.0, "h": 0.1}
+ALL = {"positions": POSITIONS, "trajectory": TRAJECTORY, "first_sensed": SENSED}
+
+
+def needs(*needed):
+    return lambda kept: kept >= set(needed)
+
+
+@pytest.mark.parametrize("algorithm", names("algorithm"))
+@pytest.mark.parametrize("partitioning", names("partitioning"))
+@pytest.mark.parametrize("prioritization", names("prioritization"))
+def test_every_combination_finds_the_needed_ones(algorithm, partitioning, prioritization):
+    found = ddenv.reduce(
+        ELEMENTS,
+        needs("b", "g"),
+        algorithm=algorithm,
+        partitioning=partitioning,
+        prioritization=prioritization,
+        **ALL,
+    )
+    assert found.kept == ("b", "g")
+
+
+def test_it_counts_the_tests_it_makes_and_makes_none_twice():
+    made = []
+
+    def test(kept):
+        made.append(kept)
+        return kept >= {"b", "g"}
+
+    found = ddenv.reduce(ELEMENTS, test, **ALL)
+    assert found.tests == len(made) == len(set(made))
+    assert made[0] == frozenset(ELEMENTS)
+    assert found.rounds > 1
+
+
+def test_its_history_goes_from_all_to_what_is_kept():
+    found = ddenv.reduce(ELEMENTS, needs("b", "g"), **ALL)
+    assert found.history[0] == ddenv.reduction.reduce.Step(0, ELEMENTS)
+    assert found.history[-1].kept == found.kept
+    tests = [step.tests for step in found.history]
+    assert tests == sorted(tests)
+    assert tests[-1] <= found.tests
+    for before, after in zip(found.history, found.history[1:], strict=False):
+        assert set(after.kept) < set(before.kept)
+
+
+@given(salt=st.integers(0, 2**31))
+@settings(max_examples=30)
+def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs(salt):
+    rng = np.random.default_rng(salt)
+
+    def flaky(kept):
+        return kept >= {"b", "g"} and rng.random() < 0.8
+
+    found = ddenv.reduce(ELEMENTS, flaky, iterations=12, **ALL)
+    assert found.kept == ("b", "g")
+
+
+def test_a_world_that_does_not_fail_is_refused():
+    with pytest.raises(ddenv.UserError, match="does not show with all elements"):
+        ddenv.reduce(ELEMENTS, lambda _: False, algorithm="ddmin")
+
+
+def test_without_a_check_the_first_test_is_already_a_smaller_one():
+    made = []
+    ddenv.reduce(ELEMENTS, lambda kept: bool(made.append(kept)) or kept >= {"a"}, check=False, algorithm="ddmin")
+    assert made[0] != frozenset(ELEMENTS)
+
+
+def test_rounds_are_told_before_they_are_tested():
+    told = []
+    found = ddenv.reduce(ELEMENTS, needs("b"), on_round=told.append, **ALL)
+    assert len(told) == found.rounds
+    assert told[0].environment == ELEMENTS
+
+
+def test_what_the_test_raises_comes_through():
+    def broken(kept):
+        raise RuntimeError("no robot")
+
+    with pytest.raises(RuntimeError, match="no robot"):
+        ddenv.reduce(ELEMENTS, broken, algorithm="ddmin")
+
+
+WRONG = {
+    "no positions": (
+        {},
+        "partitioning 'model2model' needs positions, which is not given; or choose another of timeseg",
+    ),
+    "no trajectory": (
+        {"positions": POSITIONS, "partitioning": "timeseg", "failure_pose": (0, 0, 0)},
+        "partitioning 'timeseg' needs a trajectory",
+    ),
+    "no failure": ({"positions": POSITIONS}, "prioritization 'failure-proximal' needs a failure_pose"),
+    "no times": (
+        {"positions": POSITIONS, "prioritization": "timestep"},
+        "prioritization 'timestep' needs first_sensed",
+    ),
+    "unknown algorithm": ({"algorithm": "ddmim"}, "no algorithm 'ddmim' (did you mean ddmin?)"),
+    "unknown schema": ({"partitioning": "timesegs"}, "no partitioning 'timesegs' (did you mean timeseg?)"),
+    "a place is missing": ({"positions": {"a": (0, 0, 0)}}, "positions['b']: is missing"),
+    "a place is none": ({"positions": POSITIONS | {"a": (0, float("nan"), 0)}}, "positions['a']: expected x, y, z m"),
+    "a place is text": ({"positions": POSITIONS | {"a": "near"}}, "positions['a']: expected x, y, z m"),
+    "a trajectory of another shape": ({"trajectory": np.zeros((3, 4))}, "shape (N, 5), found shape (3, 4)"),
+    "a trajectory of words": ({"trajectory": [["now", "here"]]}, "trajectory: expected finite numbers"),
+    "a trajectory backwards": ({"trajectory": TRAJECTORY[::-1]}, "its times, in the first column, must not decrease"),
+    "a time of sensing": ({"first_sensed": {"a": "soon"}}, "first_sensed['a']: expected a time in s"),
+    "iterations": ({"iterations": -1}, "iterations: expected 0 or more, found -1"),
+    "n_partitions": ({"n_partitions": 1}, "n_partitions: expected 2 or more, found 1"),
+    "candidates": ({"candidates": "all"}, "candidates: 'all' is not allowed; use one of both, partitions, complements"),
+    "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
+    "delta": ({"delta": 0}, "delta: expected a number above 0"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_told_in_one_line_before_any_test(case):
+    options, words = WRONG[case]
+    made = []
+    with pytest.raises(ddenv.UserError) as error:
+        ddenv.reduce(ELEMENTS, lambda kept: not made.append(kept), **options)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+    assert not made
+
+
+def test_two_of_one_name_are_refused():
+    with pytest.raises(ddenv.UserError, match="elements: 'a' is there twice"):
+        ddenv.reduce("abca", needs("a"), algorithm="ddmin")
+
+
+def test_the_library_needs_neither_drake_nor_a_screen():
+    code = (
+        "import sys, ddenv\n"
+        "found = ddenv.reduce('abcdef', lambda kept: kept >= {'a', 'e'}, algorithm='ddmin')\n"
+        "print(found.kept, [name for name in ('pydrake', 'textual', 'pydantic', 'yaml') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "('a', 'e') []", done.stderr
+
+
+def test_the_guides_examples_run():
+    """Each Python block of the library's page runs as printed, and prints what stands below it."""
+    page = (ROOT / "docs" / "library.md").read_text()
+    blocks = [part.split("```", 1)[0] for part in page.split("```python\n")[1:]]
+    assert len(blocks) >= 2
+    for block in blocks:
+        done = subprocess.run([sys.executable, "-c", block], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        shown = [line.split("# prints ", 1)[1] for line in block.splitlines() if "# prints " in line]
+        assert done.stdout.splitlines() == shown

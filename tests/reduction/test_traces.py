@@ -1,0 +1,98 @@
+"""The algorithms step by step, on examples worked by hand."""
+
+from itertools import pairwise
+
+from tests.reduction.worlds import evidence, line, run, tried
+
+
+def words(candidates):
+    return ["".join(sorted(one.models)) for one in candidates]
+
+
+def test_ddenv_in_a_world_of_six_models_line_by_line():
+    """Models on a line at x = 0, 1, 5, 6, 20, 21, the failure at 0; f needs a and e. The numbers are Algorithm 1's lines."""
+    known = line(a=0, b=1, c=5, d=6, e=20, f=21)
+    kept, rounds = run(known, {"a", "e"}.issubset)
+    steps = [
+        (round.environment, round.n_partitions, round.partitions, words(tried(round, won)), won and sorted(won.models))
+        for round, won in rounds
+    ]
+    assert steps == [
+        # 2: two clusters, abcd (2.5 to 3 m around) and ef. 3: abcd is nearer to f. 4-9: p0 lacks e; c0 is ef, which lacks a; p1 and
+        # c1 are these two again. 14: n = 3. 15: nothing similar, but 3 != 6.
+        (tuple("abcdef"), 2, (tuple("abcd"), tuple("ef")), ["abcd", "ef"], None),
+        # 2: ab, cd, ef. 3: by their centroids 0.5, 5.5 and 20.5 m from f. 4-9: p0 = ab lacks e, c0 = cdef lacks a, p1 = cd lacks
+        # both, c1 = abef holds a and e. 10-12: E is abef. 14: n = 4.
+        (tuple("abcdef"), 3, (("a", "b"), ("c", "d"), ("e", "f")), ["ab", "cdef", "cd", "abef"], list("abef")),
+        # 2: four models, four partitions. 4-9: p0 = a, c0 = bef and p1 = b fail, c1 = aef is similar. 14: n = 5. 17: cut to 3.
+        (tuple("abef"), 4, (("a",), ("b",), ("e",), ("f",)), ["a", "bef", "b", "aef"], list("aef")),
+        # p0 = a (known), c0 = ef (known), p1 = e and c1 = af fail, p2 = f fails, c2 = ae is similar. 14: n = 4. 17: n = 2.
+        (tuple("aef"), 3, (("a",), ("e",), ("f",)), ["a", "ef", "e", "af", "f", "ae"], list("ae")),
+        # p0 = a and c0 = e, which is p1, fail. 15: nothing similar and n = |E|: 16, and 21 returns E' = ae.
+        (tuple("ae"), 2, (("a",), ("e",)), ["a", "e"], None),
+    ]
+    assert kept == {"a", "e"}
+
+
+def test_far_first_leaves_the_farthest_out_first():
+    _, rounds = run(line(a=0, b=1, c=2), lambda _: False, n_partitions=3, complement_order="far-first")
+    complements = [one for one in rounds[0][0].candidates if one.kind == "complement"]
+    assert words(complements) == ["ab", "ac", "bc"]
+
+
+def test_steady_growth_keeps_n_after_a_success():
+    known = evidence(12, 4)
+    for growth, grows in (("paper", True), ("steady", False)):
+        rounds = run(known, {"m3", "m8"}.issubset, growth=growth)[1]
+        wins = [(round, after) for (round, won), (after, _) in pairwise(rounds) if won is not None]
+        grown = {
+            after.n_partitions > round.n_partitions
+            for round, after in wins
+            if len(after.environment) > round.n_partitions
+        }
+        assert grown == {grows}
+
+
+def test_ddmin_does_what_its_paper_prints():
+    """Zeller and Hildebrandt 2002: eight changes, of which 1, 7 and 8 together fail. A test with * was made before."""
+    known = evidence(8, 0)
+    number = {name: str(index + 1) for index, name in enumerate(known.elements)}
+    failing = {"m0", "m6", "m7"}
+    seen, trace = set(), []
+    kept, rounds = run(known, failing.issubset, algorithm="ddmin")
+    for round, winner in rounds:
+        for one in tried(round, winner):
+            mark = "*" if one.models in seen else ""
+            trace.append("".join(sorted(number[name] for name in one.models)) + mark + ("!" if one is winner else ""))
+            seen.add(one.models)
+    # Two halves, then four quarters and their complements, of which 1-2, 5-8 still fails.
+    assert trace[:8] == ["1234", "5678", "12", "34", "56", "78", "345678", "125678!"]
+    # Three parts; all that was tested before is not tested again. Without 5 and 6 it still fails.
+    assert trace[8:13] == ["12*", "56*", "78*", "5678*", "1278!"]
+    # Two parts were tested, too; then four single changes. Without 2 it still fails.
+    assert trace[13:21] == ["12*", "78*", "1", "2", "7", "8", "278", "178!"]
+    # Three single changes, and then none can be left out.
+    assert trace[21:] == ["1*", "7*", "8*", "78*", "18", "17"]
+    assert kept == failing
+
+
+def test_splitting_halves_what_holds_a_needed_model():
+    """Of eight models on a line the nearest is needed; far to near."""
+    known = line(**{name: index for index, name in enumerate("abcdefgh")})
+    kept, rounds = run(known, {"a"}.issubset, algorithm="splitting", prior="uniform")
+    assert kept == {"a"}
+    # With one chance in ten each, six models hold none that is needed with even chances, and then the two that are left are one
+    # too many. The sweep at the end shows that a is needed.
+    assert [("".join(sorted(round.partitions[0])), won is not None) for round, won in rounds] == [
+        ("cdefgh", True),
+        ("b", True),
+        ("a", False),
+    ]
+
+
+def test_probdd_leaves_out_what_promises_most():
+    """With a chance of 0.1 each, nine of twenty models promise most, and so it goes on: 1 / 0.1 less one, Wang et al. 2021."""
+    rounds = run(evidence(20, 3), {"m0"}.issubset, algorithm="probdd", prior="uniform")[1]
+    assert len(rounds[0][0].partitions[0]) in (9, 10)
+    failed = [round.partitions[0] for round, won in rounds if won is None and len(round.partitions[0]) > 1]
+    assert all("m0" in group for group in failed)

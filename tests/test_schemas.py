@@ -1,0 +1,144 @@
+"""The registry: every schema and algorithm by name, ours and other packages'."""
+
+import subprocess
+import sys
+
+import pytest
+
+from ddenv import schemas
+from ddenv.errors import UserError
+
+KINDS = ("partitioning", "prioritization", "algorithm")
+EVERY = [(kind, name) for kind in KINDS for name in schemas.names(kind)]
+
+
+def test_all_of_table_one_is_there():
+    assert schemas.names("partitioning") == ("model2model", "timeseg", "trajectoryseg", "learner")
+    assert set(schemas.names("prioritization")) == {
+        "random",
+        "sequential",
+        "failure-proximal",
+        "avg-trajectory-proximal",
+        "min-trajectory-proximal",
+        "timestep",
+    }
+    assert schemas.names("algorithm") == ("ddenv", "ddmin", "probdd", "splitting")
+    assert len(schemas.pairs()) == 24
+
+
+@pytest.mark.parametrize(("kind", "name"), EVERY)
+def test_each_can_be_loaded_and_explains_itself_in_a_paragraph(kind, name):
+    assert callable(schemas.load(kind, name))
+    words = schemas.explanation(kind, name)
+    assert 80 < len(words) < 700
+    assert words.endswith(".")
+    assert "\n" not in words
+
+
+def test_explaining_imports_nothing_numerical():
+    code = (
+        "import sys; from ddenv import schemas\n"
+        "assert all(schemas.explanation(kind, name) for kind in ('partitioning', 'prioritization', 'algorithm')"
+        " for name in schemas.names(kind))\n"
+        "print([name for name in ('numpy', 'sklearn', 'scipy') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_an_unknown_name_is_told_with_the_nearest():
+    with pytest.raises(UserError, match=r"no partitioning 'model2mode' \(did you mean model2model\?\); use one of"):
+        schemas.load("partitioning", "model2mode")
+    with pytest.raises(UserError, match=r"no prioritization 'nearest'"):
+        schemas.split_pair("timeseg/nearest")
+    with pytest.raises(UserError, match="write partitioning/prioritization"):
+        schemas.split_pair("timeseg")
+
+
+PLUGIN = '''
+def by_name(partitions, evidence):
+    """Partitions are tried by the last letter of their first model's name. It only shows how it is done.
+
+    Not for the screen.
+    """
+    return [float(ord(partition[0][-1])) for partition in partitions]
+
+
+def one_by_one(elements, guide):
+    """Leaves out one model after another."""
+    from ddenv.reduction.algorithms.sweep import sweep
+
+    return sweep(elements)
+
+
+number = 7
+'''
+ENTRY_POINTS = """
+[ddenv.prioritizations]
+by-name = some_robotics_lab:by_name
+broken = some_robotics_lab:nothing
+no-function = some_robotics_lab:number
+gone = not_installed:any
+
+[ddenv.algorithms]
+one-by-one = some_robotics_lab:one_by_one
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path):
+    """Another package with schemas of its own, as pip would have put it there; runs code beside it."""
+    (tmp_path / "some_robotics_lab.py").write_text(PLUGIN)
+    info = tmp_path / "some_robotics_lab-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-robotics-lab\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+
+    def python(code):
+        words = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{code}"]
+        return subprocess.run(words, capture_output=True, text=True)
+
+    return python
+
+
+def test_another_packages_schema_is_listed_explained_and_used(plugin):
+    done = plugin(
+        "import ddenv; from ddenv import schemas\n"
+        "print('some_robotics_lab' in sys.modules, 'timeseg/by-name' in schemas.pairs())\n"
+        "print(schemas.explanation('prioritization', 'by-name'), 'some_robotics_lab' in sys.modules)\n"
+        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, 0, 0))\n"
+        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, prioritization='by-name', **facts).kept)\n"
+        "print(ddenv.reduce('abcdef', lambda kept: kept >= {'c'}, algorithm='one-by-one', **facts).tests)\n"
+    )
+    assert done.stderr == ""
+    assert done.stdout.splitlines() == [
+        "False True",
+        "Partitions are tried by the last letter of their first model's name. It only shows how it is done. False",
+        "('c',)",
+        # All at first, the five that go, c in vain, and c again when it is alone.
+        "8",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("broken", "cannot be loaded"), ("no-function", "is not a function"), ("gone", "cannot be loaded: No module")],
+)
+def test_a_broken_package_is_told_in_one_line(plugin, name, words):
+    done = plugin(
+        "from ddenv import UserError, schemas\n"
+        f"print(repr(schemas.explanation('prioritization', '{name}')))\n"
+        "try:\n"
+        f"    schemas.load('prioritization', '{name}')\n"
+        "except UserError as error:\n"
+        "    print(error)\n"
+    )
+    lines = done.stdout.splitlines()
+    assert lines[0] == "''"
+    assert f"prioritization '{name}'" in lines[1]
+    assert words in lines[1]
+
+
+def test_ours_cannot_be_replaced_by_name(plugin):
+    done = plugin("from ddenv import schemas; print(schemas.load('algorithm', 'ddenv').__module__)")
+    assert done.stdout.strip() == "ddenv.reduction.algorithms.ddenv"
