@@ -83,7 +83,15 @@ class Bench:
         if isinstance(result, RunResult):
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
-        self._journal.record("test_finished", motions, test=test, **told(result, self.failure))
+        data = told(result, self.failure)
+        noticed = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
+        self._journal.record("test_finished", motions, test=test, **data | noticed)
+
+    def _numbered(self, times: dict[str, float]) -> list[list[float]]:
+        """`times` by name, s, as [number of the model, s] in the order of time; without what is no element."""
+        numbers = {name: number for number, name in enumerate(self._journal.state.elements)}
+        pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
+        return [[number, seconds] for seconds, number in pairs]
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

@@ -13,11 +13,13 @@ from ddenv.robot.result import RunResult
 def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
     """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
 
+    `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
-        return {"outcome": result.outcome, "failure": result.failure, **nothing}
+        unnoticed = {"first_sensed": {}, "first_touched": {}}
+        return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed}
     outcome, distance = result.outcome, None
     if failure is not None:
         judgement = judge(result, failure)
@@ -30,4 +32,10 @@ def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
         "end_pose": pose if all(map(math.isfinite, pose)) else None,
         "simulated_seconds": result.simulated_seconds,
         "wall_seconds": result.wall_seconds,
+        "first_sensed": _to_ms(result.first_sensed),
+        "first_touched": _to_ms(result.first_touched),
     }
+
+
+def _to_ms(times: dict[str, float]) -> dict[str, float]:
+    return {name: round(seconds, 3) for name, seconds in times.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,8 @@ class RunResult:
     or "fell" for a failure, and for an error "not-finite" or the first line of what Drake said.
     `trajectory` has one row every 0.1 s and one at the end: t (s), x, y, z (m), qw, qx, qy, qz of the robot's first link in
     the world frame. `motions` holds the same for each dynamic model that moved.
+    `first_sensed` and `first_touched` tell by name when (s) the robot first had a model in view or touched it, and when it
+    first touched it; models that it never did are absent. Every model that was touched was sensed by then.
     """
 
     outcome: str
@@ -26,6 +28,8 @@ class RunResult:
     simulated_seconds: float
     wall_seconds: float
     seed: int
+    first_sensed: dict[str, float] = field(default_factory=dict)
+    first_touched: dict[str, float] = field(default_factory=dict)
 
     @property
     def end_pose(self) -> tuple[float, ...]:

@@ -14,15 +14,16 @@ from ddenv.robot.clock import Clock
 from ddenv.robot.drive import Drive
 from ddenv.robot.estimate import Estimate, advance
 from ddenv.robot.navigate import Command, Navigator
-from ddenv.robot.observe import Observer
+from ddenv.robot.notice import Notice
+from ddenv.robot.observe import Observer, PoseRow
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.recording import Recording
 from ddenv.robot.result import RunResult
-from ddenv.robot.sensors import SensorSuite, Truth
+from ddenv.robot.sensors import SensorSuite
 from ddenv.robot.sleep import Sleep
 from ddenv.world.scenario import Scenario
 
-Progress = Callable[[float, tuple[float, ...]], None]
+Progress = Callable[[float, PoseRow], None]
 
 
 class Run:
@@ -39,6 +40,7 @@ class Run:
         drive: Drive,
         clock: Clock,
         sleep: Sleep,
+        notice: Notice,
         floor: float,
         kept: Sequence[Body],
         seed: int,
@@ -47,6 +49,7 @@ class Run:
         self._drive = drive
         self._clock = clock
         self._sleep = sleep
+        self._notice = notice
         self._floor = floor
         self._kept = kept
         self._seed = seed
@@ -62,6 +65,7 @@ class Run:
         """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is the caller's."""
         started = time.perf_counter()
         outcome, failure, step = self._loop(progress)
+        first_sensed = self._notice.first_sensed()
         return RunResult(
             outcome=outcome,
             failure=failure,
@@ -70,6 +74,8 @@ class Run:
             simulated_seconds=step * self._clock.step,
             wall_seconds=time.perf_counter() - started,
             seed=self._seed,
+            first_sensed=first_sensed,
+            first_touched=self._notice.first_touched,
         )
 
     def _loop(self, progress: Progress | None) -> tuple[str, str, int]:
@@ -80,10 +86,13 @@ class Run:
         step = 0
         while True:
             self._sleep.tick(step)
-            end = self._end(truth, step)
+            now, pose = step * self._clock.step, self._observer.robot()
+            end = self._end(pose, step)
             if end is not None or step % self._clock.record_every == 0:
-                self._record(step, progress)
+                self._record(now, pose, progress)
+                self._notice.look(now, pose[:3], truth.heading)
             if end is not None:
+                self._notice.feel(now, pose[:3])
                 return (*end, step)
             if step % self._clock.control_every == 0:
                 if step > 0:
@@ -92,18 +101,19 @@ class Run:
                         estimate, measured, self._scenario.sensors, self._clock.control_every * self._clock.step
                     )
                 self._command(self._navigator.command(estimate))
+            self._notice.feel(now, pose[:3])
             step = self._clock.next(step)
             problem = self._simulate(step * self._clock.step)
             if problem:
                 return "error", problem, step
             truth = self._observer.truth()
 
-    def _end(self, truth: Truth, step: int) -> tuple[str, str] | None:
+    def _end(self, pose: PoseRow, step: int) -> tuple[str, str] | None:
         """Outcome and failure of a run that ends here, or None."""
         goal = self._scenario.goal
-        if math.hypot(goal.x - truth.x, goal.y - truth.y) <= goal.tolerance:
+        if math.hypot(goal.x - pose[0], goal.y - pose[1]) <= goal.tolerance:
             return "pass", ""
-        if self._observer.robot()[2] < self._floor:
+        if pose[2] < self._floor:
             return "failed", "fell"
         return ("failed", "timeout") if step >= self._clock.last else None
 
@@ -122,8 +132,7 @@ class Run:
         speeds = self._drive.wheel_speeds(command, self._scenario.controller.skid)
         self._motors.FixValue(self._context, np.concatenate([np.zeros_like(speeds), speeds]))
 
-    def _record(self, step: int, progress: Progress | None) -> None:
-        now, pose = step * self._clock.step, self._observer.robot()
+    def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
         self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._kept})
         if progress is not None:
             progress(now, pose)

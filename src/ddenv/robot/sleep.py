@@ -18,6 +18,7 @@ from ddenv.robot.links import Links, Motion, gaps, spread
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.presence import Presence
 from ddenv.robot.rehearsal import CALM, NEAR, SLOW, Script
+from ddenv.world.extent import Bounds
 
 TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
 
@@ -97,6 +98,13 @@ class Sleep:
         self._hold.apply()
         self._tick += 1
         self._now = step
+
+    def boxes(self) -> Bounds:
+        """Lowest and highest corner, each shape (M, 3), m, of the boxes around the kept models at the last tick."""
+        if self._never:
+            self._look(np.arange(len(self._kept)), 0.0)
+        low, high = self._motion.low, self._motion.high
+        return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
     def end(self) -> None:
         """Leaves the context without any moving model that something could touch."""

@@ -9,6 +9,7 @@ from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.drive import find_drive
 from ddenv.robot.hold import Hold
+from ddenv.robot.notice import Notice
 from ddenv.robot.place import transform
 from ddenv.robot.plant import Body, Built, build
 from ddenv.robot.presence import Presence
@@ -16,6 +17,7 @@ from ddenv.robot.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
 from ddenv.robot.run import Run
 from ddenv.robot.sleep import Sleep
+from ddenv.robot.surroundings import Surroundings
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -38,6 +40,7 @@ class Template:
         self._scenario = scenario
         self._drive = find_drive(robot)
         self._built = _build(world, robot, scenario)
+        self._surroundings = Surroundings.of(world, robot, self._built)
         self._names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         self._always = self._names & frozenset(scenario.protected) | grounds
@@ -71,7 +74,9 @@ class Template:
             raise ValueError(f"no such model: {min(unknown)}")
         removed = self._names - keep - self._always
         kept = [body for name, body in self._built.moving.items() if name not in removed]
-        with self._presence.without(removed), self._asleep(kept, self._names - removed) as sleep:
+        present = self._names - removed
+        with self._presence.without(removed), self._asleep(kept, present) as sleep:
+            notice = Notice(self._surroundings, self._scenario.sensors, self._plant_context, sleep, kept, present)
             run = Run(
                 self._built,
                 self._context,
@@ -79,6 +84,7 @@ class Template:
                 self._drive,
                 self._clock,
                 sleep,
+                notice,
                 self._floor,
                 kept,
                 seed,
