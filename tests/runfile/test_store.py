@@ -86,6 +86,31 @@ def test_a_newer_file_is_refused(path):
         RunFile(path)
 
 
+@pytest.mark.parametrize("version", [1, 2])
+def test_this_and_the_older_version_are_read(path, version):
+    with sqlite3.connect(path) as database:
+        database.execute(f"PRAGMA user_version = {version}")
+    with RunFile(path) as file:
+        assert [event.kind for event in file.events()] == ["created"]
+        assert fold(file.events()).status == "created"
+
+
+def test_an_older_file_that_an_engine_goes_on_with_is_one_of_this_version(path):
+    with sqlite3.connect(path) as database:
+        database.execute("PRAGMA user_version = 1")
+    with RunFile(path) as file:
+        file.send("pause")
+        assert version_of(path) == 1
+        file.own()
+        file.append("paused", {})
+    assert version_of(path) == SCHEMA_VERSION == 2
+
+
+def version_of(path) -> int:
+    with sqlite3.connect(path) as database:
+        return database.execute("PRAGMA user_version").fetchone()[0]
+
+
 def test_damage_is_told_and_not_thrown(path):
     with sqlite3.connect(path) as database:
         database.execute("INSERT INTO event (time, kind, data) VALUES (0, 'paused', 'not json')")

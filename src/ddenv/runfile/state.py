@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
+from ddenv.runfile.persistent import PersistentTuple
+
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
+# Besides these a test may run still or be lost, and a baseline run may have failed when f was not fixed yet.
+UNFINISHED = ("running", "lost")
+_TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +21,8 @@ class Test:
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline" or
     "round". `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's
     end the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal.
+    `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the simulated time it
+    was first so, s; empty in files of version 1.
     """
 
     id: int
@@ -29,11 +37,30 @@ class Test:
     end_pose: tuple[float, ...] | None = None
     simulated_seconds: float = 0.0
     wall_seconds: float = 0.0
+    first_sensed: tuple[tuple[str, float], ...] = ()
+    first_touched: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def is_finished(self) -> bool:
+        return self.outcome not in UNFINISHED
+
+    @property
+    def is_deflake_run(self) -> bool:
+        """Whether it is a finished re-run of a candidate."""
+        return self.phase == "round" and self.run > 0 and self.is_finished
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own."""
+
+    environment: tuple[str, ...]
+    partitions: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition`.
+    """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
     `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user said no).
     `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
@@ -43,11 +70,26 @@ class Candidate:
     index: int
     kind: str
     partition: int
-    models: tuple[str, ...]
+    split: Split = field(repr=False, hash=False)
     distance: float | None = None
     verdict: str = ""
     tests: tuple[int, ...] = ()
     known: int = 0
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The models' names. They are gathered at each call: ask for `size` where their number is enough."""
+        part = self.split.partitions[self.partition]
+        if self.kind == "partition":
+            return part
+        left_out = frozenset(part)
+        return tuple(name for name in self.split.environment if name not in left_out)
+
+    @property
+    def size(self) -> int:
+        """How many models it has."""
+        part = len(self.split.partitions[self.partition])
+        return part if self.kind == "partition" else len(self.split.environment) - part
 
     @property
     def label(self) -> str:
@@ -61,11 +103,18 @@ class Round:
 
     number: int
     n_partitions: int
-    environment: tuple[str, ...]
-    partitions: tuple[tuple[str, ...], ...]
-    candidates: tuple[Candidate, ...]
+    split: Split
+    candidates: PersistentTuple[Candidate]
     winner: int | None = None
     done: bool = False
+
+    @property
+    def environment(self) -> tuple[str, ...]:
+        return self.split.environment
+
+    @property
+    def partitions(self) -> tuple[tuple[str, ...], ...]:
+        return self.split.partitions
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +144,7 @@ class Point:
     models: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RunState:
     """A whole run. `status`:
 
@@ -107,6 +156,9 @@ class RunState:
     finished   ended by itself: `minimal` says whether no model can be removed; `reason` says why it ended
     stopped    the engine was stopped; it can be resumed
     failed     the engine could not go on: `reason` says why
+
+    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how
+    long engines have worked on it up to their ends, s; `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -121,7 +173,9 @@ class RunState:
     baseline: Baseline | None = None
     round: Round | None = None
     rounds_done: int = 0
-    tests: tuple[Test, ...] = ()
+    tests: PersistentTuple[Test] = field(default_factory=PersistentTuple)
+    tally: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TALLY, 0))
+    deflake_runs: int = 0
     history: tuple[Point, ...] = ()
     evidence_test: int | None = None
     minimal: bool = False
@@ -131,20 +185,34 @@ class RunState:
     started_at: float | None = None
     updated_at: float = 0.0
 
-    @property
-    def finished_tests(self) -> tuple[Test, ...]:
-        return tuple(test for test in self.tests if test.outcome not in ("running", "lost"))
+    def changed(self, **values: Any) -> RunState:
+        """One that differs in the values of these fields."""
+        # `dataclasses.replace` passes all the many fields through the constructor: half of what an event would cost.
+        state = object.__new__(RunState)
+        state.__dict__.update(self.__dict__, **values)
+        return state
 
     @property
-    def deflake_runs(self) -> int:
-        return sum(test.phase == "round" and test.run > 0 for test in self.finished_tests)
+    def finished_tests(self) -> tuple[Test, ...]:
+        """Gathered at each call: ask for `tests_done` where their number is enough."""
+        return tuple(test for test in self.tests if test.is_finished)
+
+    @property
+    def tests_done(self) -> int:
+        """How many tests are finished."""
+        return len(self.tests) - sum(self.tally[outcome] for outcome in UNFINISHED)
+
+    @property
+    def running_tests(self) -> tuple[Test, ...]:
+        """The tests that are not known to have ended, in the order they were started."""
+        # They are among the last ones: the many before them need not be looked at.
+        latest = (test for test in reversed(self.tests) if test.outcome == "running")
+        return tuple(islice(latest, self.tally["running"]))[::-1]
 
     def outcomes(self) -> dict[str, int]:
         """Finished tests by outcome, in the order of `OUTCOMES`."""
-        counts = dict.fromkeys(OUTCOMES, 0)
-        for test in self.finished_tests:
-            counts[test.outcome] = counts.get(test.outcome, 0) + 1
-        return counts
+        counts = {outcome: self.tally[outcome] for outcome in OUTCOMES}
+        return counts | {"failed": self.tally["failed"]} if self.tally["failed"] else counts
 
     @property
     def ended(self) -> bool:

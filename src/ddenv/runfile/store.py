@@ -22,7 +22,8 @@ from typing import Any
 from ddenv.errors import UserError
 
 APPLICATION_ID = 0x64644531
-SCHEMA_VERSION = 1
+# The tables are those of version 1; from 2 on, documents and events may hold what a reader of version 1 does not know.
+SCHEMA_VERSION = 2
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # How long to wait for another's write: a screen must not stand still, an engine must not give up. s
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
@@ -177,10 +178,14 @@ class RunFile:
     # What follows is for the engine alone.
 
     def own(self) -> None:
-        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event."""
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event.
+
+        A file of an older version becomes one of this version, as its next events may be.
+        """
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
+            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 

@@ -59,7 +59,7 @@ def _to_replay(state: RunState) -> Test | None:
             return similar[-1]
     if state.evidence_test is not None and 0 < state.evidence_test <= len(state.tests):
         return state.tests[state.evidence_test - 1]
-    return state.finished_tests[-1] if state.finished_tests else None
+    return next((test for test in reversed(state.tests) if test.is_finished), None)
 
 
 def _of_test(state: RunState, kind: str, test: Test) -> Shot:

@@ -1,0 +1,94 @@
+"""What the events of tests change in a run's state: they start, end, are lost; the baseline's are compared with f."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ddenv.runfile.fold_rounds import tried, with_candidate
+from ddenv.runfile.state import Baseline, Point, RunState, Test
+from ddenv.runfile.values import Changes, Data, moments, number, vector
+
+
+def test_started(state: RunState, data: Data, _: float) -> Changes:
+    round, candidate = data["round"], data["candidate"]
+    test = Test(int(data["test"]), str(data["phase"]), round, candidate, int(data["run"]), int(data["seed"]))
+    if test.id != len(state.tests) + 1:
+        raise ValueError(test.id)
+    changes = {"tests": state.tests.added(test), **_counts(state, None, test)}
+    if round is None:
+        return changes
+    if round != state.round.number:
+        raise ValueError(round)
+    one = tried(state, candidate)
+    return changes | with_candidate(state, replace(one, tests=(*one.tests, test.id)))
+
+
+def test_finished(state: RunState, data: Data, _: float) -> Changes:
+    distance, pose = data["distance"], data["end_pose"]
+    values = {
+        "outcome": str(data["outcome"]),
+        "failure": str(data["failure"]),
+        "distance": None if distance is None else number(distance),
+        "end_pose": None if pose is None else vector(pose, 7),
+        "simulated_seconds": number(data["simulated_seconds"]),
+        "wall_seconds": number(data["wall_seconds"]),
+        "first_sensed": moments(state.elements, data.get("first_sensed", ())),
+        "first_touched": moments(state.elements, data.get("first_touched", ())),
+    }
+    return _with_test(state, int(data["test"]), values)
+
+
+def test_lost(state: RunState, data: Data, _: float) -> Changes:
+    return _with_test(state, int(data["test"]), {"outcome": "lost"})
+
+
+def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
+    baseline = Baseline(
+        runs=int(data["runs"]),
+        failures=int(data["failures"]),
+        rate=number(data["rate"]),
+        low=number(data["low"]),
+        high=number(data["high"]),
+        failure_test=int(data["failure_test"]),
+        position=vector(data["position"], 3),
+        miss_chance=number(data["miss_chance"]),
+        iterations_95=int(data["iterations_95"]),
+    )
+    compared = _compared(state, data)
+    point = Point(compared.tests_done, len(state.environment))
+    return {
+        "tests": compared.tests,
+        "tally": compared.tally,
+        "deflake_runs": compared.deflake_runs,
+        "baseline": baseline,
+        "evidence_test": baseline.failure_test,
+        "history": (*state.history, point),
+        "status": state.status if state.paused else "running",
+    }
+
+
+def _compared(state: RunState, data: Data) -> RunState:
+    """The state with what the baseline's tests turned out to be, now that f is known."""
+    for test, outcome in data["outcomes"].items():
+        distance = data["distances"].get(test)
+        values = {"outcome": str(outcome), "distance": None if distance is None else number(distance)}
+        state = state.changed(**_with_test(state, int(test), values))
+    return state
+
+
+def _with_test(state: RunState, id: int, values: Data) -> Changes:
+    if id < 1:
+        raise IndexError(id)
+    before = state.tests[id - 1]
+    after = replace(before, **values)
+    return {"tests": state.tests.changed(id - 1, after), **_counts(state, before, after)}
+
+
+def _counts(state: RunState, before: Test | None, after: Test) -> Changes:
+    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
+    # An outcome that nobody knows has no entry: a KeyError, and a tally that no file can make long.
+    tally[after.outcome] += 1
+    if before is not None:
+        tally[before.outcome] -= 1
+        reruns -= before.is_deflake_run
+    return {"tally": tally, "deflake_runs": reruns}

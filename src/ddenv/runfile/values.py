@@ -1,0 +1,43 @@
+"""Values of events, checked. All raise ValueError, TypeError, IndexError or OverflowError for what makes no sense."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+# What an event holds; which fields of the state it gives other values.
+Data = dict[str, Any]
+Changes = dict[str, Any]
+Names = tuple[str, ...]
+
+
+def number(value: Any) -> float:
+    """A finite number."""
+    finite = float(value)
+    if not math.isfinite(finite):
+        raise ValueError(value)
+    return finite
+
+
+def vector(values: Iterable[Any], length: int) -> tuple[float, ...]:
+    """`length` finite numbers."""
+    numbers = tuple(number(value) for value in values)
+    if len(numbers) != length:
+        raise ValueError(values)
+    return numbers
+
+
+def names(elements: Names, numbers: list[int]) -> Names:
+    """The models with these numbers."""
+    if min(numbers, default=0) < 0:
+        raise IndexError(numbers)
+    return tuple(elements[index] for index in numbers)
+
+
+def moments(elements: Names, pairs: Iterable[Any]) -> tuple[tuple[str, float], ...]:
+    """(name, s) for each pair of a model's number and a time, s, from the start of a test on."""
+    found = [(index, float(time)) for index, time in pairs]
+    if not all(index >= 0 and 0 <= time < math.inf for index, time in found):
+        raise ValueError(pairs)
+    return tuple((elements[index], time) for index, time in found)

@@ -1,0 +1,261 @@
+"""Events to state: what is told of tests and candidates is right, and no state is ever changed by a later event."""
+
+import tracemalloc
+from collections.abc import Iterator
+from dataclasses import fields
+from itertools import pairwise
+from unittest.mock import patch
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.state import OUTCOMES, RunState
+from ddenv.runfile.store import Event
+
+NAMES = [f"box {number}" for number in range(6)]
+
+
+def state_after(*happened: tuple[str, dict], names=NAMES) -> RunState:
+    """The state after these events of a run of six boxes."""
+    first = ("created", {"scenario": {}, "elements": list(names)})
+    return fold(Event(number + 1, 0.0, *each) for number, each in enumerate((first, *happened)))
+
+
+def with_event(state: RunState, kind: str, **data) -> RunState:
+    return apply(state, Event(state.revision + 1, float(state.revision), kind, data))
+
+
+def round_event(partitions: list[list[int]], environment=range(6), number: int = 1) -> tuple[str, dict]:
+    """A round whose candidates are each partition and its complement."""
+    candidates = [[kind, part, 1.0] for part in range(len(partitions)) for kind in ("partition", "complement")]
+    split = {"environment": list(environment), "partitions": partitions, "candidates": candidates}
+    return "round_started", {"round": number, "n_partitions": len(partitions), **split}
+
+
+def started(test: int = 1, candidate: int | None = None, run: int = 0) -> tuple[str, dict]:
+    phase, round = ("baseline", None) if candidate is None else ("round", 1)
+    place = {"test": test, "phase": phase, "round": round, "candidate": candidate}
+    return "test_started", {**place, "run": run, "seed": run}
+
+
+def finished(test: int = 1, outcome: str = "pass", **more) -> tuple[str, dict]:
+    end = {"failure": "", "distance": 0.5, "end_pose": None, "simulated_seconds": 2.0, "wall_seconds": 1.0}
+    return "test_finished", {"test": test, "outcome": outcome, **end, **more}
+
+
+# Candidates.
+
+
+def test_a_candidate_has_the_models_of_its_partition_or_all_others_in_their_order():
+    state = state_after(round_event([[4, 1], [0], [5, 3]], environment=[5, 4, 3, 1, 0]))
+    models = [candidate.models for candidate in state.round.candidates]
+    assert models == [
+        ("box 4", "box 1"),
+        ("box 5", "box 3", "box 0"),
+        ("box 0",),
+        ("box 5", "box 4", "box 3", "box 1"),
+        ("box 5", "box 3"),
+        ("box 4", "box 1", "box 0"),
+    ]
+    assert [candidate.size for candidate in state.round.candidates] == [len(each) for each in models]
+
+
+def test_candidates_are_equal_if_they_and_their_rounds_environment_are():
+    one, same, other = (
+        state_after(round_event([[0], [1]], environment)).round.candidates
+        for environment in ([0, 1, 2], [0, 1, 2], [0, 1, 3])
+    )
+    assert one == same
+    assert hash(one[1]) == hash(same[1])
+    assert one[1] != other[1]
+    assert one[0] != one[2]
+    assert "box" not in repr(one[1])
+
+
+def test_a_round_of_many_one_model_partitions_is_small():
+    """The names of all 4,000 candidates, half of them of 1,999 models, would take 32 MB."""
+    before = state_after(names=[str(number) for number in range(2000)])
+    kind, data = round_event([[number] for number in range(2000)], range(2000))
+    tracemalloc.start()
+    try:
+        state = with_event(before, kind, **data)
+        assert len(state.round.candidates) == 4000
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_verdict_copies_a_small_part_of_the_candidates():
+    before = state_after(
+        round_event([[number] for number in range(2000)], range(2000)), names=[str(number) for number in range(2000)]
+    )
+    after = with_event(before, "candidate_judged", candidate=1234, verdict="similar", tests=[], known=0)
+    shared = [
+        one is other for one, other in zip(before.round.candidates.chunks, after.round.candidates.chunks, strict=True)
+    ]
+    assert shared.count(False) == 1
+    assert after.round.split is before.round.split
+    assert [one.index for one in after.round.candidates.changed_since(before.round.candidates)] == [1234]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"environment": [0, 0, 1]},
+        {"environment": [0, 1, 6]},
+        {"environment": [0, 1, -1]},
+        {"partitions": [[0], [0]]},
+        {"partitions": [[0], [5]]},
+        {"partitions": [[0], []]},
+        {"candidates": [["partition", 2, None]]},
+        {"candidates": [["partition", 1.0, None]]},
+        {"candidates": [["partition", -1, None]]},
+        {"candidates": [["part", 0, None]]},
+        {"candidates": [["partition", 0, None], ["partition", 0, 1.0]]},
+        {"candidates": [["partition", 0, "nan"]]},
+    ],
+    ids=str,
+)
+def test_rounds_that_make_no_sense_are_told(changed):
+    kind, data = round_event([[0], [1]], [0, 1, 2])
+    state_after((kind, data))
+    with pytest.raises(UserError, match=r"damaged run file: event 2 \(round_started\)"):
+        state_after((kind, data | changed))
+
+
+# Tests.
+
+
+def test_when_models_were_first_sensed_and_touched_is_kept():
+    times = {"first_sensed": [[5, 0.0], [0, 1.25]], "first_touched": [[5, 3]]}
+    test = state_after(started(), finished(**times)).tests[0]
+    assert test.first_sensed == (("box 5", 0.0), ("box 0", 1.25))
+    assert test.first_touched == (("box 5", 3.0),)
+
+
+def test_older_files_do_not_tell_what_was_sensed():
+    test = state_after(started(), finished()).tests[0]
+    assert (test.first_sensed, test.first_touched) == ((), ())
+
+
+@pytest.mark.parametrize("key", ["first_sensed", "first_touched"])
+@pytest.mark.parametrize(
+    "pair",
+    [[6, 1.0], [-1, 1.0], [0.0, 1.0], ["0", 1.0], [0, -0.1], [0, "nan"], [0, "inf"], [0, None], [0, 10**400], [0], 0],
+    ids=lambda pair: str(pair)[:12],
+)
+def test_sensed_models_that_make_no_sense_are_told(key, pair):
+    with pytest.raises(UserError, match=r"damaged run file: event 3 \(test_finished\)"):
+        state_after(started(), finished(**{key: [[1, 1.0], pair]}))
+
+
+def test_an_outcome_that_nobody_knows_is_told():
+    with pytest.raises(UserError, match="makes no sense here"):
+        state_after(started(), finished(outcome="splendid"))
+
+
+def test_baseline_runs_count_as_what_they_turned_out_to_be():
+    told = {"runs": 2, "failures": 1, "rate": 0.5, "low": 0.1, "high": 0.9, "failure_test": 1, "iterations_95": 4}
+    more = {"position": [0, 0, 0], "miss_chance": 0.1, "outcomes": {"1": "similar"}, "distances": {"1": 0.0}}
+    state = state_after(started(1), finished(1, "failed"), started(2), finished(2, "pass"))
+    assert state.outcomes() == dict.fromkeys(OUTCOMES, 0) | {"pass": 1, "failed": 1}
+    state = with_event(state, "baseline_finished", **told, **more)
+    assert state.outcomes() == dict.fromkeys(OUTCOMES, 0) | {"pass": 1, "similar": 1}
+    assert state.history[-1].tests == state.tests_done == 2
+
+
+def test_an_event_of_a_test_copies_a_small_part_of_the_tests():
+    states = [state_after(*(started(number + 1) for number in range(2000)))]
+    states.append(with_event(states[-1], "test_finished", **finished(700)[1]))
+    states.append(with_event(states[-1], "test_lost", test=5))
+    states.append(with_event(states[-1], "test_started", **started(2001)[1]))
+    for before, after in pairwise(states):
+        shared = [one is other for one, other in zip(before.tests.chunks, after.tests.chunks, strict=True)]
+        assert shared.count(False) == 1
+
+
+# Whole runs.
+
+moves = st.tuples(
+    st.sampled_from(["start", "start", "finish", "finish", "lose", "judge", "veto", "round", "reduce", "pause"]),
+    st.integers(0, 10**6),
+)
+
+
+def next_event(state: RunState, move: str, number: int) -> tuple[str, dict] | None:
+    """An event that makes sense in this state, chosen by `number`."""
+    running = [test.id for test in state.tests if test.outcome == "running"]
+    size, tests = len(state.round.candidates), len(state.tests)
+    candidate = number % size
+    match move:
+        case "start":
+            place = started(tests + 1, candidate, number % 4)[1] | {"round": state.round.number}
+            return "test_started", place
+        case "finish" if running:
+            outcome = OUTCOMES[number % len(OUTCOMES)]
+            return finished(running[number % len(running)], outcome, first_sensed=[[number % 6, 1.0]])
+        case "lose" if tests:
+            return "test_lost", {"test": 1 + number % tests}
+        case "judge":
+            return "candidate_judged", {"candidate": candidate, "verdict": "dissimilar", "tests": [], "known": 0}
+        case "veto":
+            return "vetoed", {"candidate": candidate, "verdict": "vetoed"}
+        case "round":
+            return round_event([[index] for index in range(1 + number % 6)], number=state.round.number + 1)
+        case "reduce":
+            return "reduced", {"candidate": candidate, "environment": [number % 6], "evidence_test": 1}
+        case "pause":
+            return ("resumed" if state.paused else "paused"), {}
+    return None
+
+
+def grown(steps) -> Iterator[RunState]:
+    """The states of a run one after another, each before the next event happens."""
+    state = state_after(round_event([[0, 1], [2], [3, 4]]))
+    yield state
+    for move, number in steps:
+        happened = next_event(state, move, number)
+        if happened is not None:
+            state = with_event(state, happened[0], **happened[1])
+            yield state
+
+
+def seen(state: RunState) -> tuple:
+    """All that a viewer can see of a state."""
+    models = tuple(candidate.models for candidate in state.round.candidates)
+    return repr(state), tuple(state.tests), dict(state.tally), models
+
+
+@given(st.lists(moves, max_size=40))
+def test_a_state_is_never_changed_by_later_events(steps):
+    with patch("ddenv.runfile.persistent.CHUNK", 3):
+        kept = [(state, seen(state)) for state in grown(steps)]
+        assert all(seen(earlier) == was for earlier, was in kept)
+
+
+@given(st.lists(moves, max_size=40))
+def test_what_is_counted_along_the_way_is_what_the_tests_say(steps):
+    with patch("ddenv.runfile.persistent.CHUNK", 3):
+        for state in grown(steps):
+            tests = list(state.tests)
+            done = [test for test in tests if test.outcome not in ("running", "lost")]
+            assert state.finished_tests == tuple(done)
+            assert state.tests_done == len(done)
+            assert state.running_tests == tuple(test for test in tests if test.outcome == "running")
+            assert state.deflake_runs == sum(test.run > 0 for test in done)
+            assert state.outcomes() == {name: sum(test.outcome == name for test in done) for name in OUTCOMES}
+
+
+@given(st.lists(moves, max_size=20))
+def test_events_change_fields_that_a_state_has(steps):
+    names = {field.name for field in fields(RunState)}
+    assert all(vars(state).keys() == names for state in grown(steps))
+
+
+def test_a_state_cannot_be_changed():
+    state = state_after()
+    with pytest.raises(AttributeError):
+        state.status = "running"
