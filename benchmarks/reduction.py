@@ -1,9 +1,9 @@
-"""Reduces the ditch with each of the paper's three pairs, and compares with running the same tests one after another.
+"""Reduces a scenario with pairs and algorithms, and compares with running the same tests one after another.
 
-    python benchmarks/reduction.py [--jobs N]
+    python benchmarks/reduction.py [--scenario ditch] [--pairs paper|all|A/B,C/D] [--algorithms ddenv|all|X,Y] [--jobs N]
 
-The last column is the sum of all tests' own times over the time the reduction took: what the workers gain, with everything
-that the engine, the run file and the building of the world cost.
+"faster than one after another" is the sum of all tests' own times over the time the reduction took: what the workers gain, with
+everything that the engine, the run file and the building of the world cost.
 """
 
 import argparse
@@ -11,50 +11,113 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
+from ddenv import schemas
+from ddenv.console.words import first_of
+from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.workbench.methods import chosen, uses
 
-PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
+PAPER = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
+HEADER = (
+    "algorithm",
+    "pair",
+    "tests",
+    "re-runs",
+    "models left",
+    "smaller",
+    "time, s",
+    "s a test",
+    "faster than one after another",
+    "minimal",
+    "left",
+)
+# So many of the models that are left are named.
+MOST_NAMES = 4
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--jobs", type=int, default=2)
-    jobs = parser.parse_args().jobs
-    print(
-        f"| pair, {jobs} jobs | tests | re-runs | models left | smaller | time, s | s a test | faster than one after another |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
+    parser.add_argument("--scenario", default="ditch", help="a bundled name or a YAML file")
+    parser.add_argument("--pairs", default="paper", help="paper, all, or pairs separated by commas")
+    parser.add_argument("--algorithms", default="ddenv", help="all, or names separated by commas")
+    parser.add_argument("--jobs", type=int, default=2, help="tests at the same time")
+    options = parser.parse_args()
+    try:
+        methods = list(methods_of(algorithms_of(options.algorithms), pairs_of(options.pairs)))
+    except UserError as error:
+        parser.error(str(error))
+    header = " | ".join(HEADER).replace("pair", f"pair, {options.jobs} jobs")
+    print(f"| {header} |\n|{'---|' * len(HEADER)}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        for number, pair in enumerate(PAIRS):
-            print(row(pair, jobs, Path(folder) / f"{number}.ddenv"), flush=True)
+        for number, (algorithm, pair) in enumerate(methods):
+            cells = row(options.scenario, algorithm, pair, options.jobs, Path(folder) / f"{number}.ddenv")
+            print(f"| {' | '.join(cells)} |", flush=True)
 
 
-def row(pair: str, jobs: int, path: Path) -> str:
-    words = [
-        sys.executable,
-        "-m",
-        "ddenv",
-        "run",
-        "ditch",
-        "--pair",
-        pair,
-        "--jobs",
-        str(jobs),
-        "--output",
-        str(path),
-        "--json",
-    ]
-    told = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+def pairs_of(words: str) -> tuple[str, ...]:
+    """The pairs that an option names. Raises UserError."""
+    if words == "paper":
+        return PAPER
+    if words == "all":
+        return schemas.pairs()
+    chosen_pairs = tuple(words.split(","))
+    for pair in chosen_pairs:
+        schemas.split_pair(pair)
+    return chosen_pairs
+
+
+def algorithms_of(words: str) -> tuple[str, ...]:
+    """The algorithms that an option names. Raises UserError."""
+    if words == "all":
+        return schemas.names("algorithm")
+    algorithms = tuple(words.split(","))
+    for algorithm in algorithms:
+        schemas.check("algorithm", algorithm)
+    return algorithms
+
+
+def methods_of(algorithms: tuple[str, ...], pairs: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    """Each (algorithm, pair) that differs in what is used; "" is the scenario's own pair."""
+    for algorithm in algorithms:
+        seen = set()
+        for pair in pairs:
+            used = tuple(chosen(algorithm, pair)[kind] for kind in uses(algorithm))
+            if used not in seen:
+                seen.add(used)
+                yield algorithm, pair if used else ""
+
+
+def row(scenario: str, algorithm: str, pair: str, jobs: int, path: Path) -> list[str]:
+    """The cells of one reduction; what went wrong if there was none."""
+    words = ["run", scenario, "--algorithm", algorithm, "--jobs", str(jobs), "--output", str(path), "--json"]
+    words += ["--pair", pair] if pair else []
+    done = subprocess.run([sys.executable, "-m", "ddenv", *words], capture_output=True, text=True)
+    shown = pair if len(uses(algorithm)) != 1 else f"-/{chosen(algorithm, pair)['prioritization']}"
+    first = [algorithm, shown or "-"]
+    if not done.stdout:
+        return [*first, done.stderr.strip().rpartition("\n")[2], *[""] * (len(HEADER) - 3)]
+    return [*first, *_results(json.loads(done.stdout), path)]
+
+
+def _results(told: dict, path: Path) -> list[str]:
     with RunFile(path) as file:
         alone = sum(test.wall_seconds for test in fold(file.events()).finished_tests)
     before, after, seconds = told["models_before"], told["models_after"], told["wall_seconds"]
-    return (
-        f"| {pair} | {told['tests']} | {told['deflake_runs']} | {after} of {before} | {1 - after / before:.0%} "
-        f"| {seconds:.0f} | {alone / told['tests']:.2f} | {alone / seconds:.2f} |"
-    )
+    return [
+        str(told["tests"]),
+        str(told["deflake_runs"]),
+        f"{after} of {before}",
+        f"{1 - after / before:.0%}",
+        f"{seconds:.0f}",
+        f"{alone / told['tests']:.2f}",
+        f"{alone / seconds:.2f}",
+        "yes" if told["minimal"] else "no",
+        first_of(told["kept"], MOST_NAMES),
+    ]
 
 
 if __name__ == "__main__":

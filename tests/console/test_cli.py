@@ -192,6 +192,21 @@ MISTAKES = {
     "no scenario": (["run", "dich"], "did you mean ditch?"),
     "no file": (["run", "nothing.yaml"], "no such file"),
     "pair": (["run", WALL, "--pair", "model2model/nearest"], "reduction.pair: 'model2model/nearest' is not allowed"),
+    "no pair": (["run", WALL, "--pair", "model2model"], "reduction.pair: 'model2model' is not allowed (did you mean"),
+    "algorithm": (
+        ["run", WALL, "--algorithm", "ddmn"],
+        "reduction.algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
+    ),
+    "delta": (["run", WALL, "--delta", "0"], "reduction.delta: should be greater than 0"),
+    "candidates": (
+        ["run", WALL, "--candidates", "complement"],
+        "reduction.candidates: 'complement' is not allowed (did you mean complements?); use one of both",
+    ),
+    "complement order": (
+        ["run", WALL, "--complement-order", "far"],
+        "reduction.complement_order: 'far' is not allowed",
+    ),
+    "prior": (["run", WALL, "--prior", "flat"], "reduction.prior: 'flat' is not allowed"),
     "iterations": (["run", WALL, "--iterations", "-1"], "reduction.iterations: should be greater than or equal to 0"),
     "timeout": (["run", WALL, "--timeout", "0"], "failure.timeout: should be greater than 0"),
     "not a number": (["run", WALL, "--seed", "x"], "'x' is not a valid integer"),
@@ -219,6 +234,30 @@ MISTAKES = {
 def test_a_mistake_gets_one_line_and_leaves_nothing(home, words, told):
     _is_one_line(ddenv(*words, cwd=home), told)
     assert list(home.rglob("*")) == []
+
+
+def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
+    from ddenv.cli.app import app
+    from ddenv.launch.runs import read_parts
+
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", lambda *_: None)
+    monkeypatch.setattr("ddenv.cli.app._follow", lambda *_: 0)
+    options = {
+        "pair": "trajectoryseg/timestep",
+        "algorithm": "probdd",
+        "delta": 0.25,
+        "candidates": "complements",
+        "complement_order": "far-first",
+        "growth": "steady",
+        "skip": "implied",
+        "prior": "uniform",
+    }
+    words = [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", str(value))]
+    assert app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False) == 0
+    assert app(["run", WALL, "--output", str(home / "plain.ddenv")], standalone_mode=False) == 0
+    with RunFile(home / "asked.ddenv") as asked, RunFile(home / "plain.ddenv") as plain:
+        own, found = read_parts(plain)[0].reduction, read_parts(asked)[0].reduction
+    assert found == own.model_copy(update=options)
 
 
 def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):

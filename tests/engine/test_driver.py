@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ddenv.engine.control import Stopped
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.world.scenario import PAIRS
+from ddenv.schemas import pairs
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 
 
@@ -32,7 +32,7 @@ def flaky(salt, *names):
     return oracle
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", pairs())
 def test_every_pair_finds_the_needed_models(tmp_path, pair):
     state = drive(new_run(tmp_path, pair=pair), FakePool(needs("wall", "beam"), 2))
     assert set(state.environment) == {"wall", "beam"}

@@ -9,12 +9,15 @@ import pytest
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.poll import Poll
-from ddenv.workbench.screens.dialogs import Help, Quit, SceneDialog, ssh_line
+from ddenv.workbench.screens.dialogs import Help, Method, Quit, SceneDialog, ssh_line
 from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.screens.setup import SetupScreen
 from ddenv.workbench.widgets.candidates import Candidates
 from ddenv.workbench.widgets.map import WorldMap
+from ddenv.workbench.widgets.schema import SchemaSelect
 
 URL = "http://127.0.0.1:7012/static/"
 
@@ -204,7 +207,7 @@ async def test_question_mark_names_every_key(run):
         await session.press("question_mark")
         assert isinstance(session.app.screen, Help)
         words = session.app.screen.query_one(Static).render().plain
-        for key in ("space", "shift+s", "escape", "ctrl+z", "+", "0"):
+        for key in ("space", "shift+s", "e", "escape", "ctrl+z", "+", "0"):
             assert f"{key}   " in words
         await session.press("escape")
         assert session.app.screen is session.screen
@@ -212,8 +215,60 @@ async def test_question_mark_names_every_key(run):
 
 def test_every_binding_has_an_id_and_a_tooltip():
     bindings = [*RunScreen.BINDINGS, *WorldMap.BINDINGS, *Workbench.BINDINGS, *Quit.BINDINGS, *SceneDialog.BINDINGS]
+    bindings += [*Method.BINDINGS, *SetupScreen.BINDINGS, *SchemaSelect.BINDINGS]
     assert all(binding.id and binding.tooltip for binding in bindings)
     assert len({binding.id for binding in bindings}) == len(bindings)
+
+
+async def test_e_explains_the_method_of_the_run(runs):
+    run = run_by("splitting", runs)
+    fake_run.mid_round(run)
+    async with Attached(run, (80, 24)) as session:
+        await session.press("e")
+        assert isinstance(session.app.screen, Method)
+        static = session.app.screen.query_one(Static)
+        words = static.render().plain
+        for kind, name in (
+            ("algorithm", "splitting"),
+            ("partitioning", "model2model"),
+            ("prioritization", "failure-proximal"),
+        ):
+            assert f"{kind} {name}" in words
+            assert explanation(kind, name) in words
+        assert words.count("Not used: splitting does not look at the partitioning.") == 1
+        assert static.size.height > len(words) // 80
+        await session.press("e")
+        assert session.app.screen is session.screen
+    run.close()
+
+
+def run_by(algorithm, runs):
+    data = fake_run.scenario()
+    data["reduction"]["algorithm"] = algorithm
+    return fake_run.FakeRun(runs / f"{algorithm}.ddenv", data)
+
+
+HEADERS = {
+    "ddenv": ("crates · model2model/failure-proximal ", "crates · model2model/fa… "),
+    "ddmin": ("crates · ddmin ", "crates · ddmin "),
+    "probdd": ("crates · probdd ", "crates · probdd "),
+    "splitting": ("crates · splitting · failure-proximal ", "crates · splitting "),
+    "theirs": ("crates · theirs · model2model/failure-proximal ", "crates · theirs "),
+}
+
+
+@pytest.mark.parametrize("algorithm", HEADERS)
+async def test_the_header_names_what_the_run_is_reduced_by_as_it_fits(runs, algorithm):
+    run = run_by(algorithm, runs)
+    fake_run.mid_round(run)
+    wide, narrow = HEADERS[algorithm]
+    async with Attached(run) as session:
+        assert wide in session.text("#header")
+        assert ("n 3" in session.text("#header")) == (algorithm not in ("probdd", "splitting"))
+    left_out = algorithm in ("probdd", "splitting")
+    async with Attached(run, (74 if left_out else 80, 24)) as session:
+        assert narrow in session.text("#header")
+    run.close()
 
 
 @pytest.mark.parametrize(

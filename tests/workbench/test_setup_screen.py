@@ -7,11 +7,14 @@ import pytest
 import yaml
 from textual.widgets import Button, Input, OptionList, Select, Static
 
+from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.methods import KINDS
 from ddenv.workbench.screens.dialogs import Help, OpenFile
 from ddenv.workbench.screens.run import RunScreen
 from ddenv.workbench.screens.setup import SetupScreen
 from ddenv.workbench.widgets.map import WorldMap
+from ddenv.workbench.widgets.schema import Explained
 
 
 class Session:
@@ -40,6 +43,14 @@ class Session:
 
     def wrong(self):
         return self.screen.query_one("#wrong", Static).render().plain
+
+    def method(self):
+        return [self.screen.query_one(f"#{kind}", Select).value for kind in KINDS]
+
+    def explained(self):
+        """The title and the words of the explanation."""
+        panel = self.screen.query_one(Explained)
+        return str(panel.border_title), panel.query_one(Static).render().plain
 
     def value(self, id):
         return self.screen.query_one(f"#{id}", Input).value
@@ -87,7 +98,7 @@ async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
             "4",
         ]
         assert session.value("name") == "crates-1"
-        assert session.screen.query_one("#pair", Select).value == "model2model/failure-proximal"
+        assert session.method() == ["ddenv", "model2model", "failure-proximal"]
         assert not session.screen.query_one("#places").display
 
 
@@ -104,6 +115,117 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started,
 
         scenario = read_parts(session.app.screen._poll.file)[0]
         assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
+
+
+async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios, started):
+    async with Opened() as session:
+        for kind, name in zip(KINDS, ("splitting", "timeseg", "timestep"), strict=True):
+            session.screen.query_one(f"#{kind}", Select).value = name
+        await session.press("ctrl+s")
+        assert len(started) == 1
+        from ddenv.launch.runs import read_parts
+
+        reduction = read_parts(session.app.screen._poll.file)[0].reduction
+        assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
+
+
+async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
+    async with Opened() as session:
+        assert session.explained() == ("algorithm ddenv", explanation("algorithm", "ddenv"))
+        await session.press("enter", "tab")
+        assert session.app.focused.id == "partitioning"
+        assert session.explained() == ("partitioning model2model", explanation("partitioning", "model2model"))
+        await session.press("enter", "down")
+        assert session.explained() == ("partitioning timeseg", explanation("partitioning", "timeseg"))
+        assert session.method()[1] == "model2model"
+        await session.press("escape")
+        assert session.explained()[0] == "partitioning model2model"
+        session.screen.query_one("#prioritization", Select).value = "random"
+        await session.pilot.pause()
+        assert session.explained() == ("prioritization random", explanation("prioritization", "random"))
+
+
+async def test_another_scenario_brings_its_own_explanation(scenarios):
+    other = fake_run.scenario(name="other")
+    other["reduction"] |= {"algorithm": "probdd", "prior": "uniform"}
+    (scenarios / "other.yaml").write_text(yaml.safe_dump(other))
+    async with Opened() as session:
+        await session.press("down")
+        title, words = session.explained()
+        assert title == "algorithm probdd"
+        assert words.endswith("Here the prior is uniform (reduction.prior).")
+
+
+async def test_where_delta_comes_from_is_told(scenarios):
+    async with Opened() as session:
+        session.screen.query_one("#partitioning", Select).value = "trajectoryseg"
+        await session.pilot.pause()
+        assert session.explained()[1].endswith("Here delta is 0.5 rad/s (reduction.delta).")
+
+
+UNUSED = {
+    "ddenv": ([], "", ""),
+    "splitting": (["partitioning"], "does not use the partitioning", "Not used: splitting"),
+    "ddmin": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used: ddmin"),
+    "probdd": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used: probdd"),
+}
+
+
+@pytest.mark.parametrize(("algorithm", "unused", "words", "beside"), [(name, *what) for name, what in UNUSED.items()])
+async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios, algorithm, unused, words, beside):
+    async with Opened() as session:
+        session.screen.query_one("#algorithm", Select).value = algorithm
+        await session.pilot.pause()
+        assert words in session.explained()[1]
+        assert [kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")] == unused
+        session.screen.query_one("#partitioning").focus()
+        await session.pilot.pause()
+        assert session.explained()[1].startswith(beside or explanation("partitioning", "model2model"))
+
+
+@pytest.mark.parametrize("size", [(64, 18), (80, 24), (109, 33)], ids=str)
+async def test_small_terminals_explain_in_place_of_the_world_while_it_is_asked_for(scenarios, size):
+    async with Opened(size) as session:
+        shown = [session.screen.query_one(id).display for id in ("#preview", "#explained")]
+        assert shown == [True, False]
+        await session.press("enter", "enter", "down")
+        shown = [session.screen.query_one(id).display for id in ("#preview", "#explained")]
+        assert shown == [False, True]
+        await session.press("escape", "escape")
+        assert session.app.focused.id == "scenario-list"
+        assert session.screen.query_one("#preview").display
+
+
+@pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36), (200, 60)], ids=str)
+async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
+    async with Opened(size) as session:
+        select = session.screen.query_one("#prioritization", Select)
+        assert select.query_one("#label").size.width >= len("avg-trajectory-proximal")
+        for keys in ((), ("enter",)):
+            await session.press(*keys)
+            start = session.screen.query_one("#start")
+            assert start.region.width == 11
+            assert session.screen.region.contains_region(start.region)
+            assert session.screen.query_one("#options").content_region.contains_region(start.region)
+
+
+async def test_an_open_list_shows_all_its_names(scenarios):
+    async with Opened((64, 18)) as session:
+        await session.press("enter", "tab", "tab", "enter")
+        region = session.app.focused.region
+        assert region.height == 6
+        assert session.screen.region.contains_region(region)
+
+
+async def test_a_long_explanation_scrolls(scenarios):
+    async with Opened((64, 18)) as session:
+        await session.press("enter", "down", "end", "enter")
+        panel = session.screen.query_one(Explained)
+        assert session.explained()[0] == "algorithm splitting"
+        await session.press("pagedown")
+        assert panel.scroll_offset.y > 0
+        await session.press("pageup", "pageup")
+        assert panel.scroll_offset.y == 0
 
 
 async def test_the_start_button_starts(scenarios, started):
@@ -193,19 +315,20 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
 async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, started):
     own = {
         "failure": {"timeout": 12, "epsilon": 0.25},
-        "reduction": {"iterations": 9, "n_partitions": 5, "seed": 4, "pair": "timeseg/random"},
+        "reduction": {"iterations": 9, "n_partitions": 5, "seed": 4, "pair": "timeseg/random", "algorithm": "ddmin"},
     }
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | own))
     fields = ("timeout", "epsilon", "iterations", "n_partitions", "seed")
     async with Opened() as session:
         assert [session.value(id) for id in fields] == ["12", "0.25", "9", "5", "4"]
+        assert session.method() == ["ddmin", "timeseg", "random"]
         session.fill(timeout="soon", jobs="many", seed="6")
         await session.press("ctrl+s")
         assert session.screen.query_one("#timeout", Input).has_class("-wrong")
         session.screen._opened(scenarios / "crates.sdf")
         await session.settle()
         assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.5", "3", "2", "0", "4"]
-        assert session.screen.query_one("#pair", Select).value == "model2model/avg-trajectory-proximal"
+        assert session.method() == ["ddenv", "model2model", "avg-trajectory-proximal"]
         assert not session.screen.query(".-wrong")
         assert session.wrong() == ""
         session.fill(epsilon="near", jobs="2")

@@ -14,7 +14,8 @@ from typing import Any
 import click
 
 from ddenv import __version__
-from ddenv.cli.options import JOBS, reading_options, scenario_options
+from ddenv.cli.options import JOBS, reading_options, reduction_options, scenario_options
+from ddenv.cli.schemas import schemas_command
 from ddenv.cli.world import world_group
 from ddenv.errors import UserError, printable
 
@@ -46,11 +47,7 @@ def app(context: click.Context, **reading) -> None:
 @click.argument("scenario")
 @scenario_options
 @reading_options
-@click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal.")
-@click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure.")
-@click.option("--n-partitions", type=int, help="Partitions in the first round.")
-@click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m.")
-@click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i.")
+@reduction_options
 @click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Tests at the same time.")
 @click.option("--name", help="Name of the run.")
 @click.option(
@@ -272,6 +269,7 @@ def _cannot_print(error: OSError) -> int:
 
 
 app.add_command(world_group)
+app.add_command(schemas_command)
 
 
 def main() -> None:

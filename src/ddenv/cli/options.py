@@ -73,3 +73,31 @@ def reading_options(command):
     ):
         command = option(command)
     return command
+
+
+def reduction_options(command):
+    """How the world is reduced, in place of what the scenario says: what is left out stays the scenario's."""
+    for option in reversed(
+        (
+            click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal."),
+            click.option("--algorithm", help="How the environment is searched; 'ddenv schemas' lists all."),
+            click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure."),
+            click.option("--n-partitions", type=int, help="Partitions in the first round."),
+            click.option("--delta", type=float, help="Change of the angular velocity where trajectoryseg cuts, rad/s."),
+            click.option(
+                "--candidates", metavar="both|partitions|complements", help="What ddenv tries of each partition."
+            ),
+            click.option(
+                "--complement-order", metavar="paper|far-first", help="In which order ddenv tries the complements."
+            ),
+            click.option("--growth", metavar="paper|steady", help="When n grows: after every round, or a vain one."),
+            click.option(
+                "--skip", metavar="known|implied", help="What is not tried: judged sets, or their subsets too."
+            ),
+            click.option("--prior", metavar="spatial|uniform", help="Where probdd and splitting begin."),
+            click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m."),
+            click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i."),
+        )
+    ):
+        command = option(command)
+    return command

@@ -36,4 +36,4 @@ def _line(path: Path) -> str:
     elif status == "finished":
         status = "minimal" if state.minimal else "finished"
     size = f"{len(state.environment)} of {len(state.elements)} models"
-    return f"{status:<18}  {size:<20}  {len(state.finished_tests)} tests"
+    return f"{status:<18}  {size:<20}  {state.tests_done} tests"

@@ -19,7 +19,7 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
         "models_before": len(state.elements),
         "models_after": len(state.environment),
         "kept": list(state.environment),
-        "tests": len(state.finished_tests),
+        "tests": state.tests_done,
         "outcomes": state.outcomes(),
         "deflake_runs": state.deflake_runs,
         "rounds": state.rounds_done,
@@ -41,7 +41,7 @@ def lines(state: RunState, path: Path) -> list[str]:
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
     told = [
         f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names(state)}",
-        f"{len(state.finished_tests)} tests ({tests}; {state.deflake_runs} re-runs) in {count(state.rounds_done, 'round')}, "
+        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         f"run file: {path}",
     ]

@@ -12,8 +12,8 @@ def headline(state: RunState) -> str:
     """The state in one line, cut to the terminal's width."""
     models = f"{len(state.environment)} of {len(state.elements)} models"
     where = "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
-    running = sum(test.outcome == "running" for test in state.tests)
-    line = f"{state.status} · {where} · {models} · {len(state.finished_tests)} tests, {running} running"
+    running = state.tally["running"]
+    line = f"{state.status} · {where} · {models} · {state.tests_done} tests, {running} running"
     return line[: shutil.get_terminal_size().columns - 1]
 
 
@@ -32,11 +32,9 @@ def news(kind: str, before: RunState, after: RunState) -> str:
                 f"{count(len(round.partitions), 'partition')}, {count(len(round.candidates), 'candidate')}"
             )
         case "candidate_judged" if after.round is not None:
-            changed = [
-                new for old, new in zip(before.round.candidates, after.round.candidates, strict=True) if old != new
-            ]
+            changed = after.round.candidates.changed_since(before.round.candidates)
             return "".join(
-                f"  {one.label} ({count(len(one.models), 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
+                f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
                 for one in changed
             )
         case "waiting":
@@ -47,7 +45,7 @@ def news(kind: str, before: RunState, after: RunState) -> str:
         case "resumed":
             return "resumed"
         case "reduced":
-            return f"  reduced to {count(len(after.environment), 'model')} after {len(after.finished_tests)} tests"
+            return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
         case "finished" | "engine_stopped" | "engine_failed":
             return f"{after.status}: {after.reason}"
     return ""

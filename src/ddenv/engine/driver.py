@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Control
+from ddenv.engine.evidence import Sight
 from ddenv.engine.journal import Journal, Keep
-from ddenv.reduction.ddenv import ddenv
-from ddenv.reduction.evidence import Evidence
-from ddenv.reduction.partitioning import PARTITIONINGS
-from ddenv.reduction.prioritization import DISTANCES, PRIORITIZATIONS
+from ddenv.errors import UserError
+from ddenv.reduction.evidence import Evidence, Trial
+from ddenv.reduction.guide import Guide, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.verdict import Standing, standing
 from ddenv.robot.oracle import Failure
 from ddenv.runfile.store import COLUMNS
-from ddenv.world.extent import center
+from ddenv.schemas import split_pair
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
+
+# No machine has more idle workers than this: further candidates need not be looked at.
+ENOUGH = 2048
 
 
 class Driver:
@@ -29,29 +34,24 @@ class Driver:
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
         self._reduction = scenario.reduction
         self._failure_spec = scenario.failure
-        self._partitioning, self._prioritization = scenario.reduction.pair.split("/")
         self._journal = journal
         self._bench = bench
         self._control = control
+        self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
         self._evidence: Evidence | None = None
-        positions = {model.name: center(model) for model in world.models}
-        self._positions = {name: positions[name] for name in journal.state.elements}
+        self._trials: list[Trial] = []
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
+        # How many candidates of the round have their verdict, and were without f.
+        self._judged = 0
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
+        guide = self._guide()
+        algorithm = search(self._reduction.algorithm, self._journal.state.elements, guide)
         reason = self._baseline()
         if reason:
             self._end(False, reason)
             return
-        algorithm = ddenv(
-            self._journal.state.elements,
-            lambda environment, n: PARTITIONINGS[self._partitioning](environment, n, self._evidence),
-            lambda partitions: PRIORITIZATIONS[self._prioritization](partitions, self._evidence),
-            self._reduction.n_partitions,
-            candidates=self._reduction.candidates,
-            complement_order=self._reduction.complement_order,
-        )
         number, winner = 0, None
         try:
             while True:
@@ -60,6 +60,22 @@ class Driver:
                 winner = self._round(number, round)
         except StopIteration as end:
             self._finish(end.value)
+
+    def _guide(self) -> Guide:
+        """The schemas that the scenario names. Raises UserError where there are none of these names."""
+        asked = self._reduction
+        partitioning, prioritization = split_pair(asked.pair)
+        return make_guide(
+            partitioning,
+            prioritization,
+            lambda: replace(self._evidence, trials=self._trials),
+            prior=asked.prior,
+            n_partitions=asked.n_partitions,
+            candidates=asked.candidates,
+            complement_order=asked.complement_order,
+            growth=asked.growth,
+            skip=asked.skip,
+        )
 
     def _finish(self, kept: Keep) -> None:
         # Each model must have been left out, in tests and without success; a veto or a reject leaves that open.
@@ -76,7 +92,7 @@ class Driver:
         self._journal.record("finished", minimal=minimal, reason=reason)
 
     def _is_dissimilar(self, keep: Keep) -> bool:
-        return standing([keep], self._similar(), self._reduction.iterations).verdicts[0] == "dissimilar"
+        return standing([keep], self._journal.is_similar, self._reduction.iterations).verdicts[0] == "dissimilar"
 
     def _baseline(self) -> str:
         """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""
@@ -104,9 +120,11 @@ class Driver:
     def _round(self, number: int, round: Round) -> Candidate | None:
         """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""
         self._announce(number, round)
+        self._judged = 0
         winner = self._judge(number, round)
         while winner is not None and not self._is_accepted(number, winner):
             winner = self._judge(number, round)
+        self._learn(round, winner)
         if winner is not None:
             self._take(number, round, winner)
         if not self._journal.has("round_finished", number):
@@ -115,8 +133,11 @@ class Driver:
         return None if winner is None else round.candidates[winner]
 
     def _announce(self, number: int, round: Round) -> None:
+        # The scores of such schemas are distances in m, which is worth showing.
+        shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
+
         def distance(candidate: Candidate) -> float | None:
-            return float(f"{round.scores[candidate.partition]:.3f}") if self._prioritization in DISTANCES else None
+            return float(f"{round.scores[candidate.partition]:.3f}") if shown else None
 
         self._journal.record_once(
             "round_started",
@@ -126,9 +147,16 @@ class Driver:
             partitions=[self._numbers(partition) for partition in round.partitions],
             candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
         )
-        if self._journal.state.round.number == number:
-            for index in self._refused(round):
-                verdict = self._journal.refused[round.candidates[index].models]
+        current = self._journal.state.round
+        if current.number != number:
+            return
+        if [set(part) for part in current.partitions] != [set(part) for part in round.partitions]:
+            raise UserError(
+                f"round {number} would now be another one: the run was begun with other versions of ddenv or scikit-learn; "
+                "go on with those, or begin a new run"
+            )
+        for index, one in enumerate(round.candidates) if self._journal.refused else ():
+            if verdict := self._journal.refused.get(one.models):
                 self._journal.record_once("vetoed", number, index, verdict=verdict)
 
     def _judge(self, number: int, round: Round) -> int | None:
@@ -143,26 +171,36 @@ class Driver:
         return self._standing(round).winner
 
     def _standing(self, round: Round) -> Standing:
-        keeps = [candidate.models for candidate in round.candidates]
-        return standing(keeps, self._similar(), self._reduction.iterations, self._refused(round))
-
-    def _refused(self, round: Round) -> frozenset[int]:
-        """The candidates that the user vetoed or rejected, in this round or an earlier one."""
-        refused = self._journal.refused
-        return frozenset(index for index, one in enumerate(round.candidates) if one.models in refused)
+        """Of the candidates that have no verdict yet."""
+        open_ones = (candidate.models for candidate in islice(round.candidates, self._judged, None))
+        similar, refused = self._journal.is_similar, self._journal.refused
+        return standing(open_ones, similar, self._reduction.iterations, refused, first=self._judged, enough=ENOUGH)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
         """Tells verdicts in the order of candidates: what was run ahead of time is told when its turn has come."""
-        refused = self._refused(round)
-        for index, verdict in enumerate(verdicts):
+        for verdict in verdicts:
             if not verdict:
                 return
-            if index not in refused:
-                tests = self._tests_of(round.candidates[index].models)
+            models = round.candidates[self._judged].models
+            if models not in self._journal.refused:
+                tests = self._tests_of(models)
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
-                self._journal.record_once("candidate_judged", number, index, verdict=verdict, tests=tests, known=known)
+                self._journal.record_once(
+                    "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
+                )
             if verdict == "similar":
                 return
+            self._judged += 1
+
+    def _learn(self, round: Round, winner: int | None) -> None:
+        """What the round's verdicts rest on, for schemas that learn: never what only ran ahead of time."""
+        last = len(round.candidates) if winner is None else winner + 1
+        tests = self._journal.state.tests
+        for candidate in round.candidates[:last]:
+            models = candidate.models
+            if models not in self._journal.refused:
+                shown = (tests[test - 1].outcome == "similar" for test in self._tests_of(models))
+                self._trials += [Trial(models, similar) for similar in shown]
 
     def _tests_of(self, keep: Keep) -> list[int]:
         """The tests that a candidate's verdict rests on, in the order of runs."""
@@ -195,16 +233,12 @@ class Driver:
         self._look_at(test)
 
     def _look_at(self, test: int) -> None:
-        """Partitioning and prioritization see the trajectory of `test`, the last similar run."""
-        position = self._journal.state.baseline.position
-        self._evidence = Evidence(self._positions, self._trajectory(test), position, self._reduction.seed)
+        """The schemas see `test`, the last similar run."""
+        self._evidence = self._sight.evidence(self._journal.state, test, self._trajectory(test), self._trials)
 
     def _trajectory(self, test: int) -> np.ndarray:
         return np.array(self._journal.file.trajectory(test)).reshape(-1, COLUMNS)
 
-    def _similar(self) -> dict[tuple[Keep, int], bool]:
-        tests = self._journal.state.tests
-        return {key: tests[test - 1].outcome == "similar" for key, test in self._journal.ledger.items()}
-
     def _numbers(self, names: Iterable[str]) -> list[int]:
-        return [self._number[name] for name in names]
+        """In the order of the world, which is not always the algorithm's."""
+        return sorted(self._number[name] for name in names)

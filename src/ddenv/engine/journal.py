@@ -42,6 +42,11 @@ class Journal:
             data["candidate"] = candidate
         self.record(kind, round=round, **data)
 
+    def is_similar(self, keep: Keep, run: int) -> bool | None:
+        """Whether a finished test showed f; None where it is not made yet."""
+        test = self.ledger.get((keep, run))
+        return None if test is None else self.state.tests[test - 1].outcome == "similar"
+
     def start_test(self, phase: str, keep: Keep, run: int, round: int | None, candidate: int | None) -> int:
         """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise."""
         test = len(self.state.tests) + 1

@@ -51,23 +51,20 @@ def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], go
 def with_options(
     scenario: Scenario,
     *,
-    pair: str | None = None,
-    iterations: int | None = None,
-    n_partitions: int | None = None,
-    seed: int | None = None,
     timeout: float | None = None,
     epsilon: float | None = None,
     spawn: Sequence[float] | None = None,
     goal: Sequence[float] | None = None,
     world: Path | None = None,
     reading: Reading | None = None,
+    **reduction: str | int | float | None,
 ) -> Scenario:
-    """`scenario` with some of its settings replaced. Raises UserError.
+    """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
-    `timeout` is in simulated s, `epsilon` in m, `spawn` x, y, z m and yaw rad (0 if left out), `goal` x, y m.
+    `timeout` is in simulated s, `epsilon` in m, `spawn` x, y, z m and yaw rad (0 if left out), `goal` x, y m. All others
+    are keys of the scenario's section `reduction`.
     """
     data = scenario.model_dump(mode="json")
-    reduction = {"pair": pair, "iterations": iterations, "n_partitions": n_partitions, "seed": seed}
     failure = {"timeout": timeout, "epsilon": epsilon}
     data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
     data["failure"].update({key: value for key, value in failure.items() if value is not None})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ddenv.errors import UserError
 
 if TYPE_CHECKING:
-    from ddenv.world.scenario import Scenario
+    from ddenv.world.scenario import Reduction, Scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +91,16 @@ def texts_of(scenario: Scenario) -> dict[str, str]:
         "n_partitions": str(reduction.n_partitions),
         "epsilon": f"{failure.epsilon:g}",
         "seed": str(reduction.seed),
+    }
+
+
+def settings_of(reduction: Reduction) -> dict[str, str]:
+    """A sentence for each name that has a setting without a field: what it is here, and the scenario's key for it."""
+    prior = f"Here the prior is {reduction.prior} (reduction.prior)."
+    return {
+        "trajectoryseg": f"Here delta is {reduction.delta:g} rad/s (reduction.delta).",
+        "probdd": prior,
+        "splitting": prior,
     }
 
 

@@ -14,6 +14,7 @@ class Settings:
     """`epsilon` in m, `timeout` in simulated s; `iterations` re-runs a candidate, `baseline_runs` of the whole world."""
 
     name: str = "run"
+    algorithm: str = "ddenv"
     pair: str = ""
     iterations: int = 3
     baseline_runs: int = 10
@@ -28,6 +29,7 @@ def settings(state: RunState) -> Settings:
     standard = Settings()
     return Settings(
         name=plain(scenario.get("name", standard.name)),
+        algorithm=plain(reduction.get("algorithm", standard.algorithm)),
         pair=plain(reduction.get("pair", standard.pair)),
         iterations=_number(reduction, "iterations", standard.iterations),
         baseline_runs=_number(reduction, "baseline_runs", standard.baseline_runs),

@@ -1,4 +1,4 @@
-"""Dialogs above the screens: help, quit, the scene, and choosing a file."""
+"""Dialogs above the screens: help, the method, quit, the scene, and choosing a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Button, DirectoryTree, Input, Static
 
+from ddenv.schemas import Kind
+from ddenv.workbench.methods import chosen, note, paragraph
 from ddenv.workbench.processes import Scene
+from ddenv.workbench.wording import plain
 
 SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
 
@@ -47,6 +50,37 @@ class Help(ModalScreen[None]):
         width = max(len(key) for key, _ in self._keys)
         rows = [Text(f"{key:>{width}}", "bold").append(f"   {what}", "not bold") for key, what in self._keys]
         return Text("\n").join(rows)
+
+
+class Method(ModalScreen[None]):
+    """What a run is reduced by, each with its explanation."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("escape,e,q,enter", "dismiss", "close", id="method.close", tooltip="close this dialog"),
+    ]
+
+    def __init__(self, algorithm: str, pair: str) -> None:
+        super().__init__()
+        self._algorithm, self._pair = algorithm, pair
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "How this run is reduced"
+            dialog.border_subtitle = "escape closes"
+            with VerticalScroll():
+                yield Static(self._words(), markup=False)
+
+    def _words(self) -> Text:
+        names = chosen(self._algorithm, self._pair)
+        return Text("\n\n").join(self._paragraph(kind, name) for kind, name in names.items())
+
+    def _paragraph(self, kind: Kind, name: str) -> Text:
+        text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
+        unused = note(kind, self._algorithm)
+        if unused:
+            text.append(unused, "bold").append(" ")
+        return text.append(paragraph(kind, name))
 
 
 class Quit(ModalScreen[str]):

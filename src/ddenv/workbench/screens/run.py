@@ -18,7 +18,8 @@ from ddenv.workbench.place import place_of_run
 from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine, Scene
 from ddenv.workbench.screens.controls import Controls
-from ddenv.workbench.screens.dialogs import Help, Quit, SceneDialog
+from ddenv.workbench.screens.dialogs import Help, Method, Quit, SceneDialog
+from ddenv.workbench.settings import settings
 from ddenv.workbench.widgets.candidates import Candidates
 from ddenv.workbench.widgets.chart import Chart
 from ddenv.workbench.widgets.happening import Happening
@@ -47,6 +48,7 @@ class RunScreen(Controls):
         Binding("v", "veto", "veto", id="run.veto", tooltip="leave out the candidate under the cursor"),
         Binding("t", "mode", "ask", id="run.mode", tooltip="accept reductions automatically, or ask before each one"),
         Binding("m", "scene", "scene", id="run.scene", tooltip="start the 3-D scene and show its address"),
+        Binding("e", "method", "explain", id="run.method", tooltip="explain how this run is reduced", show=False),
         Binding("question_mark,f1", "help", "help", id="run.help", tooltip="show every key", key_display="?"),
         Binding("d", "detach", "detach", id="run.detach", tooltip="leave this screen; the engine goes on"),
         Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks what becomes of the engine"),
@@ -97,6 +99,7 @@ class RunScreen(Controls):
                 yield Chart(id="chart")
             with Vertical(id="now", classes="panel") as panel:
                 panel.border_title = "What is happening"
+                panel.border_subtitle = "e explains the method"
                 yield Happening(id="happening")
         yield Status(id="status")
         yield Footer(compact=True, show_command_palette=False)
@@ -222,6 +225,10 @@ class RunScreen(Controls):
             dialog.refresh_address()
         elif self.scene.trouble:
             self.notify(self.scene.trouble, severity="error", markup=False)
+
+    def action_method(self) -> None:
+        options = settings(self.snapshot.state)
+        self.app.push_screen(Method(options.algorithm, options.pair))
 
     def action_help(self) -> None:
         keys = [(self._key(binding), binding.tooltip) for binding in self.BINDINGS]

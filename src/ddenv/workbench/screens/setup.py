@@ -20,10 +20,11 @@ from ddenv.workbench import form
 from ddenv.workbench.chosen import Chosen, read_choice
 from ddenv.workbench.place import place_of
 from ddenv.workbench.processes import Engine
-from ddenv.workbench.recent import Recent, recent_runs
 from ddenv.workbench.screens.dialogs import Help, OpenFile
 from ddenv.workbench.widgets.map import Place, WorldMap
 from ddenv.workbench.widgets.options import OptionsForm
+from ddenv.workbench.widgets.runs import RunList
+from ddenv.workbench.widgets.schema import Explained, SchemaSelect
 from ddenv.workbench.wording import plain, shorten
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ class SetupScreen(Screen[None]):
     """Nothing is written before Start, and then only if everything fits."""
 
     CSS_PATH = "setup.tcss"
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (64, "-narrow"), (110, "-wide")]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (18, "-short"), (30, "-tall")]
+    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (64, "-slim"), (80, "-narrow"), (110, "-wide")]
+    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (18, "-low"), (24, "-short"), (34, "-tall")]
     BINDINGS: ClassVar = [
         Binding("ctrl+s,f5", "start", "start", id="setup.start", tooltip="start the reduction", key_display="ctrl+s"),
         Binding("ctrl+o", "open", "open a file", id="setup.open", tooltip="choose a scenario or world file"),
@@ -52,29 +53,27 @@ class SetupScreen(Screen[None]):
         self._reading = reading or {}
         self._chosen: Chosen | None = None
         self._files: dict[str, Path] = {}
-        self._runs: dict[str, Recent] = {}
         self._starting = False
 
     def compose(self) -> ComposeResult:
-        from ddenv.world.scenario import PAIRS
-
         yield Static(self._title(), id="header", markup=False)
         with Horizontal(id="body"):
             with Vertical(id="choice"):
                 with Vertical(id="scenarios", classes="panel") as panel:
                     panel.border_title = "Scenarios"
-                    panel.border_subtitle = "ctrl+o opens a file"
+                    panel.border_subtitle = "^o opens"
                     yield OptionList(id="scenario-list", compact=True, markup=False)
                 with Vertical(id="runs", classes="panel") as panel:
                     panel.border_title = "Recent runs"
                     panel.border_subtitle = "enter opens"
-                    yield OptionList(id="run-list", compact=True, markup=False)
+                    yield RunList(id="run-list")
             with Vertical(id="right"):
                 with Vertical(id="preview", classes="panel") as panel:
                     panel.border_title = "World"
                     yield WorldMap(id="map")
                     yield Static("", id="about", markup=False)
-                yield OptionsForm(PAIRS, id="options", classes="panel")
+                yield Explained(id="explained", classes="panel", can_focus=False)
+                yield OptionsForm(id="options", classes="panel")
         yield Footer(compact=True, show_command_palette=False)
         yield Static("Please make the terminal larger: at least 64 x 18.", id="small", markup=False)
 
@@ -89,7 +88,7 @@ class SetupScreen(Screen[None]):
         self.query_one("#scenario-list").focus()
 
     def on_screen_resume(self) -> None:
-        self._list_runs()
+        self.query_one(RunList).read()
 
     # Left: what there is to choose from.
 
@@ -112,30 +111,11 @@ class SetupScreen(Screen[None]):
             self.query_one("#scenario-list", OptionList).add_option(Option(Text(plain(words), no_wrap=True), id=key))
         return key
 
-    @work(thread=True, group="runs", exclusive=True)
-    def _list_runs(self) -> None:
-        from ddenv.launch.runs import runs_folder
-
-        runs = recent_runs(runs_folder())
-        self.app.call_from_thread(self._show_runs, runs)
-
-    def _show_runs(self, runs: list[Recent]) -> None:
-        if not self.is_attached:
-            return
-        self._runs = {str(run.path): run for run in runs}
-        options = self.query_one("#run-list", OptionList)
-        options.clear_options()
-        for run in runs:
-            text = Text(f"{run.sign} {plain(run.path.stem)}", no_wrap=True, overflow="ellipsis")
-            options.add_option(Option(text.append(f"  {run.words}", "dim"), id=str(run.path)))
-        if not runs:
-            options.add_option(Option(Text("none yet", "dim"), disabled=True))
-
     @on(OptionList.OptionSelected, "#run-list")
     def _open_run(self, event: OptionList.OptionSelected) -> None:
         from ddenv.workbench.screens.run import RunScreen
 
-        recent = self._runs[event.option_id or ""]
+        recent = self.query_one(RunList).run_of(event.option_id)
         try:
             screen = RunScreen(recent.path)
         except UserError as error:
@@ -150,7 +130,7 @@ class SetupScreen(Screen[None]):
 
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
-        self.query_one("#pair").focus()
+        self.query_one("#algorithm").focus()
 
     # Right: the chosen one, read beside the screen.
 
@@ -207,6 +187,21 @@ class SetupScreen(Screen[None]):
         except UserError:
             return None
 
+    # Between: what the algorithm, the partitioning or the prioritization does.
+
+    @on(OptionsForm.Explain)
+    def _explain(self, event: OptionsForm.Explain) -> None:
+        self.query_one(Explained).show(event.kind, event.name, self._form.method["algorithm"], event.here)
+
+    def on_descendant_focus(self) -> None:
+        """Small terminals show the explanation in place of the world, while it is asked for."""
+        looking = isinstance(self.focused, SchemaSelect) or isinstance(self.focused.parent, SchemaSelect)
+        self.set_class(looking, "-looking")
+
+    def action_scroll(self, pages: int) -> None:
+        explained = self.query_one(Explained)
+        explained.scroll_relative(y=pages * max(1, explained.size.height - 1), animate=False)
+
     @property
     def _form(self) -> OptionsForm:
         return self.query_one(OptionsForm)
@@ -249,7 +244,8 @@ class SetupScreen(Screen[None]):
         path = find_run(name)
         if path.exists():
             raise form.FieldError("name", f"run name: {path} exists already; choose another name")
-        return with_options(scenario, pair=self._form.pair, reading=self._chosen.reading, **options), jobs, path
+        options |= self._form.method
+        return with_options(scenario, reading=self._chosen.reading, **options), jobs, path
 
     @work(thread=True, group="start", exclusive=True)
     def _create(self, scenario: Scenario, jobs: int, path: Path, mode: str) -> None:
@@ -288,7 +284,8 @@ class SetupScreen(Screen[None]):
         self.query_one("#scenario-list").focus()
 
     def action_help(self) -> None:
-        keys = [(binding.key_display or binding.key, binding.tooltip) for binding in self.BINDINGS]
+        bindings = (*self.BINDINGS, *SchemaSelect.BINDINGS)
+        keys = [(binding.key_display or binding.key, binding.tooltip) for binding in bindings]
         more = [
             ("tab", "next field"),
             ("enter", "in a list: take it; in a field: start"),

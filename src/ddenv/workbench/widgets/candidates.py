@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.text import Text
 from textual.message import Message
 from textual.widgets import DataTable
@@ -37,7 +39,7 @@ class Candidates(DataTable):
         self._of: tuple = ()
         self._names: tuple[str, ...] = ()
         self._cells: Rows = {}
-        self._round: tuple[Candidate, ...] = ()
+        self._round: Sequence[Candidate] = ()
 
     def on_mount(self) -> None:
         self.set_narrow(False)
@@ -151,12 +153,12 @@ def _candidates(snapshot: Snapshot) -> Rows:
 
 def _candidate(snapshot: Snapshot, each: Candidate, full: int) -> dict[str, str]:
     tests = [snapshot.state.tests[id - 1] for id in each.tests if 0 < id <= len(snapshot.state.tests)]
-    done = sum(test.outcome not in ("running", "lost") for test in tests)
+    done = sum(test.is_finished for test in tests)
     verdict = VERDICT.get(each.verdict, plain(each.verdict)) or _open(snapshot, tests)
     if snapshot.state.waiting_candidate == each.index:
         verdict = "? a or x"
     ran = f"{done}/{full}" if done or any(test.outcome == "running" for test in tests) else ""
-    return _row(str(each.index + 1), each.label, str(len(each.models)), metres(each.distance), ran, verdict)
+    return _row(str(each.index + 1), each.label, str(each.size), metres(each.distance), ran, verdict)
 
 
 def _open(snapshot: Snapshot, tests: list[Test]) -> str:

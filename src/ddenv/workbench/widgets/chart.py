@@ -21,7 +21,7 @@ class Chart(Widget):
         self._tests = 0
 
     def show(self, snapshot: Snapshot) -> None:
-        points, tests = snapshot.state.history, len(snapshot.state.finished_tests)
+        points, tests = snapshot.state.history, snapshot.state.tests_done
         if (points, tests) != (self._points, self._tests):
             self._points, self._tests = points, tests
             self.refresh()

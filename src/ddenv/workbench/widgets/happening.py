@@ -1,11 +1,12 @@
-"""What is happening: where in Algorithm 1 the run is, and what it does there and why."""
+"""What is happening: where in its algorithm the run is, and what it does there and why."""
 
 from __future__ import annotations
 
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.workbench.explain import ALGORITHM, Explanation, explain
+from ddenv.workbench.explain import Explanation, explain
+from ddenv.workbench.listings import Lines
 from ddenv.workbench.poll import Snapshot
 
 
@@ -28,7 +29,7 @@ class Happening(Widget):
         width, height = self.size
         words = self._sentences()
         taken = len(words.wrap(self.app.console, max(1, width)))
-        text = _window(self._explanation.line, width, height - taken, self.app.theme_variables["primary"])
+        text = _window(self._explanation, width, height - taken, self.app.theme_variables["primary"])
         return text.append_text(words)
 
     def _sentences(self) -> Text:
@@ -38,16 +39,17 @@ class Happening(Widget):
         return Text("\n").join(sentences)
 
 
-def _window(line: int | None, width: int, room: int, color: str) -> Text:
+def _window(explanation: Explanation, width: int, room: int, color: str) -> Text:
     """Up to `room` lines of the algorithm with the current one marked; at least that one, and a blank line below if it fits."""
     text = Text()
-    if line is None:
+    lines: Lines = explanation.lines
+    if explanation.line is None:
         return text
-    index = next((place for place, (number, _) in enumerate(ALGORITHM) if number == line), 0)
-    shown = max(1, min(room - 1, len(ALGORITHM)))
-    first = max(0, min(index - shown // 2, len(ALGORITHM) - shown))
+    index = next((place for place, (number, _) in enumerate(lines) if number == explanation.line), 0)
+    shown = max(1, min(room - 1, len(lines)))
+    first = max(0, min(index - shown // 2, len(lines) - shown))
     for place in range(first, first + shown):
-        number, code = ALGORITHM[place]
+        number, code = lines[place]
         current = place == index
         row = Text(f"{'▶' if current else ' '}{number:>2} {code}", f"bold {color}" if current else "dim", no_wrap=True)
         row.truncate(width, overflow="ellipsis")

@@ -14,35 +14,49 @@ from textual.message import Message
 from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
+from ddenv.schemas import Kind
 from ddenv.workbench import form
+from ddenv.workbench.methods import chosen, uses
+from ddenv.workbench.widgets.schema import SchemaSelect
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
-    from ddenv.world.scenario import Scenario
+    from ddenv.world.scenario import Reduction, Scenario
 
 MODES = ("automatic", "ask")
 MARK = "✗ "
+METHOD: dict[Kind, str] = {
+    "algorithm": "how the environment is searched",
+    "partitioning": "how the environment is split",
+    "prioritization": "in which order the parts are tried",
+}
 
 
 class OptionsForm(Vertical):
-    """Text fields by the ids of `ddenv.workbench.form`, the pair, the accept mode, and Start."""
+    """Text fields by the ids of `ddenv.workbench.form`, the method, the accept mode, and Start."""
 
     class PlaceEdited(Message):
         """Spawn or goal were edited."""
 
-    def __init__(self, pairs: tuple[str, ...], *, id: str, classes: str) -> None:
+    class Explain(Message):
+        """A name is looked at; `here` is what the scenario has set for it, a sentence or ""."""
+
+        def __init__(self, kind: Kind, name: str, here: str) -> None:
+            super().__init__()
+            self.kind, self.name, self.here = kind, name, here
+
+    def __init__(self, *, id: str, classes: str) -> None:
         super().__init__(id=id, classes=classes)
-        self._pairs = pairs
         self._name_given = False
+        self._here: dict[str, str] = {}
         self.border_title = "Options"
 
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="fields", can_focus=False):
-            with Horizontal(classes="row"):
-                yield Label("pair", markup=False)
-                yield _select(
-                    "pair", self._pairs, "how the environment is split, and in which order the parts are tried"
-                )
+            for kind, tooltip in METHOD.items():
+                with Horizontal(classes="row"):
+                    yield Label(kind, markup=False)
+                    yield SchemaSelect(kind, tooltip)
             with Grid(classes="grid"):
                 for field in form.OPTIONS:
                     yield from _field(field)
@@ -63,8 +77,10 @@ class OptionsForm(Vertical):
         self.ask_for_places(False)
 
     @property
-    def pair(self) -> str:
-        return str(self.query_one("#pair", Select).value)
+    def method(self) -> dict[str, str]:
+        """The chosen algorithm and pair, by the scenario's keys."""
+        names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
+        return {"algorithm": names["algorithm"], "pair": f"{names['partitioning']}/{names['prioritization']}"}
 
     @property
     def accept_mode(self) -> str:
@@ -96,7 +112,34 @@ class OptionsForm(Vertical):
             field = self.query_one(f"#{id}", Input)
             field.value = text
             field.remove_class("-wrong")
-        self.query_one("#pair", Select).value = scenario.reduction.pair
+        self._show_method(scenario.reduction)
+
+    def _show_method(self, reduction: Reduction) -> None:
+        self._here = form.settings_of(reduction)
+        names = chosen(reduction.algorithm, reduction.pair)
+        for kind, name in names.items():
+            select = self.query_one(f"#{kind}", SchemaSelect)
+            with select.prevent(Select.Changed):
+                select.value = name
+        looked = next((each for each in self.query(SchemaSelect) if each.has_focus), None)
+        kind = looked.kind if looked else "algorithm"
+        self._dim(reduction.algorithm)
+        self._look(kind, names[kind])
+
+    @on(SchemaSelect.Looked)
+    def _looked(self, event: SchemaSelect.Looked) -> None:
+        event.stop()
+        self._dim(event.name if event.kind == "algorithm" else self.method["algorithm"])
+        self._look(event.kind, event.name)
+
+    def _look(self, kind: Kind, name: str) -> None:
+        self.post_message(self.Explain(kind, name, self._here.get(name, "")))
+
+    def _dim(self, algorithm: str) -> None:
+        """What the algorithm does not use stays a choice, for the next algorithm."""
+        used = uses(algorithm)
+        for select in self.query(SchemaSelect):
+            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
 
     def suggest_name(self, name: str) -> None:
         """Fills in a run name, unless the user gave one."""

@@ -6,7 +6,9 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.workbench.methods import labels
 from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.rounds import GROUPS
 from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import STATUS, count, duration, shorten
 
@@ -36,24 +38,31 @@ class Line(Widget):
 
 
 class Header(Line):
-    """Scenario and pair on the left, how far the reduction is on the right."""
+    """Scenario and method on the left, how far the reduction is on the right."""
 
     def facts(self, width: int) -> tuple[str, str, str]:
-        state, options = self._snapshot.state, settings(self._snapshot.state)
-        left = f"{options.name} · {options.pair}"
+        """The program's name, the left and the right text; the method in the longest words that fit."""
+        options = settings(self._snapshot.state)
+        name, right = "ddenv", self._progress()
+        room = max(0, width - 2 - len(name) - len(right) - 4)
+        lefts = [f"{options.name} · {label}" for label in labels(options.algorithm, options.pair)]
+        left = next((left for left in lefts if len(left) <= room), lefts[-1])
+        return name, shorten(left, room), right
+
+    def _progress(self) -> str:
+        state = self._snapshot.state
         total, kept = len(state.elements), len(state.environment)
         progress = [f"{kept} of {count(total, 'model')}"]
         if state.round is not None:
-            progress.insert(0, f"round {state.round.number} · n {state.round.n_partitions}")
+            n = "" if settings(state).algorithm in GROUPS else f" · n {state.round.n_partitions}"
+            progress.insert(0, f"round {state.round.number}{n}")
         if kept < total:
             progress.append(f"{round(100 * (1 - kept / total))} % smaller")
-        return "ddenv", left, " · ".join(progress)
+        return " · ".join(progress)
 
     def render(self) -> Text:
         name, left, right = self.facts(self.size.width)
-        width = self.size.width - 2
-        left = shorten(left, max(0, width - len(name) - len(right) - 4))
-        space = max(1, width - len(name) - 2 - len(left) - len(right))
+        space = max(1, self.size.width - 4 - len(name) - len(left) - len(right))
         primary = self.app.theme_variables["primary"]
         text = Text(" ", no_wrap=True).append(name, f"bold {primary}").append(f"  {left}", "bold")
         return text.append(" " * space).append(right)

@@ -1,0 +1,56 @@
+"""What the schemas see of a run: where models are, what the last similar run was like, what all tests came to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ddenv.reduction.evidence import Evidence, Traits, Trial
+from ddenv.runfile.state import RunState
+from ddenv.world.extent import center, model_bounds
+from ddenv.world.model import Model, World
+
+
+def trajectory_of(rows: np.ndarray) -> np.ndarray:
+    """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
+    qw, qx, qy, qz = rows[:, 4:].T
+    yaw = np.arctan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+    return np.column_stack([rows[:, :4], yaw])
+
+
+def traits_of(model: Model) -> Traits:
+    """What the learner is told of a model: of several surfaces the most slippery one counts."""
+    box = model_bounds(model)
+    size = 0.0 if box is None else float((box[1] - box[0]).max())
+    friction = min((collision.mu for collision in model.collisions), default=1.0)
+    return Traits(size, friction, not model.static)
+
+
+class Sight:
+    """The world's side of the evidence, which stays as it is through a run."""
+
+    def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:
+        models = {model.name: model for model in world.models}
+        self._elements = tuple(elements)
+        self._positions = {name: center(models[name]) for name in elements}
+        self._traits = {name: traits_of(models[name]) for name in elements}
+        self._delta = delta
+        self._seed = seed
+
+    def evidence(self, state: RunState, test: int, rows: np.ndarray, trials: Sequence[Trial]) -> Evidence:
+        """What is known when `test` was the last similar run; `rows` (N, 8) is its trajectory."""
+        run, f = state.tests[test - 1], state.baseline
+        return Evidence(
+            elements=self._elements,
+            positions=self._positions,
+            trajectory=trajectory_of(rows),
+            failure_position=f.position,
+            first_sensed=dict(run.first_sensed),
+            touched=frozenset(name for name, _ in run.first_touched),
+            traits=self._traits,
+            trials=trials,
+            miss_chance=f.miss_chance,
+            delta=self._delta,
+            seed=self._seed,
+        )

@@ -1,0 +1,165 @@
+"""The algorithms in a few lines each, and the line for each step of a run. Pure text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ddenv.runfile.state import Round
+
+Step = Literal["baseline", "split", "next", "test", "rerun", "waiting", "reduced", "nothing", "returned"]
+Lines = tuple[tuple[int, str], ...]
+
+# Before any algorithm begins.
+FIX_F = (0, "f ← failure of R(E, goal, timeout), several runs")
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """`lines` with their numbers; the numbers of a run's steps; `sweep` is where each model is left out in turn at the end."""
+
+    lines: Lines
+    split: int
+    next: int
+    test: int
+    rerun: int
+    waiting: int
+    reduced: int
+    nothing: int
+    returned: int
+    sweep: int | None = None
+    baseline: int = 0
+
+    def line(self, step: Step, current: Round | None) -> int:
+        """The line of a step in the round `current`."""
+        if self.sweep is not None and step not in ("baseline", "returned") and is_sweep(current):
+            return self.sweep
+        return getattr(self, step)
+
+
+def is_sweep(current: Round | None) -> bool:
+    """Whether the round leaves out each model in turn."""
+    if current is None or not current.candidates or len(current.candidates) != len(current.environment):
+        return False
+    return current.candidates[0].kind == "complement"
+
+
+# The paper's Algorithm 1 with the paper's numbers.
+DDENV = Listing(
+    (
+        FIX_F,
+        (1, "while E' not reached do"),
+        (2, " subenvironments ← partition(E, f, n_partitions)"),
+        (3, " subenvironments ← prioritize(subenvironments)"),
+        (4, " for s in subenvironments do"),
+        (5, "   result ← R(s, f, timeout)"),
+        (6, "   if is_new_failure or is_success then"),
+        (7, "     results ← deflake(s, R, iterations, timeout)"),
+        (8, "     result ← find_similar_failure(results, f)"),
+        (10, "   if is_similar_failure(result, f) then"),
+        (11, "     E ← s; break"),
+        (15, " n_partitions ← n_partitions + 1"),
+        (16, " if none similar and n_partitions = E.size then"),
+        (17, "   E' ← E; break"),
+        (21, "return E'"),
+    ),
+    split=2,
+    next=4,
+    test=5,
+    rerun=7,
+    waiting=10,
+    reduced=11,
+    nothing=15,
+    returned=21,
+)
+DDMIN = Listing(
+    (
+        FIX_F,
+        (1, "while E' not reached do"),
+        (2, " parts ← cut(E, n), in the order of the file"),
+        (3, " for s in parts, then in their complements do"),
+        (4, "   result ← R(s, f, timeout)"),
+        (5, "   if not similar: deflake(s, R, iterations)"),
+        (6, "   if similar: E ← s; n ← 2, or n - 1; break"),
+        (7, " nothing similar: n ← 2 n; at E.size: E' ← E"),
+        (8, "return E'"),
+    ),
+    split=2,
+    next=3,
+    test=4,
+    rerun=5,
+    waiting=6,
+    reduced=6,
+    nothing=7,
+    returned=8,
+)
+PROBDD = Listing(
+    (
+        FIX_F,
+        (1, "while some model's chance p of being needed < 1"),
+        (2, " group ← models with the greatest expected gain"),
+        (3, " result ← R(E without group, f, timeout)"),
+        (4, " if not similar: deflake(E without group, ...)"),
+        (5, " if similar: E ← E without group"),
+        (6, " else: p rises for each model of the group"),
+        (7, "for m in E: if similar without m, remove m"),
+        (8, "return E'"),
+    ),
+    split=2,
+    next=3,
+    test=3,
+    rerun=4,
+    waiting=5,
+    reduced=5,
+    nothing=6,
+    returned=8,
+    sweep=7,
+)
+SPLITTING = Listing(
+    (
+        FIX_F,
+        (1, "while a model of E, far to near, is undecided"),
+        (2, " group ← farthest undecided, or half the suspects"),
+        (3, " result ← R(E without group, f, timeout)"),
+        (4, " if not similar: deflake(E without group, ...)"),
+        (5, " if similar: E ← E without group"),
+        (6, " else: suspects ← group; a single one is needed"),
+        (7, "for m in E: if similar without m, remove m"),
+        (8, "return E'"),
+    ),
+    split=2,
+    next=3,
+    test=3,
+    rerun=4,
+    waiting=5,
+    reduced=5,
+    nothing=6,
+    returned=8,
+    sweep=7,
+)
+# What every algorithm comes to, for those of other packages.
+ANY = Listing(
+    (
+        FIX_F,
+        (1, "while the algorithm makes a round do"),
+        (2, " for s in its candidates do"),
+        (3, "   result ← R(s, f, timeout)"),
+        (4, "   if not similar: deflake(s, R, iterations)"),
+        (5, "   if similar: E ← s; break"),
+        (6, "return E'"),
+    ),
+    split=1,
+    next=2,
+    test=3,
+    rerun=4,
+    waiting=5,
+    reduced=5,
+    nothing=1,
+    returned=6,
+)
+LISTINGS = {"ddenv": DDENV, "ddmin": DDMIN, "probdd": PROBDD, "splitting": SPLITTING}
+
+
+def listing(algorithm: str) -> Listing:
+    """The listing of an algorithm, or the general one."""
+    return LISTINGS.get(algorithm, ANY)
