@@ -1,6 +1,9 @@
 """The algorithms step by step, on examples worked by hand."""
 
+from dataclasses import replace
 from itertools import pairwise
+
+import numpy as np
 
 from tests.reduction.worlds import evidence, line, run, tried
 
@@ -96,3 +99,14 @@ def test_probdd_leaves_out_what_promises_most():
     assert len(rounds[0][0].partitions[0]) in (9, 10)
     failed = [round.partitions[0] for round, won in rounds if won is None and len(round.partitions[0]) > 1]
     assert all("m0" in group for group in failed)
+
+
+def test_steady_growth_halves_what_a_split_leaves_together():
+    """A robot that stood still saw all models at one instant: near and far are told apart all the same."""
+    still = line(a=1, b=2, c=3, d=4, e=5, f=6, g=7, h=8)
+    standing = replace(still, trajectory=np.array([[0.0, 0, 0, 0, 0]]))
+    pair = ("timeseg", "failure-proximal")
+    steady = run(standing, {"c"}.issubset, pair, growth="steady")[1]
+    assert words(steady[0][0].candidates) == ["abcd", "efgh"]
+    # As the paper has it, the round has nothing to try until each model is on its own.
+    assert run(standing, {"c"}.issubset, pair)[1][0][0].n_partitions == 8

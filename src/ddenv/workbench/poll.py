@@ -53,7 +53,7 @@ class Snapshot:
         """The tests that run now, in the order they were started; none when no engine is there to run them."""
         if self.engine != "alive":
             return ()
-        return tuple(test for test in self.state.tests if test.outcome == "running")
+        return self.state.running_tests
 
     @property
     def focus(self) -> Candidate | None:

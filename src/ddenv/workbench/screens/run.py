@@ -162,7 +162,7 @@ class RunScreen(Controls):
         static = self.query_one("#legend", Static)
         width = static.size.width
         if self._shown is not None:
-            words = f"{self._shown.label}: {count(len(self._shown.models), 'model')}"
+            words = f"{self._shown.label}: {count(self._shown.size, 'model')}"
             text = Text(words, "bold", no_wrap=True).append(
                 "  others in small letters  " if width > 44 else "  ", "dim"
             )
