@@ -22,6 +22,10 @@ from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
 from tests.conftest import DATA
 
+# What every run notices, in s; the ground is no element.
+SENSED = {"beam": 0.5, "wall": 0.25, "ground_plane": 0.0}
+TOUCHED = {"beam": 1.5, "ground_plane": 0.0}
+
 Oracle = Callable[[frozenset[str], int], str]
 
 
@@ -30,7 +34,7 @@ def result(outcome: str, seed: int, x: float) -> RunResult:
     trajectory = np.zeros((3, 8))
     trajectory[:, 0], trajectory[:, 1], trajectory[:, 4] = (0, 1, 2), (0, x / 2, x), 1
     failure = "timeout" if outcome == "failed" else ""
-    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed)
+    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed, SENSED, TOUCHED)
 
 
 class FakePool:

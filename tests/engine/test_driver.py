@@ -1,5 +1,7 @@
 """The engine's promises, on a simulator that costs nothing."""
 
+import json
+import sqlite3
 import tempfile
 from itertools import pairwise
 from pathlib import Path
@@ -10,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
+from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.schemas import pairs
+from ddenv.schemas import names, pairs
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 
 
@@ -40,14 +43,76 @@ def test_every_pair_finds_the_needed_models(tmp_path, pair):
     assert state.status == "finished"
 
 
-def test_workers_never_change_the_result(tmp_path):
+@pytest.mark.parametrize("algorithm", names("algorithm"))
+def test_every_algorithm_finds_the_needed_models(tmp_path, algorithm):
+    state = drive(new_run(tmp_path, algorithm=algorithm), FakePool(needs("wall", "beam"), 2))
+    # In the order of the world, whatever order the algorithm has them in.
+    assert state.environment == tuple(name for name in ELEMENTS if name in ("wall", "beam"))
+    assert state.minimal
+
+
+def test_the_settings_of_the_scenario_reach_the_algorithm(tmp_path):
+    exact = drive(new_run(tmp_path), FakePool(needs("wall", "beam"), 1))
+    fewer = drive(new_run(tmp_path, growth="steady", skip="implied"), FakePool(needs("wall", "beam"), 1))
+    assert fewer.environment == exact.environment
+    assert len(fewer.tests) < len(exact.tests)
+
+
+# What was tried first, what remembers what it saw, and what splits by what was seen.
+METHODS = [
+    {"pair": "model2model/avg-trajectory-proximal"},
+    {"pair": "learner/timestep"},
+    {"pair": "trajectoryseg/min-trajectory-proximal", "growth": "steady", "skip": "implied"},
+    {"algorithm": "splitting"},
+]
+every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()))
+
+
+def story(state):
+    """What a run's rounds came to: all that must not depend on who worked on it."""
+    return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
+
+
+@every_method
+def test_workers_never_change_the_result(tmp_path, method):
     for salt in range(5):
-        kept = {
-            drive(new_run(tmp_path), FakePool(flaky(salt, "wall", "ball"), jobs, seed)).environment
+        stories = [
+            story(drive(new_run(tmp_path, **method), FakePool(flaky(salt, "wall", "ball"), jobs, seed)))
             for jobs in (1, 2, 5)
             for seed in (1, 2)
-        }
-        assert len(kept) == 1
+        ]
+        assert all(each == stories[0] for each in stories)
+
+
+def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
+    path = new_run(tmp_path, pair="model2model/timestep")
+    state = drive(path, FakePool(needs("wall", "beam"), 1))
+    assert dict(state.tests[0].first_sensed) == {"wall": 0.25, "beam": 0.5}
+    assert dict(state.tests[0].first_touched) == {"beam": 1.5}
+    # The partition of the wall, which was sensed first, is tried first in each round.
+    with RunFile(path) as file:
+        rounds = [event.data for event in file.events() if event.kind == "round_started"]
+    wall = ELEMENTS.index("wall")
+    assert all(wall in data["partitions"][0] for data in rounds)
+
+
+def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path):
+    path = new_run(tmp_path)
+    with pytest.raises(Killed):
+        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: _kill(file, 14))
+    with sqlite3.connect(path) as db:
+        data = json.loads(db.execute("SELECT data FROM event WHERE kind = 'round_started'").fetchone()[0])
+        swapped = [data["partitions"][0][:1] + data["partitions"][1], data["partitions"][0][1:]]
+        text = json.dumps(data | {"partitions": swapped})
+        db.execute("UPDATE event SET data = ? WHERE kind = 'round_started'", (text,))
+    with pytest.raises(UserError, match="round 1 would now be another one: the run was begun with other versions"):
+        drive(path, FakePool(needs("wall", "beam"), 1))
+
+
+def test_a_schema_that_is_not_installed_is_told(tmp_path):
+    path = new_run(tmp_path, pair="model2model/by-colour")
+    with pytest.raises(UserError, match="no prioritization 'by-colour'"):
+        drive(path, FakePool(needs("wall"), 1))
 
 
 def test_one_worker_makes_no_test_for_nothing(tmp_path):
@@ -69,13 +134,14 @@ class Killed(Exception):
     pass
 
 
+@every_method
 @given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
-@settings(max_examples=20)
-def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
+@settings(max_examples=10)
+def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
         oracle = flaky(salt, "wall", "beam")
-        undisturbed = drive(new_run(Path(folder)), FakePool(oracle, jobs))
-        path, made = new_run(Path(folder)), []
+        undisturbed = drive(new_run(Path(folder), **method), FakePool(oracle, jobs))
+        path, made = new_run(Path(folder), **method), []
         for moment in moments:
             pool = FakePool(oracle, jobs, moment)
             try:
@@ -88,8 +154,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
         state = fold(RunFile(path).events())
         if state.status != "finished":
             state = drive(path, pool)
-        assert state.environment == undisturbed.environment
-        assert state.minimal == undisturbed.minimal
+        assert story(state) == story(undisturbed)
         finished = _finished(path)
         assert len(finished) == len(set(finished))
         assert not any(test.outcome == "running" for test in state.tests)

@@ -175,6 +175,11 @@ def test_lines_of_a_listing_are_in_order_and_every_step_has_one(shown):
     assert all(len(code) <= 49 for _, code in shown.lines)
 
 
+def test_the_listing_says_when_n_grows():
+    assert (15, " n_partitions ← n_partitions + 1") in listing("ddenv").lines
+    assert (15, " if none similar: n_partitions + 1") in listing("ddenv", "steady").lines
+
+
 def test_every_algorithm_of_ours_has_its_own_listing():
     assert set(LISTINGS) == set(names("algorithm"))
     assert listing("theirs") is ANY

@@ -31,7 +31,8 @@ class Explanation:
 def explain(snapshot: Snapshot) -> Explanation:
     """What happens now, and why."""
     state = snapshot.state
-    shown = listing(settings(state).algorithm)
+    options = settings(state)
+    shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)

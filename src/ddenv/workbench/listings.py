@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ddenv.runfile.state import Round
@@ -157,9 +157,15 @@ ANY = Listing(
     nothing=1,
     returned=6,
 )
+# With the scenario's `growth: steady`.
+STEADY = replace(
+    DDENV, lines=tuple((15, " if none similar: n_partitions + 1") if line[0] == 15 else line for line in DDENV.lines)
+)
 LISTINGS = {"ddenv": DDENV, "ddmin": DDMIN, "probdd": PROBDD, "splitting": SPLITTING}
 
 
-def listing(algorithm: str) -> Listing:
-    """The listing of an algorithm, or the general one."""
+def listing(algorithm: str, growth: str = "paper") -> Listing:
+    """The listing of an algorithm, or the general one; `growth` is when ddenv's n grows."""
+    if algorithm == "ddenv" and growth == "steady":
+        return STEADY
     return LISTINGS.get(algorithm, ANY)

@@ -16,6 +16,7 @@ class Settings:
     name: str = "run"
     algorithm: str = "ddenv"
     pair: str = ""
+    growth: str = "paper"
     iterations: int = 3
     baseline_runs: int = 10
     epsilon: float = 0.5
@@ -31,6 +32,7 @@ def settings(state: RunState) -> Settings:
         name=plain(scenario.get("name", standard.name)),
         algorithm=plain(reduction.get("algorithm", standard.algorithm)),
         pair=plain(reduction.get("pair", standard.pair)),
+        growth=plain(reduction.get("growth", standard.growth)),
         iterations=_number(reduction, "iterations", standard.iterations),
         baseline_runs=_number(reduction, "baseline_runs", standard.baseline_runs),
         epsilon=_number(failure, "epsilon", standard.epsilon),

@@ -1,0 +1,19 @@
+"""Results as plain data."""
+
+import json
+
+from ddenv.engine.pool import Broken
+from ddenv.engine.told import told
+from tests.engine.fake import result
+
+
+def test_what_was_noticed_is_told_to_the_millisecond():
+    found = told(result("failed", 0, 2.0), None)
+    assert found["first_sensed"] == {"beam": 0.5, "wall": 0.25, "ground_plane": 0.0}
+    assert found["first_touched"] == {"beam": 1.5, "ground_plane": 0.0}
+    json.dumps(found, allow_nan=False)
+
+
+def test_a_test_without_a_result_noticed_nothing():
+    found = told(Broken("timeout", "took too long"), None)
+    assert (found["outcome"], found["first_sensed"], found["first_touched"]) == ("timeout", {}, {})
