@@ -71,14 +71,47 @@ def one_by_one(elements, guide):
     return sweep(elements)
 
 
+def too_few(partitions, evidence):
+    return [1.0]
+
+
+def half(environment, n, evidence):
+    return [environment[::2]]
+
+
+class Needy:
+    def __init__(self, something):
+        pass
+
+
 number = 7
 '''
+DEEP = b"""\xef\xbb\xbf'A module that begins with a mark, and has a strange escape: \\d'
+class Near:
+    @staticmethod
+    def to(partitions, evidence):
+        return [0.0 for _ in partitions]
+
+
+def order(partitions, evidence):
+    'As they come.'
+    return [0.0 for _ in partitions]
+"""
 ENTRY_POINTS = """
 [ddenv.prioritizations]
 by-name = some_robotics_lab:by_name
 broken = some_robotics_lab:nothing
 no-function = some_robotics_lab:number
 gone = not_installed:any
+inside = large_lab.orders.near:Near.to [fast]
+rude = large_lab.rude:order
+deep = large_lab.orders.near:order
+a/b = some_robotics_lab:by_name
+too-few = some_robotics_lab:too_few
+
+[ddenv.partitionings]
+half = some_robotics_lab:half
+needy = some_robotics_lab:Needy
 
 [ddenv.algorithms]
 one-by-one = some_robotics_lab:one_by_one
@@ -89,6 +122,12 @@ one-by-one = some_robotics_lab:one_by_one
 def plugin(tmp_path):
     """Another package with schemas of its own, as pip would have put it there; runs code beside it."""
     (tmp_path / "some_robotics_lab.py").write_text(PLUGIN)
+    lab = tmp_path / "large_lab"
+    (lab / "orders").mkdir(parents=True)
+    (lab / "__init__.py").write_text("print('imported')\n")
+    (lab / "orders" / "__init__.py").write_text("")
+    (lab / "orders" / "near.py").write_bytes(DEEP)
+    (lab / "rude.py").write_text("import sys\nsys.exit('no licence')\n")
     info = tmp_path / "some_robotics_lab-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-robotics-lab\nVersion: 1.0\n")
@@ -120,6 +159,42 @@ def test_another_packages_schema_is_listed_explained_and_used(plugin):
     ]
 
 
+def test_explaining_imports_no_package_and_tells_nothing_else(plugin):
+    done = plugin(
+        "from ddenv import schemas\n"
+        "print([schemas.explanation('prioritization', name) for name in ('deep', 'rude', 'inside')])\n"
+        "print('a/b' in schemas.names('prioritization'))"
+    )
+    assert (done.stdout.splitlines(), done.stderr) == (["['As they come.', '', '']", "False"], "")
+
+
+def test_entry_points_may_point_into_classes(plugin):
+    done = plugin("from ddenv import schemas; print(schemas.load('prioritization', 'inside')([1], None))")
+    assert done.stdout.splitlines() == ["imported", "[0.0]"]
+
+
+@pytest.mark.parametrize(
+    ("pair", "words"),
+    [
+        ("half/sequential", "partitioning 'half': its parts are not disjoint, not empty and all of E"),
+        ("needy/sequential", "partitioning 'needy': cannot be made:"),
+        ("half/rude", "prioritization 'rude': large_lab.rude:order cannot be loaded: no licence"),
+        ("model2model/too-few", "prioritization 'too-few': expected a score for each of 2 parts"),
+    ],
+)
+def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin, pair, words):
+    split, order = pair.split("/")
+    done = plugin(
+        "import ddenv\n"
+        "facts = dict(positions={n: (i, 0, 0) for i, n in enumerate('abcdef')}, failure_pose=(0, 0, 0))\n"
+        "try:\n"
+        f"    ddenv.reduce('abcdef', lambda kept: kept >= {{'c'}}, partitioning='{split}', prioritization='{order}', **facts)\n"
+        "except ddenv.UserError as error:\n"
+        "    print(error)\n"
+    )
+    assert words in done.stdout.splitlines()[-1], done.stderr
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [("broken", "cannot be loaded"), ("no-function", "is not a function"), ("gone", "cannot be loaded: No module")],
@@ -137,6 +212,11 @@ def test_a_broken_package_is_told_in_one_line(plugin, name, words):
     assert lines[0] == "''"
     assert f"prioritization '{name}'" in lines[1]
     assert words in lines[1]
+
+
+def test_ours_come_first(plugin):
+    done = plugin("from ddenv import schemas; print(schemas.names('prioritization')[0], schemas.pairs()[0])")
+    assert done.stdout.split() == ["failure-proximal", "model2model/failure-proximal"]
 
 
 def test_ours_cannot_be_replaced_by_name(plugin):

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import ast
 import difflib
-import importlib
 import importlib.util
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Literal
 
@@ -68,6 +68,8 @@ def split_pair(pair: str) -> tuple[str, str]:
 def check(kind: Kind, name: str) -> None:
     """Raises UserError for a name that is not known, with the nearest one."""
     known = names(kind)
+    if not isinstance(name, str):
+        raise UserError(f"{kind}: expected a name, found {name!r}; use one of {', '.join(known)}")
     if name not in known:
         raise UserError(f"no {kind} '{name}'{nearest(name, known)}; use one of {', '.join(known)}")
 
@@ -75,30 +77,43 @@ def check(kind: Kind, name: str) -> None:
 def load(kind: Kind, name: str) -> Callable:
     """The function itself. Raises UserError for an unknown name, and where another package's cannot be loaded."""
     check(kind, name)
-    module, _, attribute = _known(kind)[name].partition(":")
+    entry = _known(kind)[name]
     try:
-        found = getattr(importlib.import_module(module), attribute)
-    except Exception as error:
-        raise UserError(f"{kind} '{name}': {module}:{attribute} cannot be loaded: {error}") from error
+        found = entry.load()
+    # Other packages do what they like when they are imported.
+    except (Exception, SystemExit) as error:
+        raise UserError(f"{kind} '{name}': {entry.value} cannot be loaded: {error}") from error
     if not callable(found):
-        raise UserError(f"{kind} '{name}': {module}:{attribute} is not a function")
+        raise UserError(f"{kind} '{name}': {entry.value} is not a function")
     return found
 
 
 @cache
 def explanation(kind: Kind, name: str) -> str:
     """What its author says of it: the first paragraph of the docstring, as one line; "" where there is none."""
-    module, _, attribute = _known(kind).get(name, "").partition(":")
+    entry = _known(kind).get(name)
     try:
-        origin = importlib.util.find_spec(module).origin
-        tree = ast.parse(Path(origin).read_text(encoding="utf-8"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(_source(entry.module).read_bytes())
     except Exception:
         # Another package may be half removed, or not be written in Python.
         return ""
     for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == attribute:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == entry.attr:
             return " ".join((ast.get_docstring(node) or "").split("\n\n")[0].split())
     return ""
+
+
+def _source(module: str) -> Path:
+    """The file of a module. Python itself would import the packages around it to find it."""
+    top, *rest = module.split(".")
+    spec = importlib.util.find_spec(top)
+    if not rest:
+        return Path(spec.origin)
+    places = [Path(folder, *rest) for folder in spec.submodule_search_locations]
+    files = [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]
+    return next(file for file in files if file.is_file())
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
@@ -108,6 +123,9 @@ def nearest(word: str, known: Sequence[str]) -> str:
 
 
 @cache
-def _known(kind: Kind) -> dict[str, str]:
-    others = {each.name: each.value for each in entry_points(group=f"ddenv.{kind}s")}
-    return others | _OURS[kind]
+def _known(kind: Kind) -> dict[str, EntryPoint]:
+    group = f"ddenv.{kind}s"
+    ours = {name: EntryPoint(name, value, group) for name, value in _OURS[kind].items()}
+    # A slash would make a pair of it.
+    others = {each.name: each for each in entry_points(group=group) if each.name not in ours and "/" not in each.name}
+    return ours | others

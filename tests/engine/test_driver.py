@@ -12,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
+from ddenv.engine.driver import Driver
+from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
@@ -96,17 +98,66 @@ def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
     assert all(wall in data["partitions"][0] for data in rounds)
 
 
-def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path):
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
+    """Whichever round it is that differs: nothing is written to the file that would make no sense in it."""
     path = new_run(tmp_path)
     with pytest.raises(Killed):
-        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: _kill(file, 14))
+        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: _kill(file, 50))
     with sqlite3.connect(path) as db:
-        data = json.loads(db.execute("SELECT data FROM event WHERE kind = 'round_started'").fetchone()[0])
-        swapped = [data["partitions"][0][:1] + data["partitions"][1], data["partitions"][0][1:]]
-        text = json.dumps(data | {"partitions": swapped})
-        db.execute("UPDATE event SET data = ? WHERE kind = 'round_started'", (text,))
-    with pytest.raises(UserError, match="round 1 would now be another one: the run was begun with other versions"):
-        drive(path, FakePool(needs("wall", "beam"), 1))
+        rounds = db.execute("SELECT id, data FROM event WHERE kind = 'round_started'").fetchall()
+        assert len(rounds) >= 3
+        id, text = rounds[number - 1]
+        data = json.loads(text)
+        (first, *rest), (second, *more), *others = data["partitions"]
+        text = json.dumps(data | {"partitions": [[second, *rest], [first, *more], *others]})
+        db.execute("UPDATE event SET data = ? WHERE id = ?", (text, id))
+    for _ in range(2):
+        with pytest.raises(UserError, match=f"round {number} would now be another one: the run was begun with other"):
+            drive(path, FakePool(needs("wall", "beam"), 1))
+
+
+def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, monkeypatch):
+    """A set was without f in an earlier round, and is vetoed when it comes again: what it taught stays learnt."""
+    learnt = []
+    learn = Driver._learn
+
+    def noted(self, number, round, winner):
+        learn(self, number, round, winner)
+        learnt.append((number, len(self._trials)))
+
+    monkeypatch.setattr(Driver, "_learn", noted)
+    oracle, method = needs("deck", "wall"), {"pair": "timeseg/sequential", "iterations": 0}
+    drive(path := new_run(tmp_path, **method), FakePool(oracle, 1))
+    with RunFile(path) as file:
+        known = [e.data for e in file.events() if e.kind == "candidate_judged" and e.data["known"]]
+    # Behind one that has to be tested: there is time for a veto.
+    again = next(data for data in known if data["candidate"] > 1)
+    path = new_run(tmp_path, **method)
+    learnt.clear()
+    with pytest.raises(Killed):
+        drive(path, FakePool(oracle, 1), prepare=lambda file: _veto_in(file, again["round"], again["candidate"]))
+    first = list(learnt)
+    with RunFile(path) as file:
+        assert Journal(file).refused
+    learnt.clear()
+    drive(path, FakePool(oracle, 1))
+    assert learnt[: len(first)] == first
+
+
+def _veto_in(file, round, candidate):
+    """The user vetoes a candidate as soon as its round begins; the engine is killed when the next one begins."""
+    append = file.append
+
+    def watched(kind, data, *rest):
+        if kind == "round_started" and data["round"] == round + 1:
+            raise Killed
+        event = append(kind, data, *rest)
+        if kind == "round_started" and data["round"] == round:
+            file.send("veto", round=round, candidate=candidate)
+        return event
+
+    file.append = watched
 
 
 def test_a_schema_that_is_not_installed_is_told(tmp_path):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -128,6 +129,23 @@ WRONG = {
     "candidates": ({"candidates": "all"}, "candidates: 'all' is not allowed; use one of both, partitions, complements"),
     "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
     "delta": ({"delta": 0}, "delta: expected a number above 0"),
+    "half an iteration": ({"iterations": 1.5}, "iterations: expected 0 or more, found 1.5"),
+    "iterations in words": ({"iterations": "2"}, "iterations: expected 0 or more, found '2'"),
+    "no n_partitions": ({"n_partitions": None}, "n_partitions: expected 2 or more, found None"),
+    "a seed below zero": ({"seed": -1}, "seed: expected 0 or more, found -1"),
+    "no seed": ({"seed": None}, "seed: expected 0 or more, found None"),
+    "positions in a list": ({"positions": [(0, 0, 0)] * 8}, "positions: expected names with values, found list"),
+    "a place in digits": ({"positions": POSITIONS | {"a": "123"}}, "positions['a']: expected x, y, z m, found '123'"),
+    "a place beyond all bounds": (
+        {"positions": POSITIONS | {"a": (1e200, 0, 0)}},
+        "positions['a']: expected x, y, z m",
+    ),
+    "times in a list": ({"first_sensed": ["a"]}, "first_sensed: expected names with values, found list"),
+    "a time before the beginning": ({"first_sensed": {"a": -1e6}}, "first_sensed['a']: expected a time in s"),
+    "a complex trajectory": ({"trajectory": TRAJECTORY + 1j}, "trajectory: expected finite numbers"),
+    "no algorithm": ({"algorithm": None, **ALL}, "algorithm: expected a name, found None; use one of ddenv"),
+    "a number as schema": ({"partitioning": 3}, "partitioning: expected a name, found 3"),
+    "traits of another kind": ({"traits": dict.fromkeys(ELEMENTS, 1)}, "traits['a']: expected ddenv.Traits, found 1"),
 }
 
 
@@ -140,6 +158,35 @@ def test_wrong_input_is_told_in_one_line_before_any_test(case):
     assert words in str(error.value)
     assert "\n" not in str(error.value)
     assert not made
+
+
+@pytest.mark.parametrize("elements", [None, 3, [["a"]]])
+def test_elements_that_are_no_names_are_refused(elements):
+    with pytest.raises(ddenv.UserError, match="elements: expected names"):
+        ddenv.reduce(elements, needs("a"), algorithm="ddmin")
+
+
+def test_numbers_of_numpy_are_numbers():
+    numbers = {"iterations": np.int64(1), "seed": np.int32(2), "delta": np.float32(0.3)}
+    facts = ALL | {"first_sensed": {"a": np.float32(1), "b": np.int64(2)}}
+    assert ddenv.reduce(ELEMENTS, needs("b"), prioritization="timestep", **numbers, **facts).kept == ("b",)
+
+
+@pytest.mark.parametrize("where", ["test", "on_round"])
+def test_also_the_end_of_an_iterator_comes_through(where):
+    def over(*_):
+        raise StopIteration
+
+    calls = {"test": needs("b"), "on_round": None} | {where: over}
+    with pytest.raises(StopIteration):
+        ddenv.reduce(ELEMENTS, algorithm="ddmin", **calls)
+
+
+def test_what_a_model_is_like_reaches_the_schemas():
+    """A slippery model far away: the learner finds it in fewer tests when it is told what models are like."""
+    traits = {name: ddenv.Traits(1.0, 0.01 if name == "h" else 1.0) for name in ELEMENTS}
+    found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", traits=traits, touched=["a"], **ALL)
+    assert found.kept == ("a",)
 
 
 def test_two_of_one_name_are_refused():
@@ -167,3 +214,33 @@ def test_the_guides_examples_run():
         assert done.returncode == 0, done.stderr
         shown = [line.split("# prints ", 1)[1] for line in block.splitlines() if "# prints " in line]
         assert done.stdout.splitlines() == shown
+
+
+def test_the_guides_package_works_as_printed(tmp_path):
+    """Put where pip would put it, its schema is used by name."""
+    page = (ROOT / "docs" / "library.md").read_text()
+    module = next(
+        part.split("```")[0] for part in page.split("```python\n") if part.startswith("# file heavy_first.py")
+    )
+    project = tomllib.loads(page.split("```toml\n")[1].split("```")[0])["project"]
+    (tmp_path / "heavy_first.py").write_text(module)
+    info = tmp_path / f"{project['name']}-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    groups = project["entry-points"].items()
+    points = "\n".join(
+        f"[{group}]\n" + "\n".join(f"{k} = {v}" for k, v in entries.items()) for group, entries in groups
+    )
+    (info / "entry_points.txt").write_text(points)
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "import ddenv\n"
+        "traits = {name: ddenv.Traits(size) for name, size in zip('abcd', (1, 9, 2, 3))}\n"
+        "positions = {name: (float(x), 0, 0) for x, name in enumerate('abcd')}\n"
+        "first = []\n"
+        "ddenv.reduce('abcd', lambda kept: first.append(kept) or 'b' in kept, prioritization='heavy-first',\n"
+        "             positions=positions, traits=traits, check=False, n_partitions=4)\n"
+        "print(sorted(first[0]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "['b']", done.stderr

@@ -108,5 +108,5 @@ def test_steady_growth_halves_what_a_split_leaves_together():
     pair = ("timeseg", "failure-proximal")
     steady = run(standing, {"c"}.issubset, pair, growth="steady")[1]
     assert words(steady[0][0].candidates) == ["abcd", "efgh"]
-    # As the paper has it, the round has nothing to try until each model is on its own.
-    assert run(standing, {"c"}.issubset, pair)[1][0][0].n_partitions == 8
+    # As the paper has it, a split that leaves all together becomes one of single models.
+    assert run(standing, {"c"}.issubset, pair)[1][0][0].exhaustive

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 
-from ddenv.reduction.evidence import Evidence, Traits
+from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
 from ddenv.schemas import names, pairs
 
@@ -34,8 +36,9 @@ def line(**places):
 
 
 def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="ddenv", **options):
-    """What is left, and the rounds with their winners. No candidate is tested twice."""
-    guide = make_guide(*pair, lambda: known, **options)
+    """What is left, and the rounds with their winners. The schemas see every test that was made."""
+    trials = []
+    guide = make_guide(*pair, lambda: replace(known, trials=trials), **options)
     searching = search(algorithm, known.elements, guide)
     rounds, winner = [], None
     try:
@@ -43,6 +46,7 @@ def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="
             round = searching.send(winner)
             winner = next((one for one in round.candidates if is_similar(one.models)), None)
             rounds.append((round, winner))
+            trials += [Trial(one.models, one is winner) for one in tried(round, winner)]
             assert len(rounds) < 2000, "it does not end"
     except StopIteration as end:
         return end.value, rounds

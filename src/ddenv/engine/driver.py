@@ -12,7 +12,7 @@ from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Control
 from ddenv.engine.evidence import Sight
-from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.journal import Journal, Keep, other_way
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import Guide, make_guide, search
@@ -40,6 +40,7 @@ class Driver:
         self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
         self._evidence: Evidence | None = None
         self._trials: list[Trial] = []
+        self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
         # How many candidates of the round have their verdict, and were without f.
         self._judged = 0
@@ -124,7 +125,7 @@ class Driver:
         winner = self._judge(number, round)
         while winner is not None and not self._is_accepted(number, winner):
             winner = self._judge(number, round)
-        self._learn(round, winner)
+        self._learn(number, round, winner)
         if winner is not None:
             self._take(number, round, winner)
         if not self._journal.has("round_finished", number):
@@ -139,22 +140,19 @@ class Driver:
         def distance(candidate: Candidate) -> float | None:
             return float(f"{round.scores[candidate.partition]:.3f}") if shown else None
 
+        partitions = [self._numbers(partition) for partition in round.partitions]
         self._journal.record_once(
             "round_started",
             number,
             n_partitions=round.n_partitions,
             environment=self._numbers(round.environment),
-            partitions=[self._numbers(partition) for partition in round.partitions],
+            partitions=partitions,
             candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
         )
-        current = self._journal.state.round
-        if current.number != number:
+        if self._journal.partitions[number] != partitions:
+            raise UserError(other_way(number))
+        if self._journal.state.round.number != number:
             return
-        if [set(part) for part in current.partitions] != [set(part) for part in round.partitions]:
-            raise UserError(
-                f"round {number} would now be another one: the run was begun with other versions of ddenv or scikit-learn; "
-                "go on with those, or begin a new run"
-            )
         for index, one in enumerate(round.candidates) if self._journal.refused else ():
             if verdict := self._journal.refused.get(one.models):
                 self._journal.record_once("vetoed", number, index, verdict=verdict)
@@ -192,15 +190,22 @@ class Driver:
                 return
             self._judged += 1
 
-    def _learn(self, round: Round, winner: int | None) -> None:
-        """What the round's verdicts rest on, for schemas that learn: never what only ran ahead of time."""
+    def _learn(self, number: int, round: Round, winner: int | None) -> None:
+        """What the round's verdicts rest on, each test once, for schemas that learn.
+
+        Never what only ran ahead of time, and never what was refused in this round: a resumed run must see the same.
+        """
         last = len(round.candidates) if winner is None else winner + 1
-        tests = self._journal.state.tests
-        for candidate in round.candidates[:last]:
+        journal = self._journal
+        for index, candidate in enumerate(round.candidates[:last]):
+            rejected = journal.decisions.get((number, index)) == "reject"
+            if rejected or not journal.has("candidate_judged", number, index):
+                continue
             models = candidate.models
-            if models not in self._journal.refused:
-                shown = (tests[test - 1].outcome == "similar" for test in self._tests_of(models))
-                self._trials += [Trial(models, similar) for similar in shown]
+            for test in self._tests_of(models):
+                if test not in self._learnt:
+                    self._learnt.add(test)
+                    self._trials.append(Trial(models, journal.state.tests[test - 1].outcome == "similar"))
 
     def _tests_of(self, keep: Keep) -> list[int]:
         """The tests that a candidate's verdict rests on, in the order of runs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
@@ -11,12 +12,20 @@ from ddenv.runfile.store import Event, RunFile
 Keep = frozenset[str]
 
 
+def other_way(round: int) -> str:
+    """What to tell where a resumed run would leave the way that it took before."""
+    return (
+        f"round {round} would now be another one: the run was begun with other versions of ddenv, scikit-learn or a "
+        "package of schemas; go on with those, or begin a new run"
+    )
+
+
 class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
     `ledger` holds each finished test as (models, run) -> its id; a test in it is never made again. `decisions` are the
     user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected: they stay refused
-    in later rounds, whatever is known of them.
+    in later rounds, whatever is known of them. `partitions` are those of each round, as numbers of models.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -25,6 +34,7 @@ class Journal:
         self.ledger: dict[tuple[Keep, int], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
         self.refused: dict[Keep, str] = {}
+        self.partitions: dict[int, list[list[int]]] = {}
         self._keeps: dict[int, Keep] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         for event in file.events():
@@ -48,7 +58,12 @@ class Journal:
         return None if test is None else self.state.tests[test - 1].outcome == "similar"
 
     def start_test(self, phase: str, keep: Keep, run: int, round: int | None, candidate: int | None) -> int:
-        """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise."""
+        """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise.
+
+        Raises UserError for a test of a round that is over: the file must not hold what makes no sense.
+        """
+        if round is not None and round != self.state.round.number:
+            raise UserError(other_way(round))
         test = len(self.state.tests) + 1
         self._keeps[test] = keep
         seed = self.state.scenario["reduction"]["seed"] + run
@@ -70,7 +85,9 @@ class Journal:
         data = event.data
         round, candidate = data.get("round"), data.get("candidate")
         self._seen.add((event.kind, round, candidate))
-        if event.kind == "test_started":
+        if event.kind == "round_started":
+            self.partitions[round] = data["partitions"]
+        elif event.kind == "test_started":
             self._keeps.setdefault(data["test"], self._keep_of(candidate))
         elif event.kind == "test_finished":
             test = self.state.tests[data["test"] - 1]

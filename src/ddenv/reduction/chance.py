@@ -66,9 +66,13 @@ def beliefs(prior: np.ndarray, groups: np.ndarray, miss_chance: float = 0.0) -> 
 
 
 def undominated(groups: np.ndarray) -> np.ndarray:
-    """The rows of `groups` (T, M) of bool that are not supersets of another: a larger group than that tells nothing new."""
-    groups = np.unique(groups[groups.any(axis=1)], axis=0)
-    sizes = groups.sum(axis=1)
-    inside = groups.astype(np.float32) @ groups.T.astype(np.float32) >= sizes[None, :]
+    """Which rows (K,) of `groups` (T, M) of bool are no supersets of another: a larger group than that tells nothing new.
+
+    Of equal rows the first stays; empty ones never do.
+    """
+    _, firsts = np.unique(groups, axis=0, return_index=True)
+    rows = np.sort(firsts[groups[firsts].any(axis=1)])
+    wide = groups[rows].astype(np.float32)
+    inside = wide @ wide.T >= wide.sum(axis=1)[None, :]
     np.fill_diagonal(inside, False)
-    return groups[~inside.any(axis=1)]
+    return rows[~inside.any(axis=1)]

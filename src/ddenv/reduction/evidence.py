@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from ddenv.reduction.geometry import nearest_on_path
 
 Partition = tuple[str, ...]
 Place = tuple[float, float, float]
@@ -54,6 +56,7 @@ class Evidence:
     miss_chance: float = 0.0
     delta: float = 0.5
     seed: int = 0
+    _memory: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict, repr=False, compare=False)
 
     def need(self, what: str):
         """The field `what`. Raises Lacking where it is not known."""
@@ -73,6 +76,18 @@ class Evidence:
         sizes = np.array([len(partition) for partition in partitions])
         firsts = np.cumsum(sizes) - sizes
         return np.add.reduceat(places, firsts, axis=0) / sizes[:, None]
+
+    def nearest(self, models: Partition) -> np.ndarray:
+        """How near the robot came to each of `models` on its path, m, and when, s: shape (len(models), 2). Raises Lacking.
+
+        It is worked out once for the whole world: rounds ask again and again.
+        """
+        if "nearest" not in self._memory:
+            times = self.need("trajectory")[:, 0]
+            pairs = zip(*nearest_on_path(self.places(self.elements), times, self.path()), strict=True)
+            self._memory["nearest"] = dict(zip(self.elements, pairs, strict=True))
+        known = self._memory["nearest"]
+        return np.array([known[name] for name in models]).reshape(-1, 2)
 
     def path(self) -> np.ndarray:
         """Where the robot drove, shape (N, 3), m. Raises Lacking."""

@@ -7,7 +7,6 @@ from scipy.spatial.distance import cdist
 
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.evidence import Evidence, Partition, Traits
-from ddenv.reduction.geometry import nearest_on_path
 
 # Distances are seen on a scale on which 1 cm more at the failure counts as much as a metre far away, m.
 NEAR = 0.1
@@ -26,7 +25,7 @@ def features(models: Partition, evidence: Evidence) -> np.ndarray:
     if evidence.trajectory is not None:
         places, path = evidence.places(models), evidence.path()
         rows[:, 1] = _scaled(cdist(places, path).mean(axis=1))
-        rows[:, 2] = _scaled(nearest_on_path(places, evidence.trajectory[:, 0], path)[0])
+        rows[:, 2] = _scaled(evidence.nearest(models)[:, 0])
     sensed = evidence.first_sensed or {}
     times = np.array([sensed.get(name, np.inf) for name in models])
     rows[:, 3] = np.exp(-times / SOON)

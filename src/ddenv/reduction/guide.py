@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,8 @@ _ARGUMENTS = {
     "trajectory": "a trajectory",
     "failure_position": "a failure_pose",
     "first_sensed": "first_sensed",
+    "traits": "traits",
+    "touched": "touched",
 }
 
 
@@ -67,15 +70,22 @@ def make_guide(
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
         try:
-            return split(environment, n, evidence())
+            partitions = [tuple(part) for part in split(environment, n, evidence())]
         except Lacking as lacking:
             raise _complaint("partitioning", partitioning, lacking) from None
+        models = [name for part in partitions for name in part]
+        if not all(partitions) or len(models) != len(environment) or set(models) != set(environment):
+            raise UserError(f"partitioning '{partitioning}': its parts are not disjoint, not empty and all of E")
+        return partitions
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
         try:
-            return rank(partitions, evidence())
+            scores = [float(score) for score in rank(partitions, evidence())]
         except Lacking as lacking:
             raise _complaint("prioritization", prioritization, lacking) from None
+        if len(scores) != len(partitions) or any(map(math.isnan, scores)):
+            raise UserError(f"prioritization '{prioritization}': expected a score for each of {len(partitions)} parts")
+        return scores
 
     def chances_now(environment: Partition) -> np.ndarray:
         known = evidence()
@@ -93,7 +103,10 @@ def search(algorithm: str, elements: Iterable[str], guide: Guide) -> Search:
 
 def _made(kind: schemas.Kind, name: str) -> Callable:
     found = schemas.load(kind, name)
-    return found() if isinstance(found, type) else found
+    try:
+        return found() if isinstance(found, type) else found
+    except TypeError as error:
+        raise UserError(f"{kind} '{name}': cannot be made: {error}") from error
 
 
 def _complaint(kind: str, name: str, lacking: Lacking) -> UserError:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ddenv.reduction.chance import undominated
 from ddenv.reduction.evidence import Partition, Trial
 
 Sample = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -26,12 +27,22 @@ class Lessons:
         self._taken = 0
         self._rows: dict[str, np.ndarray] = {}
         self._prior: dict[str, float] = {}
-        self._failed: dict[frozenset[str], None] = {}
+        self._columns: dict[str, int] = {}
+        # Those that are left to say something: of each (T, N) whether a model of the first environment was left out.
+        self._failed = np.zeros((0, 0), dtype=bool)
         self._new_gone = np.zeros((0, 0))
         self._new_groups: list[Partition] = []
 
+    @property
+    def begun(self) -> bool:
+        """Whether the first environment was seen."""
+        return bool(self._columns)
+
     def take(self, environment: Partition, rows: np.ndarray, prior: np.ndarray, trials: Sequence[Trial]) -> None:
         """What was tested since the last time; `rows` (M, F) and `prior` (M,) are of the environment as it is now."""
+        if not self._columns:
+            self._columns = {name: column for column, name in enumerate(environment)}
+            self._failed = np.zeros((0, len(environment)), dtype=bool)
         left = frozenset(environment)
         gone = [name for name in self._rows if name not in left]
         self._new_gone = np.array([self._rows.pop(name) for name in gone]).reshape(len(gone), rows.shape[1])
@@ -47,14 +58,20 @@ class Lessons:
         fresh, self._taken = trials[self._taken :], len(trials)
         similar = {trial.models for trial in fresh if trial.similar}
         failed = dict.fromkeys(trial.models for trial in fresh if trial.models not in similar)
-        self._failed |= failed
+        rows = [[name not in models for name in self._columns] for models in failed]
+        self._failed = np.vstack([self._failed, np.array(rows, dtype=bool).reshape(-1, len(self._columns))])
         groups = (tuple(name for name in environment if name not in models) for models in failed)
         return [group for group in groups if group]
 
     def groups(self, environment: Partition) -> np.ndarray:
-        """Of each row (T, M) at least one model is needed: those that a candidate without f had left out."""
-        rows = [[name not in models for name in environment] for models in self._failed]
-        return np.array(rows, dtype=bool).reshape(-1, len(environment))
+        """Of each row (T, M) at least one model is needed: those that a candidate without f had left out.
+
+        A group that holds all of another says nothing more, and never will.
+        """
+        groups = self._failed[:, [self._columns[name] for name in environment]]
+        telling = undominated(groups)
+        self._failed = self._failed[telling]
+        return groups[telling]
 
     def fresh(self, chances: Callable[[np.ndarray], np.ndarray]) -> Iterator[Sample]:
         """New lessons for a classifier as samples, labels and weights: removed models, then each candidate without f.

@@ -16,14 +16,16 @@ class OnlineClassifier:
 
     def __init__(self) -> None:
         self._model: SGDClassifier | None = None
-        self._mean = self._scale = np.zeros(0)
+        self._mean = self._spread = np.zeros(0)
+
+    def see(self, samples: np.ndarray) -> None:
+        """All there will be, shape (N, F), before anything is learnt: what is usual of each feature."""
+        spread = samples.std(axis=0)
+        self._mean, self._spread = samples.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
 
     def learn(self, samples: np.ndarray, labels: np.ndarray, weights: np.ndarray, seed: int) -> None:
         """One step: `samples` (N, F) with `labels` (N,) of 0 and 1 that count `weights` (N,)."""
         if self._model is None:
-            self._mean = samples.mean(axis=0)
-            spread = samples.std(axis=0)
-            self._scale = np.where(spread > 1e-9, spread, 1.0)
             self._model = SGDClassifier(loss="log_loss", alpha=REGULARIZATION, average=True, random_state=seed)
         with warnings.catch_warnings():
             # Early on there may be one label only.
@@ -37,4 +39,4 @@ class OnlineClassifier:
         return self._model.predict_proba(self._scaled(samples))[:, 1]
 
     def _scaled(self, samples: np.ndarray) -> np.ndarray:
-        return (samples - self._mean) / self._scale
+        return (samples - self._mean) / self._spread

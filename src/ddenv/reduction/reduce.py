@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.reduction.evidence import Evidence, Place, Trial
-from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.arguments import (
+    checked_choice,
+    checked_count,
+    checked_failure,
+    checked_names,
+    checked_number,
+    checked_positions,
+    checked_times,
+    checked_traits,
+    checked_trajectory,
+)
+from ddenv.reduction.evidence import Evidence, Place, Traits, Trial
+from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Candidate, Round
 
 Test = Callable[[frozenset[str]], bool]
@@ -48,6 +58,8 @@ def reduce(
     trajectory: np.ndarray | None = None,
     failure_pose: Iterable[float] | None = None,
     first_sensed: Mapping[str, float] | None = None,
+    touched: Iterable[str] | None = None,
+    traits: Mapping[str, Traits] | None = None,
     iterations: int = 0,
     n_partitions: int = 2,
     candidates: str = "both",
@@ -69,23 +81,32 @@ def reduce(
 
     `positions` maps each name to x, y, z m. `trajectory` is an array (N, 5) of time s, x, y, z m, yaw rad of the run that failed.
     `failure_pose` is where it failed, x, y, z m first; if it is not given, the trajectory's end. `first_sensed` maps a name to the
-    time (s) when the robot first sensed it; names that are missing were never sensed. What a schema does not look at need not be
-    given. `n_partitions`, `candidates`, `complement_order`, `prior` and `delta` (rad/s) are as in a scenario's `reduction`.
+    time (s) when the robot first sensed it; names that are missing were never sensed. `touched` are the names that it touched,
+    `traits` maps each name to its `ddenv.Traits`. What a schema does not look at need not be given. `n_partitions`, `candidates`,
+    `complement_order`, `growth`, `skip`, `prior` and `delta` (rad/s) are as in a scenario's `reduction`.
 
     With `check`, all elements are tested first: without the failure there is nothing to reduce. `on_round` is told of each round
     before it is tested. Raises UserError, in one line, for what makes no sense, and lets through what `test` raises.
     """
-    names = tuple(elements)
-    known = _evidence(names, positions, trajectory, failure_pose, first_sensed, delta, seed)
-    if iterations < 0:
-        raise UserError(f"iterations: expected 0 or more, found {iterations}")
-    if n_partitions < 2:
-        raise UserError(f"n_partitions: expected 2 or more, found {n_partitions}")
-    _check_choice("candidates", candidates, CANDIDATES)
-    _check_choice("complement_order", complement_order, COMPLEMENT_ORDERS)
-    _check_choice("growth", growth, ("paper", "steady"))
-    _check_choice("skip", skip, ("known", "implied"))
-    _check_choice("prior", prior, ("spatial", "uniform"))
+    names = checked_names(elements)
+    known = Evidence(
+        names,
+        checked_positions(names, positions),
+        path := checked_trajectory(trajectory),
+        checked_failure(failure_pose, path),
+        checked_times(first_sensed),
+        None if touched is None else frozenset(touched),
+        checked_traits(names, traits),
+        delta=checked_number("delta", delta),
+        seed=checked_count("seed", seed, 0),
+    )
+    checked_count("iterations", iterations, 0)
+    checked_count("n_partitions", n_partitions, 2)
+    checked_choice("candidates", candidates, CANDIDATES)
+    checked_choice("complement_order", complement_order, COMPLEMENT_ORDERS)
+    checked_choice("growth", growth, ("paper", "steady"))
+    checked_choice("skip", skip, ("known", "implied"))
+    checked_choice("prior", prior, ("spatial", "uniform"))
     bench = _Bench(test, iterations)
     guide = make_guide(
         partitioning,
@@ -100,23 +121,29 @@ def reduce(
     )
     running = search(algorithm, names, guide)
     history, rounds = [Step(0, names)], 0
-    try:
-        # Planned before the first test: what is lacking is told before anything is run.
-        round = next(running)
-        if check and not bench.is_similar(frozenset(names)):
-            raise UserError("the failure does not show with all elements: there is nothing to reduce")
-        while True:
-            rounds += 1
-            if on_round is not None:
-                on_round(round)
-            winner = bench.first_similar(round)
-            if winner is not None:
-                kept = winner.models
-                history.append(Step(len(bench.trials), tuple(name for name in names if name in kept)))
-            round = running.send(winner)
-    except StopIteration as end:
-        kept = tuple(name for name in names if name in end.value)
+    # Planned before the first test: what is lacking is told before anything is run.
+    round, left = _next(running, None)
+    if check and not bench.is_similar(frozenset(names)):
+        raise UserError("the failure does not show with all elements: there is nothing to reduce")
+    while round is not None:
+        rounds += 1
+        if on_round is not None:
+            on_round(round)
+        winner = bench.first_similar(round)
+        if winner is not None:
+            kept = winner.models
+            history.append(Step(len(bench.trials), tuple(name for name in names if name in kept)))
+        round, left = _next(running, winner)
+    kept = tuple(name for name in names if name in left)
     return Reduction(kept, len(bench.trials), rounds, tuple(history))
+
+
+def _next(running: Search, winner: Candidate | None) -> tuple[Round | None, frozenset[str]]:
+    """The next round, or None and what is left."""
+    try:
+        return running.send(winner), frozenset()
+    except StopIteration as end:
+        return None, end.value
 
 
 class _Bench:
@@ -129,71 +156,24 @@ class _Bench:
         self.trials: list[Trial] = []
 
     def first_similar(self, round: Round) -> Candidate | None:
-        return next((one for one in round.candidates if self.is_similar(one.models)), None)
+        for one in round.candidates:
+            if self.is_similar(one.models):
+                return one
+        return None
 
     def is_similar(self, models: frozenset[str]) -> bool:
         if models not in self._known:
-            self._known[models] = any(self._run(models) for _ in range(1 + self._iterations))
+            self._known[models] = self._deflaked(models)
         return self._known[models]
+
+    def _deflaked(self, models: frozenset[str]) -> bool:
+        # No generator: it would turn what the test raises into something else.
+        for _ in range(1 + self._iterations):  # noqa: SIM110
+            if self._run(models):
+                return True
+        return False
 
     def _run(self, models: frozenset[str]) -> bool:
         similar = bool(self._test(models))
         self.trials.append(Trial(models, similar))
         return similar
-
-
-def _evidence(
-    names: tuple[str, ...],
-    positions: Mapping[str, Place] | None,
-    trajectory: np.ndarray | None,
-    failure_pose: Iterable[float] | None,
-    first_sensed: Mapping[str, float] | None,
-    delta: float,
-    seed: int,
-) -> Evidence:
-    """What is known, checked. Raises UserError."""
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise UserError(f"elements: {twice!r} is there twice; give each a name of its own")
-    places = (
-        None if positions is None else {name: _place(f"positions[{name!r}]", positions.get(name)) for name in names}
-    )
-    path = None if trajectory is None else _path(trajectory)
-    end = None if path is None else tuple(path[-1, 1:4].tolist())
-    if failure_pose is not None:
-        end = _place("failure_pose", failure_pose)
-    if not (isinstance(delta, int | float) and delta > 0 and math.isfinite(delta)):
-        raise UserError(f"delta: expected a number above 0, found {delta!r}")
-    for name, at in (first_sensed or {}).items():
-        if not isinstance(at, int | float) or math.isnan(at):
-            raise UserError(f"first_sensed[{name!r}]: expected a time in s, found {at!r}")
-    return Evidence(names, places, path, end, first_sensed, delta=float(delta), seed=seed)
-
-
-def _path(trajectory: np.ndarray) -> np.ndarray:
-    try:
-        path = np.asarray(trajectory, dtype=float)
-    except (TypeError, ValueError):
-        raise UserError("trajectory: expected finite numbers of shape (N, 5)") from None
-    if path.ndim != 2 or path.shape[1] != 5 or not len(path) or not np.isfinite(path).all():
-        raise UserError(f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}")
-    if (np.diff(path[:, 0]) < 0).any():
-        raise UserError("trajectory: its times, in the first column, must not decrease")
-    return path
-
-
-def _place(what: str, values: Iterable[float] | None) -> Place:
-    if values is None:
-        raise UserError(f"{what}: is missing")
-    try:
-        numbers = [float(value) for value in values][:3]
-    except (TypeError, ValueError):
-        numbers = []
-    if len(numbers) < 3 or not all(map(math.isfinite, numbers)):
-        raise UserError(f"{what}: expected x, y, z m, found {values!r}")
-    return numbers[0], numbers[1], numbers[2]
-
-
-def _check_choice(key: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise UserError(f"{key}: {value!r} is not allowed; use one of {', '.join(allowed)}")

@@ -28,7 +28,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
         round = make_round(n, environment, ranked, guide.candidates, guide.complement_order)
         if guide.skip == "implied":
             round = _without_implied(round, missed)
-        # A split that left all models together gives nothing to try.
+        # Everything may be implied.
         winner = (yield round) if round.candidates else None
         missed = _missed(round, winner, missed)
         if winner is not None:
@@ -45,7 +45,10 @@ def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
     if n == len(environment):
         return one_model_partitions(environment)
     partitions = guide.split(environment, n)
-    return partitions if guide.growth == "paper" else _halved(partitions, n, guide)
+    if guide.growth == "steady":
+        return _halved(partitions, n, guide)
+    # A split that leaves all models together is no split (paper, section III-B).
+    return partitions if len(partitions) > 1 else one_model_partitions(environment)
 
 
 def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition]:

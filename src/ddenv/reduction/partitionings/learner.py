@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ddenv.reduction.chance import LEAST, MOST, beliefs, spatial_prior, undominated
+from ddenv.reduction.chance import LEAST, MOST, beliefs, spatial_prior
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.features import features
 from ddenv.reduction.lessons import Lessons
@@ -16,8 +16,8 @@ TRUST = 10.0
 # The chance that none of a group is needed is one half where its models' weights, -ln(1 - chance), add up to this.
 EVEN = float(np.log(2.0))
 # How far the chances may be moved as a whole, in log odds, and how far they may be drawn together (as in Platt's scaling).
-SHIFTS = np.linspace(-3.0, 3.0, 25)
-SLOPES = np.array([0.25, 0.5, 0.75, 1.0, 1.25])
+SHIFTS = np.linspace(-3.0, 3.0, 13)
+SLOPES = np.array([0.5, 0.75, 1.0, 1.25])
 
 
 class Learner:
@@ -45,6 +45,8 @@ class Learner:
     def chances(self, environment: Partition, evidence: Evidence) -> np.ndarray:
         """How likely each model is needed, shape (len(environment),). Learns from what was tested since the last time."""
         rows = features(environment, evidence)
+        if not self._lessons.begun:
+            self._classifier.see(rows)
         prior = spatial_prior(environment, evidence)
         self._lessons.take(environment, rows, prior, evidence.trials)
         if not self._lessons.count:
@@ -54,7 +56,6 @@ class Learner:
         logits = _logit(prior) + self._learnt(rows)
         gone = _logit(self._lessons.gone_prior) + self._learnt(self._lessons.gone_rows)
         groups = self._lessons.groups(environment)
-        groups = undominated(groups) if len(groups) else groups
         slope, shift = _scaling(logits, gone, groups)
         chances = _sigmoid(slope * logits + shift)
         return beliefs(chances, groups, evidence.miss_chance)
@@ -81,16 +82,14 @@ def _scaling(logits: np.ndarray, gone: np.ndarray, groups: np.ndarray) -> tuple[
 
     `gone` (G,) are the log odds of models that turned out not to be needed, `groups` (T, M) those of which one is.
     """
-    best, found = -np.inf, (1.0, 0.0)
-    for slope in SLOPES:
-        for shift in SHIFTS:
-            spared = -np.logaddexp(0.0, slope * logits + shift)
-            none_needed = np.exp(groups @ spared)
-            score = np.log(np.clip(1.0 - none_needed, LEAST, 1.0)).sum() - np.logaddexp(0.0, slope * gone + shift).sum()
-            score -= 0.5 * shift**2 + 2.0 * np.log(slope) ** 2
-            if score > best:
-                best, found = score, (float(slope), float(shift))
-    return found
+    slopes, shifts = (grid.ravel() for grid in np.meshgrid(SLOPES, SHIFTS, indexing="ij"))
+    spared = -np.logaddexp(0.0, np.outer(logits, slopes) + shifts)
+    some_needed = -np.expm1(groups.astype(float) @ spared)
+    scores = np.log(np.clip(some_needed, LEAST, 1.0)).sum(axis=0)
+    scores -= np.logaddexp(0.0, np.outer(gone, slopes) + shifts).sum(axis=0)
+    scores -= 0.5 * shifts**2 + 2.0 * np.log(slopes) ** 2
+    best = int(np.argmax(scores))
+    return float(slopes[best]), float(shifts[best])
 
 
 def _logit(chances: np.ndarray) -> np.ndarray:

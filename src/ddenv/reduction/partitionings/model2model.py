@@ -12,8 +12,9 @@ from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.partitionings.grouped import grouped
 from ddenv.reduction.round import one_model_partitions
 
-# Above so many clusters k-means begins once instead of four times, and above these at random models: a second instead of 0.1 s.
-MANY, MOST = 100, 500
+# Above so many clusters or models k-means begins once instead of four times, and above so many clusters at random models: it
+# would take a second instead of a tenth.
+MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
 
 
 def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
@@ -23,10 +24,10 @@ def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -
 
     Paper, Algorithm 2.
     """
-    many, most = n_partitions > MANY, n_partitions > MOST
+    many = n_partitions > MANY_CLUSTERS or len(environment) > MANY_MODELS
     clusters = KMeans(
         n_clusters=n_partitions,
-        init="random" if most else "k-means++",
+        init="random" if n_partitions > MOST_CLUSTERS else "k-means++",
         n_init=1 if many else 4,
         random_state=evidence.seed,
     )

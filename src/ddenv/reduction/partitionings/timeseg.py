@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ddenv.reduction.evidence import Evidence, Partition
-from ddenv.reduction.geometry import nearest_on_path
 from ddenv.reduction.partitionings.grouped import grouped
 
 
@@ -20,6 +19,4 @@ def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> li
 
 def by_span(environment: Partition, cuts: np.ndarray, evidence: Evidence) -> list[Partition]:
     """The models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
-    times = evidence.need("trajectory")[:, 0]
-    _, moments = nearest_on_path(evidence.places(environment), times, evidence.path())
-    return grouped(environment, np.searchsorted(cuts, moments, side="left"))
+    return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
