@@ -110,3 +110,13 @@ def test_steady_growth_halves_what_a_split_leaves_together():
     assert words(steady[0][0].candidates) == ["abcd", "efgh"]
     # As the paper has it, a split that leaves all together becomes one of single models.
     assert run(standing, {"c"}.issubset, pair)[1][0][0].exhaustive
+
+
+def test_what_was_missed_by_chance_implies_nothing_once_it_is_gone():
+    """Without e and f the failure is missed once, but shows when more is gone: then the two say nothing any more."""
+    known = line(a=0, b=1, c=2, d=3, e=8, f=9, g=20, h=21)
+    odd = frozenset("abcdgh")
+    kept, rounds = run(known, lambda models: models >= {"a"} and models != odd, growth="steady", skip="implied")
+    assert kept == {"a"}
+    # It goes on in steps of several models, and not one by one.
+    assert len(rounds) < 7

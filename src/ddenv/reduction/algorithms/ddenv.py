@@ -69,14 +69,15 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
 def _missed(round: Round, winner: Candidate | None, missed: list[frozenset[str]]) -> list[frozenset[str]]:
     """Groups of models of which at least one is needed, if f shows in every environment that holds all it needs.
 
-    They are what candidates without f had left out, as far as it is still there.
+    They are what candidates without f had left out, as far as it is still there. Where nothing of it is, f did not need it after
+    all: it showed by chance, or does not show in every such environment.
     """
     failed = takewhile(lambda one: one is not winner, round.candidates)
     found = [*missed, *(one.lacks for one in failed)]
-    if winner is None:
-        return list(dict.fromkeys(found))
-    left = winner.models
-    return list(dict.fromkeys(group & left for group in found))
+    if winner is not None:
+        left = winner.models
+        found = [group & left for group in found]
+    return [group for group in dict.fromkeys(found) if group]
 
 
 def _without_implied(round: Round, missed: list[frozenset[str]]) -> Round:
