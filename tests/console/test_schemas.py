@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-from types import SimpleNamespace
+from importlib.metadata import EntryPoint
 
 import pytest
 
@@ -46,8 +46,8 @@ def test_the_object_names_all_by_kind():
 def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_path, monkeypatch):
     (tmp_path / "theirs.py").write_text('def halves(e, n, x):\n    """Two \\x1b[31mhalves."""\n')
     monkeypatch.syspath_prepend(tmp_path)
-    entry = SimpleNamespace(name="halves", value="theirs:halves")
-    gone = SimpleNamespace(name="gone", value="nowhere.at_all:gone")
+    entry = EntryPoint("halves", "theirs:halves", "ddenv.partitionings")
+    gone = EntryPoint("gone", "nowhere.at_all:gone", "ddenv.partitionings")
     monkeypatch.setattr(schemas, "entry_points", lambda group: [entry, gone] if group == "ddenv.partitionings" else [])
     schemas._known.cache_clear()
     schemas.explanation.cache_clear()
