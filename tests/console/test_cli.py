@@ -131,8 +131,9 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
     """kill -9 of the engine at different moments: the same end, and no finished test is made twice."""
     _, undisturbed = reduced
     run = home / "killed.ddenv"
-    start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2"]
-    for engines, moment in enumerate((3, 6, 9), start=1):
+    # Re-runs enough that there is still something to do when the last engine is killed, also on a busy machine.
+    start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2", "--iterations", "9"]
+    for engines, moment in enumerate((3, 9, 15), start=1):
         process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         # The one before may have made more tests than this one waits for.
         _wait(lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least)
