@@ -115,27 +115,17 @@ PROBDD = Listing(
     returned=8,
     sweep=7,
 )
-SPLITTING = Listing(
-    (
-        FIX_F,
-        (1, "while a model of E, far to near, is undecided"),
-        (2, " group ← farthest undecided, or half the suspects"),
-        (3, " result ← R(E without group, f, timeout)"),
-        (4, " if not similar: deflake(E without group, ...)"),
-        (5, " if similar: E ← E without group"),
-        (6, " else: suspects ← group; a single one is needed"),
-        (7, "for m in E: if similar without m, remove m"),
-        (8, "return E'"),
+# It differs only in which group it leaves out, and in what it makes of a vain test.
+SPLITTING = replace(
+    PROBDD,
+    lines=tuple(
+        {
+            1: (1, "while a model of E, far to near, is undecided"),
+            2: (2, " group ← farthest undecided, or half the suspects"),
+            6: (6, " else: suspects ← group; a single one is needed"),
+        }.get(number, (number, code))
+        for number, code in PROBDD.lines
     ),
-    split=2,
-    next=3,
-    test=3,
-    rerun=4,
-    waiting=5,
-    reduced=5,
-    nothing=6,
-    returned=8,
-    sweep=7,
 )
 # What every algorithm comes to, for those of other packages.
 ANY = Listing(
