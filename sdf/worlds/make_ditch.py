@@ -2,17 +2,19 @@
 
     python sdf/worlds/make_ditch.py
 
-The gap lies across the y axis at x = 0. A Husky that comes along the x axis crosses it on clean asphalt; `rough_tile_20`, at
-the edge in its way, makes it stick there.
+The gap lies across the y axis at x = 0, in the way of a robot that comes along the x axis: a little too wide for its wheels.
 """
 
 from __future__ import annotations
 
 import math
 import random
+from collections.abc import Iterator
 from pathlib import Path
 
-GAP = 0.365  # m
+import pieces
+
+GAP = 0.39  # m
 TOP = 2.0  # m above the ground
 PLATFORM = (8.0, 9.0)  # m along and across the way
 TILE = (1.27, 0.6)  # m
@@ -24,11 +26,7 @@ HIGH_BLOCK_HEIGHTS = (0.05, 0.06, 0.07)  # m
 SETBACK = 0.1  # m between the edge tile and the gap
 
 MU = 1.2  # rubber on dry asphalt and wood
-
-ASPHALT = "0.22 0.22 0.24 1"
-PLYWOOD = "0.62 0.47 0.29 1"
-PINE = "0.80 0.66 0.43 1"
-CONCRETE = "0.58 0.58 0.56 1"
+SOIL = "0.45 0.47 0.42 1"
 
 # Places of tiles on one side: distance from the gap's edge to the tile's centre, offset to the left, heading in degrees.
 NEAR = [
@@ -49,38 +47,17 @@ FAR = [
 ]  # fmt: skip
 
 
-def numbers(values) -> str:
-    return " ".join(f"{value:.6g}" for value in values)
-
-
-def box(name: str, position, size, color: str) -> str:
-    """A collision and a visual of the same box."""
-    friction = f"<surface><friction><ode><mu>{MU}</mu><mu2>{MU}</mu2></ode></friction></surface>"
-    shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry><box><size>{numbers(size)}</size></box></geometry>"
-    material = f"<material><ambient>{color}</ambient><diffuse>{color}</diffuse></material>"
-    return (
-        f'        <collision name="{name}">{shape}{friction}</collision>\n'
-        f'        <visual name="{name}">{shape}{material}</visual>\n'
-    )
-
-
-def model(name: str, x: float, y: float, z: float, yaw: float, boxes: str) -> str:
-    return (
-        f'    <model name="{name}">\n      <static>true</static>\n      <pose>{numbers((x, y, z, 0, 0, yaw))}</pose>\n'
-        f'      <link name="link">\n{boxes}      </link>\n    </model>\n'
-    )
-
-
 def tile(rng: random.Random, heights: tuple[float, ...]) -> str:
     """A plate with rows of blocks, no two neighbours of a row of the same height; its frame lies on its underside."""
-    boxes = box("plate", (0, 0, PLATE / 2), (*TILE, PLATE), PLYWOOD)
+    boxes = pieces.box("plate", (0, 0, PLATE / 2), (*TILE, PLATE), MU, pieces.PLYWOOD)
     for row in range(ROWS):
         shift = rng.randrange(len(heights))
         for column in range(COLUMNS):
             height = heights[(column + shift) % len(heights)]
             x = (column - (COLUMNS - 1) / 2) * TILE[0] / COLUMNS
             y = (row - (ROWS - 1) / 2) * TILE[1] / ROWS
-            boxes += box(f"block_{row + 1}_{column + 1}", (x, y, PLATE + height / 2), (BLOCK, BLOCK, height), PINE)
+            place, size = (x, y, PLATE + height / 2), (BLOCK, BLOCK, height)
+            boxes += pieces.box(f"block_{row + 1}_{column + 1}", place, size, MU, pieces.PINE)
     return boxes
 
 
@@ -88,54 +65,36 @@ def cinder_block() -> str:
     """A hollow block, 0.39 x 0.19 x 0.19 m, standing on its frame."""
     boxes = ""
     for name, y in (("left", 0.0793), ("right", -0.0793)):
-        boxes += box(name, (0, y, 0.095), (0.39, 0.0314, 0.19), CONCRETE)
+        boxes += pieces.box(name, (0, y, 0.095), (0.39, 0.0314, 0.19), MU, pieces.CONCRETE)
     for name, x in (("front", 0.1793), ("middle", 0.0), ("back", -0.1793)):
-        boxes += box(name, (x, 0, 0.095), (0.0314, 0.1272, 0.19), CONCRETE)
+        boxes += pieces.box(name, (x, 0, 0.095), (0.0314, 0.1272, 0.19), MU, pieces.CONCRETE)
     return boxes
 
 
 def platform(side: int) -> str:
     name = "asphalt_near" if side < 0 else "asphalt_far"
     x = side * (GAP + PLATFORM[0]) / 2
-    return model(name, x, 0, TOP / 2, 0, box("asphalt", (0, 0, 0), (*PLATFORM, TOP), ASPHALT))
+    parts = pieces.box("asphalt", (0, 0, 0), (*PLATFORM, TOP), MU, pieces.ASPHALT)
+    return pieces.model(name, (x, 0, TOP / 2, 0, 0, 0), parts)
 
 
-HEAD = """<?xml version="1.0"?>
-<sdf version="1.9">
-  <world name="ditch">
-    <gravity>0 0 -9.81</gravity>
-    <light name="sun" type="directional">
-      <cast_shadows>true</cast_shadows>
-      <pose>0 0 10 0 0 0</pose>
-      <diffuse>0.8 0.8 0.8 1</diffuse>
-      <specular>0.2 0.2 0.2 1</specular>
-      <direction>-0.5 0.3 -1</direction>
-    </light>
-    <model name="ground_plane">
-      <static>true</static>
-      <link name="link">
-        <collision name="ground"><geometry><plane><normal>0 0 1</normal><size>60 60</size></plane></geometry></collision>
-        <visual name="ground">
-          <geometry><plane><normal>0 0 1</normal><size>60 60</size></plane></geometry>
-          <material><ambient>0.45 0.47 0.42 1</ambient><diffuse>0.45 0.47 0.42 1</diffuse></material>
-        </visual>
-      </link>
-    </model>
-"""
-
-
-def ditch() -> str:
+def models() -> Iterator[str]:
+    yield pieces.ground(SOIL)
+    yield platform(-1)
+    yield platform(1)
     places = [(-1, *place) for place in NEAR] + [(1, *place) for place in FAR]
     # The numbers follow the places from one end of the world to the other, as a person who lays tiles would count.
     places.sort(key=lambda place: (place[0] * place[1], place[2]))
-    text = HEAD + platform(-1) + platform(1)
     for number, (side, distance, y, degrees) in enumerate(places, start=1):
         x = side * (GAP / 2 + distance)
         heights = HIGH_BLOCK_HEIGHTS if side < 0 and distance < 0.45 else BLOCK_HEIGHTS
-        yaw = math.radians(degrees)
-        text += model(f"rough_tile_{number:02d}", x, y, TOP, yaw, tile(random.Random(number), heights))
-    text += model("cinder_block", GAP / 2 + 3.4, -0.9, TOP, 0.4, cinder_block())
-    return text + "  </world>\n</sdf>\n"
+        parts = tile(random.Random(number), heights)
+        yield pieces.model(f"rough_tile_{number:02d}", (x, y, TOP, 0, 0, math.radians(degrees)), parts)
+    yield pieces.model("cinder_block", (GAP / 2 + 3.4, -0.9, TOP, 0, 0, 0.4), cinder_block())
+
+
+def ditch() -> str:
+    return pieces.world("ditch", models())
 
 
 if __name__ == "__main__":

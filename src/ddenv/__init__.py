@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
@@ -9,15 +10,20 @@ from ddenv.errors import UserError
 if TYPE_CHECKING:
     from ddenv.reduction.evidence import Traits
     from ddenv.reduction.reduce import Reduction, reduce
+    from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 
 __version__ = "0.1.0"
-__all__ = ["Reduction", "Traits", "UserError", "reduce"]
+__all__ = ["Reading", "Reduction", "Setup", "Traits", "Twist", "UserError", "WheelSpeeds", "reduce"]
+
+_HOMES = {
+    "ddenv.reduction.reduce": ("Reduction", "Traits", "reduce"),
+    "ddenv.robot.protocol": ("Reading", "Setup", "Twist", "WheelSpeeds"),
+}
 
 
 def __getattr__(name: str) -> Any:
     # The command line and the screens begin fast because nothing numerical is imported for them.
-    if name in ("Reduction", "Traits", "reduce"):
-        from ddenv.reduction import reduce as module
-
-        return getattr(module, name)
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(home), name)
     raise AttributeError(f"module 'ddenv' has no attribute '{name}'")

@@ -75,6 +75,16 @@ def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
     assert _outcomes(ddenv("test", tmp_path / "m.yaml", "--json")) == ["failed"]
 
 
+def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
+    # Long enough that a robot at the wall can be ended early.
+    done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["kept"], summary["minimal"], summary["failure"]) == (reduced[1]["kept"], True, "stuck")
+    assert summary["ended_early"] > 0
+    assert "confirming what is left with full runs" in done.stderr
+
+
 def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(reduced):
     folder, _ = reduced
     (folder / "runs" / "broken.ddenv").write_text("no run file")
@@ -96,7 +106,7 @@ def test_an_sdf_world_runs_with_a_spawn_and_a_goal(home):
     done = ddenv("test", DATA / "wall.sdf", "--spawn", "0,0,0.45,0", "--goal", "4,0", "--timeout", 5)
     assert done.returncode == 0, done.stderr
     assert "failed" in done.stdout
-    assert "timeout" in done.stdout
+    assert "stuck" in done.stdout
 
 
 def test_a_world_in_which_the_robot_does_not_fail_ends_with_1(home):
@@ -254,11 +264,13 @@ def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
         "prior": "uniform",
     }
     words = [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", str(value))]
+    words += ["--early-stop", "--epsilon", "0.2"]
     assert app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False) == 0
     assert app(["run", WALL, "--output", str(home / "plain.ddenv")], standalone_mode=False) == 0
     with RunFile(home / "asked.ddenv") as asked, RunFile(home / "plain.ddenv") as plain:
-        own, found = read_parts(plain)[0].reduction, read_parts(asked)[0].reduction
-    assert found == own.model_copy(update=options)
+        own, found = read_parts(plain)[0], read_parts(asked)[0]
+    assert found.reduction == own.reduction.model_copy(update=options)
+    assert found.failure == own.failure.model_copy(update={"early_stop": True, "epsilon": 0.2})
 
 
 def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):

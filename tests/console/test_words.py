@@ -1,14 +1,14 @@
 """The lines that are printed while a run is followed."""
 
-from ddenv.console.words import headline, news
+from ddenv.console.words import baseline, headline, news
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event
 
 
-def states(*happened: tuple[str, dict]) -> list[RunState]:
+def states(*happened: tuple[str, dict], scenario: dict | None = None) -> list[RunState]:
     """The states of a run of four boxes after its round of two partitions started, and after each of these events."""
-    elements = {"scenario": {}, "elements": ["a", "b", "c", "d"]}
+    elements = {"scenario": scenario or {}, "elements": ["a", "b", "c", "d"]}
     candidates = [[kind, part, None] for part in (0, 1) for kind in ("partition", "complement")]
     parts = {"environment": [0, 1, 2, 3], "partitions": [[0], [1, 2]], "candidates": candidates}
     found, state = [], RunState()
@@ -29,8 +29,48 @@ def test_of_many_candidates_the_judged_one_is_told():
     assert news("candidate_judged", before, after) == "  without A (3 models): similar after 1 test"
 
 
+def ended(test: int, outcome: str, failure: str = "", **more) -> tuple[str, dict]:
+    end = {"distance": None, "end_pose": None, "simulated_seconds": 1, "wall_seconds": 1}
+    return "test_finished", {"test": test, "outcome": outcome, "failure": failure, **end, **more}
+
+
+def test_how_the_robot_failed_is_told_with_a_verdict():
+    ways = [
+        ("pass", ""),
+        ("other", "tipped over"),
+        ("other", "lost"),
+        ("other", "tipped over"),
+        ("error", "not-finite"),
+    ]
+    happened = [event for test, way in enumerate(ways, 1) for event in (started(test), ended(test, *way))]
+    judged = {"candidate": 1, "verdict": "dissimilar", "tests": [1, 2, 3, 4, 5], "known": 0}
+    *_, before, after = states(*happened, ("candidate_judged", judged))
+    words = "  without A (3 models): dissimilar after 5 tests (1 pass, 2 tipped over, 1 lost, 1 error)"
+    assert news("candidate_judged", before, after) == words
+
+
+def test_the_baseline_says_how_the_robot_failed_in_f():
+    runs = {1: ("similar", "stuck"), 2: ("other", "fell"), 3: ("pass", "")}
+    happened = [event for test, way in runs.items() for event in (base(test), ended(test, *way))]
+    found = {"runs": 3, "failures": 1, "rate": 1 / 3, "low": 0.1, "high": 0.7, "failure_test": 1, "miss_chance": 0.2}
+    more = {"position": [1, 2, 0.5], "iterations_95": 7, "outcomes": {}, "distances": {}}
+    state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
+    assert baseline(state) == (
+        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 1 run failed in another way; "
+        "f: stuck at (1.00, 2.00, 0.50) m; 4 runs of a candidate miss it with chance 0.2; 95 % needs --iterations 7"
+    )
+
+
+def base(test: int) -> tuple[str, dict]:
+    return "test_started", {"test": test, "phase": "baseline", "round": None, "candidate": None, "run": 0, "seed": 0}
+
+
+def test_full_runs_of_what_is_left_are_told():
+    _, before, after = states(started(1), ("confirm_started", {"round": None}))
+    assert news("confirm_started", before, after) == "confirming what is left with full runs"
+    assert "confirming what is left with full runs · 4 of 4 models" in headline(after)
+
+
 def test_the_headline_counts_tests_that_ended_and_that_run():
-    ended = {"outcome": "pass", "failure": "", "distance": None, "end_pose": None, "simulated_seconds": 1}
-    finished = ("test_finished", {"test": 2, "wall_seconds": 1, **ended})
-    state = states(*map(started, (1, 2, 3, 4)), finished, ("test_lost", {"test": 3}))[-1]
+    state = states(*map(started, (1, 2, 3, 4)), ended(2, "pass"), ("test_lost", {"test": 3}))[-1]
     assert headline(state).endswith("4 of 4 models · 1 tests, 2 running")

@@ -27,25 +27,29 @@ SENSED = {"beam": 0.5, "wall": 0.25, "ground_plane": 0.0}
 TOUCHED = {"beam": 1.5, "ground_plane": 0.0}
 
 Oracle = Callable[[frozenset[str], int], str]
+# What a run that may be cut shows then, or "" where it is not cut.
+Cut = Callable[[frozenset[str], int], str]
+ENDS = {"similar": ("failed", 2.0), "other": ("failed", 9.0), "pass": ("pass", 4.0)}
 
 
-def result(outcome: str, seed: int, x: float) -> RunResult:
+def result(outcome: str, seed: int, x: float, cut: bool = False) -> RunResult:
     """A run of 2 s that ends at (x, 0, 0)."""
     trajectory = np.zeros((3, 8))
     trajectory[:, 0], trajectory[:, 1], trajectory[:, 4] = (0, 1, 2), (0, x / 2, x), 1
-    failure = "timeout" if outcome == "failed" else ""
-    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed, SENSED, TOUCHED)
+    failure = "stuck" if outcome == "failed" else ""
+    return RunResult(outcome, failure, trajectory, {}, 2.0, 0.01, seed, SENSED, TOUCHED, cut)
 
 
 class FakePool:
     """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other" or "pass".
 
-    Tests finish in an order that `seed` shuffles, as they do on a busy machine.
+    `cut(models, seed)` says "similar" or "other" of a run that is ended early unless it has to be full. Tests finish in an order
+    that `seed` shuffles, as they do on a busy machine.
     """
 
-    def __init__(self, oracle: Oracle, jobs: int, seed: int = 0) -> None:
-        self.oracle, self.jobs, self.random = oracle, jobs, random.Random(seed)
-        self.running: list[tuple[int, frozenset[str], int]] = []
+    def __init__(self, oracle: Oracle, jobs: int, seed: int = 0, cut: Cut = lambda *_: "") -> None:
+        self.oracle, self.jobs, self.random, self.cut = oracle, jobs, random.Random(seed), cut
+        self.running: list[tuple[int, frozenset[str], int, bool]] = []
         self.made: list[tuple[frozenset[str], int]] = []
 
     @property
@@ -56,27 +60,31 @@ class FakePool:
     def busy(self) -> int:
         return len(self.running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int) -> None:
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True) -> None:
         assert self.idle
-        self.running.append((test, keep, seed))
+        self.running.append((test, keep, seed, full))
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult]]:
         if not self.running:
             return []
-        test, keep, seed = self.running.pop(self.random.randrange(len(self.running)))
+        test, keep, seed, full = self.running.pop(self.random.randrange(len(self.running)))
         self.made.append((keep, seed))
-        outcome = self.oracle(keep, seed)
-        ends = {"similar": ("failed", 2.0), "other": ("failed", 9.0), "pass": ("pass", 4.0)}
-        return [(test, result(ends[outcome][0], seed, ends[outcome][1]))]
+        cut = "" if full else self.cut(keep, seed)
+        outcome, x = ENDS[cut or self.oracle(keep, seed)]
+        return [(test, result(outcome, seed, x, bool(cut)))]
 
     def live(self) -> list[Live]:
         return []
 
 
-def new_run(folder: Path, **reduction) -> Path:
+def new_run(folder: Path, *, early_stop: bool = False, **reduction) -> Path:
     """A run file of the small world."""
     scenario = load_scenario(DATA / "wall.yaml")
-    scenario = scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)})
+    changed = {
+        "reduction": scenario.reduction.model_copy(update=reduction),
+        "failure": scenario.failure.model_copy(update={"early_stop": early_stop}),
+    }
+    scenario = scenario.model_copy(update=changed)
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"
     create_run(scenario, path)
     return path

@@ -226,8 +226,6 @@ def _kill(file, after):
 
 def _finished(path):
     """Each finished test as (models, run)."""
-    from ddenv.engine.journal import Journal
-
     with RunFile(path) as file:
         journal = Journal(file)
         return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]

@@ -4,6 +4,7 @@ import math
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
 
@@ -42,14 +43,32 @@ def workers(pool):
     return [int(pid) for pid in pool._pool._pool_manager.worker_manager.workers]
 
 
-def test_an_idle_worker_that_dies_is_replaced(pool):
+def test_an_idle_worker_that_dies_is_replaced_and_all_have_what_makes_drake_fast(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    before, pool = dict(os.environ), Pool(*parts(), 2)
+    try:
+        _test_a_dying_worker(pool)
+    finally:
+        pool.close()
+    assert dict(os.environ) == before
+
+
+def _test_a_dying_worker(pool):
     pool.submit(1, EVERYTHING, 0)
     assert result(pool)[1].outcome == "failed"
+    first = workers(pool)
     for pid in workers(pool):
         os.kill(pid, signal.SIGKILL)
     time.sleep(0.5)
     pool.submit(2, EVERYTHING, 0)
     assert result(pool)[1].outcome == "failed"
+    assert not set(first) & set(workers(pool))
+    for pid in workers(pool):
+        given = Path(f"/proc/{pid}/environ").read_text().split("\0")
+        assert given.count("GLIBC_TUNABLES=glibc.malloc.tcache_count=127") == 1
+        assert "OPENBLAS_NUM_THREADS=1" in given
+        # What the user has set stays.
+        assert "OMP_NUM_THREADS=3" in given
 
 
 def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(pool):

@@ -17,3 +17,9 @@ def test_what_was_noticed_is_told_to_the_millisecond():
 def test_a_test_without_a_result_noticed_nothing():
     found = told(Broken("timeout", "took too long"), None)
     assert (found["outcome"], found["first_sensed"], found["first_touched"]) == ("timeout", {}, {})
+    assert found["cut"] is False
+
+
+def test_how_the_robot_failed_and_whether_it_was_cut_are_told():
+    found = told(result("failed", 0, 2.0, cut=True), None)
+    assert (found["outcome"], found["failure"], found["cut"]) == ("failed", "stuck", True)

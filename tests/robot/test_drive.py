@@ -1,17 +1,26 @@
-"""Which wheels a robot has, and how they turn it."""
+"""Which wheels a robot has, how they turn it, and what the simplest controller makes of that."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.drive import find_drive
-from ddenv.robot.estimate import Estimate
-from ddenv.robot.navigate import STOP, Command, Navigator
-from ddenv.world.scenario import Controller, Goal
+from ddenv.robot.drive import find_drive, footprint
+from ddenv.robot.navigation.straight import Straight
+from ddenv.robot.protocol import STOP, Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.sensing.estimate import Estimate
+from ddenv.robot.template import Template
+from ddenv.world.model import Box, Capsule, Ellipsoid, Mesh, Model, Shape, Sphere
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Controller, Wheels
+from tests.robot.conftest import joint_of, link_of
+
+ALL = Wheels(left=("front_left_wheel", "rear_left_wheel"), right=("front_right_wheel", "rear_right_wheel"))
+FRONT = Wheels(left=("front_left_wheel",), right=("front_right_wheel",))
 
 
 def test_the_husky_has_four_wheels(husky):
@@ -20,20 +29,97 @@ def test_the_husky_has_four_wheels(husky):
     assert drive.left == (True, False, True, False)
     assert drive.radius == pytest.approx(0.1651)
     assert drive.track == pytest.approx(0.5708)
+    assert drive == find_drive(husky, ALL)
 
 
 def test_wheel_speeds_of_a_skid_steered_turn(husky):
     drive = find_drive(husky)
-    assert drive.wheel_speeds(Command(1.0, 0.0), 0.5) == pytest.approx(np.full(4, 1.0 / 0.1651))
-    left, right, *_ = drive.wheel_speeds(Command(0.0, 1.0), 0.5) * 0.1651
+    assert drive.wheel_speeds(Twist(1.0, 0.0), 0.5) == pytest.approx(np.full(4, 1.0 / 0.1651))
+    left, right, *_ = drive.wheel_speeds(Twist(0.0, 1.0), 0.5) * 0.1651
     # To turn at 1 rad/s where half of it is lost, the rims must differ by 2 rad/s times the track.
     assert right - left == pytest.approx(2 * 0.5708)
     assert right > 0 > left
 
 
+def test_wheel_speeds_by_name(husky):
+    drive = find_drive(husky)
+    speeds = drive.wheel_speeds(WheelSpeeds({"rear_left_wheel": 2.0, "front_right_wheel": -1.0}), 0.5)
+    assert speeds.tolist() == [0.0, -1.0, 2.0, 0.0]
+    with pytest.raises(ValueError, match="'wheel' is no wheel; wheels are front_left"):
+        drive.wheel_speeds(WheelSpeeds({"wheel": 2.0}), 0.5)
+
+
+def test_what_turns_about_the_opposite_axis_turns_the_other_way(husky, world_of, scenario_of):
+    joints = tuple(replace(joint, axis=(0.0, -1.0, 0.0)) if "right" in joint.name else joint for joint in husky.joints)
+    mixed = replace(husky, joints=joints)
+    drive = find_drive(mixed)
+    assert drive.signs == (1.0, -1.0, 1.0, -1.0)
+    assert np.sign(drive.wheel_speeds(Twist(1.0, 0.0), 0.5)).tolist() == list(drive.signs)
+    assert drive.wheel_speeds(WheelSpeeds({"front_right_wheel": 3.0}), 0.5).tolist() == [0.0, -3.0, 0.0, 0.0]
+    assert Template(world_of(), mixed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+
+
+def turned(robot: Model, pose: Pose) -> Model:
+    """`robot` as a whole somewhere else."""
+
+    def link(each):
+        collisions = tuple(replace(one, pose=pose @ one.pose) for one in each.collisions)
+        return replace(each, pose=pose @ each.pose, collisions=collisions)
+
+    joints = tuple(replace(each, pose=pose @ each.pose, axis=pose.rotate(each.axis)) for each in robot.joints)
+    return replace(robot, pose=pose @ robot.pose, links=tuple(map(link, robot.links)), joints=joints)
+
+
+def test_sides_and_footprint_are_seen_from_the_model(husky):
+    there = turned(husky, Pose.from_rpy(3.0, -5.0, 1.0, 0.0, 0.0, math.pi))
+    assert find_drive(there).left == find_drive(husky).left
+    assert find_drive(there).signs == find_drive(husky).signs
+    assert footprint(there) == pytest.approx(footprint(husky))
+    # Its bumpers are 0.9874 m apart, its tyres stand out by half of their width.
+    assert footprint(husky) == pytest.approx((0.4937, 0.4937, 0.2854 + 0.1143 / 2, 0.2854 + 0.1143 / 2), abs=1e-6)
+
+
+REFUSED = {
+    "mistyped": (
+        Wheels(left=("front_left_weel",), right=FRONT.right),
+        r"robot.wheels.left: there is no joint 'front_left_weel' \(did you mean front_left_wheel\?\); joints of 'husky' that turn "
+        "are front_left_wheel, .*, turret$",
+    ),
+    "fixed": (
+        Wheels(left=FRONT.left, right=("mast",)),
+        "robot.wheels.right: 'mast' is a fixed joint that does not turn",
+    ),
+    "both": (
+        Wheels(left=FRONT.left, right=FRONT.left),
+        "robot.wheels: joint 'front_left_wheel' is named on both sides$",
+    ),
+    "twice": (Wheels(left=FRONT.left * 2, right=FRONT.right), "robot.wheels: joint 'front_left_wheel' is named twice$"),
+    "swapped": (
+        Wheels(left=FRONT.right, right=FRONT.left),
+        "left wheels of 'husky' are not to the left of the right ones",
+    ),
+    "upright": (
+        Wheels(left=("turret",), right=FRONT.right),
+        "'husky': joint 'turret' is no wheel: its axis is not across",
+    ),
+}
+
+
+@pytest.mark.parametrize(("wheels", "complaint"), REFUSED.values(), ids=REFUSED.keys())
+def test_wheels_that_cannot_be_are_refused(husky, wheels, complaint):
+    extra = [
+        replace(joint_of(kind, "base_link", "load", (0.0, 0.2, 0.5)), name=name)
+        for name, kind in (("mast", "fixed"), ("turret", "continuous"))
+    ]
+    with pytest.raises(UserError, match=complaint):
+        find_drive(replace(husky, joints=(*husky.joints, *extra)), wheels)
+
+
 def test_a_robot_without_wheels_is_refused(husky):
-    with pytest.raises(UserError, match=r"husky.*wheels"):
+    with pytest.raises(UserError, match=r"husky.*wheels on both sides.*robot\.wheels"):
         find_drive(replace(husky, joints=()))
+    with pytest.raises(UserError, match=r"robot.wheels.left: there is no joint.*none of its joints turns"):
+        find_drive(replace(husky, joints=()), FRONT)
 
 
 def test_a_robot_with_wheels_on_one_side_is_refused(husky):
@@ -41,20 +127,80 @@ def test_a_robot_with_wheels_on_one_side_is_refused(husky):
         find_drive(replace(husky, joints=husky.joints[::2]))
 
 
+def on_wheels_of(husky: Model, shape: Shape) -> Model:
+    def with_shape(link):
+        return replace(link, collisions=tuple(replace(one, shape=shape) for one in link.collisions))
+
+    return replace(husky, links=tuple(with_shape(link) if "wheel" in link.name else link for link in husky.links))
+
+
+def tyre(radius: float) -> Mesh:
+    """A wheel of 24 corners along its frame's z axis."""
+    angles = np.linspace(0.0, math.tau, 24, endpoint=False)
+    rims = [np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(24, z)]) for z in (-0.3, 0.3)]
+    return Mesh("tyre", np.vstack(rims), np.zeros((0, 3), int))
+
+
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.2), Capsule(0.2, 0.1), Ellipsoid((0.2, 0.2, 0.3)), tyre(0.2)], ids=lambda one: type(one).__name__
+)
+def test_the_radius_of_wheels_of_any_round_shape(husky, shape):
+    assert find_drive(on_wheels_of(husky, shape)).radius == pytest.approx(0.2)
+
+
+def test_square_wheels_are_refused(husky):
+    with pytest.raises(UserError, match="'front_left_wheel_link' has no round collision: a cylinder"):
+        find_drive(on_wheels_of(husky, Box((0.3, 0.3, 0.1))))
+
+
+def test_joints_that_are_not_named_turn_freely(husky, world_of, scenario_of):
+    """Two driven wheels, and behind them two that only roll."""
+    scenario = scenario_of(
+        robot={"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": FRONT.model_dump()}
+    )
+    template = Template(world_of(), husky, scenario)
+    assert template._built.plant.num_actuators() == 2
+    assert template.run(frozenset(), seed=1).outcome == "pass"
+
+
+def test_links_without_mass_are_frames_of_what_they_are_fixed_to(husky, world_of, scenario_of):
+    at = (0.4, 0.0, 0.4)
+    rod = link_of("rod", Sphere(0.1), Pose(at), mass=None)
+    tip = link_of("tip", None, Pose(at), mass=None)
+    fixed = joint_of("fixed", "base_link", "rod", at), joint_of("fixed", "rod", "tip", at)
+    framed = replace(husky, links=(*husky.links, rod, tip), joints=(*husky.joints, *fixed))
+    assert Template(world_of(), framed, scenario_of()).run(frozenset(), seed=1).outcome == "pass"
+    loose = replace(framed, joints=(*husky.joints, replace(fixed[0], kind="continuous"), fixed[1]))
+    wheels = {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": ALL.model_dump()}
+    with pytest.raises(UserError, match=r"link 'rod' of the moving model 'husky' has no <inertial>"):
+        Template(world_of(), loose, scenario_of(robot=wheels))
+
+
+def straight(x: float, y: float = 0.0, tolerance: float = 0.5, **settings: float) -> Straight:
+    controller = Controller(**settings)
+    limits = controller.period, controller.speed, controller.acceleration, controller.turn_rate
+    return Straight(Setup((x, y), tolerance, (0, 0, 0), (), (), 0.1, 0.5, (0, 0, 0, 0), *limits, settings=controller))
+
+
+def reading(x: float) -> Reading:
+    return Reading(0.0, Estimate(x, 0.0, 0.0))
+
+
 def test_starts_gently_and_keeps_to_its_speed():
-    navigator = Navigator(Goal(x=10, y=0), Controller(speed=0.5, acceleration=1.0, period=0.1))
-    speeds = [navigator.command(Estimate(0.0, 0.0, 0.0)).speed for _ in range(8)]
+    controller = straight(10, speed=0.5, acceleration=1.0, period=0.1)
+    speeds = [controller.step(reading(0.0)).speed for _ in range(8)]
     assert speeds == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5, 0.5, 0.5, 0.5])
 
 
 def test_turns_on_the_spot_to_a_goal_behind():
-    command = Navigator(Goal(x=-10, y=1), Controller(turn_rate=0.7)).command(Estimate(0.0, 0.0, 0.0))
+    command = straight(-10, 1, turn_rate=0.7).step(reading(0.0))
     assert command.speed == 0.0
     assert command.turn_rate == pytest.approx(0.7)
 
 
 def test_stays_once_it_believes_to_be_there():
-    navigator = Navigator(Goal(x=10, y=0, tolerance=1.0), Controller())
-    assert navigator.command(Estimate(9.7, 0.0, 0.0)) != STOP
-    assert navigator.command(Estimate(9.9, 0.0, 0.0)) == STOP
-    assert navigator.command(Estimate(5.0, 0.0, 0.0)) == STOP
+    controller = straight(10, tolerance=1.0)
+    assert controller.step(reading(9.7)) != STOP
+    assert controller.step(reading(9.9)) == STOP
+    assert controller.step(reading(5.0)) == STOP
+    assert controller.arrived

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ddenv.robot.oracle import Failure, judge, medoid, trajectory_distance
 from ddenv.robot.result import RunResult
@@ -15,7 +19,7 @@ def path(*points) -> np.ndarray:
 
 
 def result(outcome: str, trajectory: np.ndarray) -> RunResult:
-    failure = {"failed": "timeout", "error": "not-finite"}.get(outcome, "")
+    failure = {"failed": "stuck", "error": "not-finite"}.get(outcome, "")
     return RunResult(outcome, failure, trajectory, {}, float(trajectory[-1, 0]), 0.1, 0)
 
 
@@ -52,6 +56,56 @@ def test_trajectories_are_compared_at_equal_times():
     assert trajectory_distance(WAY, WAY[::2]) == pytest.approx(0.0)
     # The shorter one waits at its end: 0, 0 and 1 m apart.
     assert trajectory_distance(WAY, WAY[:2]) == pytest.approx(1 / 3)
+
+
+numbers = st.floats(-20, 20)
+
+
+@st.composite
+def ways(draw) -> np.ndarray:
+    """A trajectory with a row every 0.1 s and one at its end, as runs have it."""
+    length = draw(st.integers(1, 30))
+    steps = draw(st.lists(st.tuples(numbers, numbers, numbers), min_size=length, max_size=length))
+    rest = draw(st.sampled_from([0.0, 0.035]))
+    return np.array(
+        [(0.1 * row + (rest if row == length - 1 else 0), *step, 1, 0, 0, 0) for row, step in enumerate(steps)]
+    )
+
+
+def waiting(trajectory: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """The trajectory with rows at all later `times`, at its end."""
+    later = times[times > trajectory[-1, 0]]
+    return np.vstack([trajectory, *([[time, *trajectory[-1, 1:]]] for time in later)])
+
+
+@given(ways(), ways())
+def test_the_distance_of_trajectories_is_one(a, b):
+    distance = trajectory_distance(a, b)
+    assert distance == pytest.approx(trajectory_distance(b, a))
+    assert trajectory_distance(a, a) == 0.0
+    farthest = max(np.linalg.norm(p - q) for p in a[:, 1:4] for q in b[:, 1:4])
+    assert 0.0 <= distance <= farthest + 1e-9
+
+
+@given(ways(), ways())
+def test_a_run_that_was_cut_waits_at_its_end(cut, f):
+    """Whether a robot that stands still is watched to the end or not makes no difference."""
+    assert trajectory_distance(cut, f) == pytest.approx(trajectory_distance(waiting(cut, f[:, 0]), f))
+
+
+@given(ways(), st.tuples(numbers, numbers, numbers))
+def test_the_same_way_elsewhere_is_as_far_as_it_was_moved(way, shift):
+    moved = way.copy()
+    moved[:, 1:4] += shift
+    assert trajectory_distance(way, moved) == pytest.approx(np.linalg.norm(shift), abs=1e-9)
+
+
+@given(ways(), ways(), st.floats(0.01, 50))
+def test_similar_trajectories_have_similar_ends(a, b, epsilon):
+    f = Failure(tuple(b[-1, 1:4]), b, epsilon)
+    along = judge(result("failed", a), replace(f, similarity="trajectory"))
+    assert along.outcome == "other" or judge(result("failed", a), f).outcome == "similar"
+    assert (along.outcome == "similar") == (max(along.distance, along.trajectory_distance) <= epsilon)
 
 
 def test_medoid_is_the_position_nearest_to_all_others():

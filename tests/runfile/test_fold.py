@@ -152,6 +152,23 @@ def test_sensed_models_that_make_no_sense_are_told(key, pair):
         state_after(started(), finished(**{key: [[1, 1.0], pair]}))
 
 
+def test_what_older_files_call_a_timeout_is_out_of_time_and_was_not_cut():
+    test = state_after(started(), finished(outcome="other", failure="timeout")).tests[0]
+    assert (test.failure, test.cut, test.without) == ("out of time", False, None)
+    slow = state_after(started(), finished(outcome="timeout", failure="took longer than 9 s of wall clock")).tests[0]
+    assert slow.failure == "took longer than 9 s of wall clock"
+
+
+def test_full_runs_of_what_is_left_are_told_apart():
+    whole, one = ({**started(test)[1], "phase": "confirm", "without": left} for test, left in ((2, None), (3, 4)))
+    state = state_after(
+        started(1), ("confirm_started", {"round": None}), ("test_started", whole), ("test_started", one)
+    )
+    assert state.confirming
+    assert [(test.id, test.without) for test in state.confirm_tests] == [(2, None), (3, "box 4")]
+    assert state.deflake_runs == 0
+
+
 def test_an_outcome_that_nobody_knows_is_told():
     with pytest.raises(UserError, match="makes no sense here"):
         state_after(started(), finished(outcome="splendid"))

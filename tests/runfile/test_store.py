@@ -86,8 +86,8 @@ def test_a_newer_file_is_refused(path):
         RunFile(path)
 
 
-@pytest.mark.parametrize("version", [1, 2])
-def test_this_and_the_older_version_are_read(path, version):
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_this_and_the_older_versions_are_read(path, version):
     with sqlite3.connect(path) as database:
         database.execute(f"PRAGMA user_version = {version}")
     with RunFile(path) as file:
@@ -103,7 +103,7 @@ def test_an_older_file_that_an_engine_goes_on_with_is_one_of_this_version(path):
         assert version_of(path) == 1
         file.own()
         file.append("paused", {})
-    assert version_of(path) == SCHEMA_VERSION == 2
+    assert version_of(path) == SCHEMA_VERSION == 3
 
 
 def version_of(path) -> int:

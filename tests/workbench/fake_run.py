@@ -101,12 +101,14 @@ class FakeRun:
         self.write("test_started", test=self.tests, phase=phase, round=number, candidate=candidate, run=run, seed=run)
         return self.tests
 
-    def finish(self, test: int, outcome: str, distance: float | None = None, wall: float = 2.0) -> None:
+    def finish(
+        self, test: int, outcome: str, distance: float | None = None, wall: float = 2.0, failure: str = ""
+    ) -> None:
         pose = [2.0, 0.4, 0.2, 1.0, 0.0, 0.0, 0.0]
         event = {
             "test": test,
             "outcome": outcome,
-            "failure": "",
+            "failure": failure,
             "distance": distance,
             "end_pose": pose,
             "simulated_seconds": 45.0,
@@ -114,10 +116,20 @@ class FakeRun:
         }
         self.file.append("test_finished", event, {ROBOT: path_samples().tobytes()})
 
-    def test(self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0) -> int:
+    def test(
+        self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0, failure: str = ""
+    ) -> int:
         number = self.start(candidate, run)
-        self.finish(number, outcome, distance)
+        self.finish(number, outcome, distance, failure=failure)
         return number
+
+    def confirm(self, without: str | None = None, run: int = 0) -> int:
+        """A full run of what is left starts."""
+        self.tests += 1
+        left_out = None if without is None else self.elements.index(without)
+        place = {"phase": "confirm", "round": None, "candidate": None, "without": left_out}
+        self.write("test_started", test=self.tests, **place, run=run, seed=run)
+        return self.tests
 
     def live(self, *tests: tuple[int, float]) -> None:
         """Tests run now: each (test, part of the way from 0 to 1)."""
@@ -128,7 +140,8 @@ class FakeRun:
         self.file.set_live(rows)
 
     def baseline(self, failures: int = 3, runs: int = 4) -> FakeRun:
-        tests = [self.test(None, "failed" if run < failures else "pass", run=run) for run in range(runs)]
+        words = [("failed", "stuck") if run < failures else ("pass", "") for run in range(runs)]
+        tests = [self.test(None, outcome, run=run, failure=how) for run, (outcome, how) in enumerate(words)]
         outcomes = {test: "similar" if index < failures else "pass" for index, test in enumerate(tests)}
         self.write(
             "baseline_finished",
@@ -167,11 +180,12 @@ class FakeRun:
         self.write("candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known)
 
     def dissimilar(self, candidate: int) -> None:
-        tests = [self.test(candidate, "pass" if run % 2 else "other", 2.3, run) for run in range(4)]
+        words = [("pass", "") if run % 2 else ("other", "tipped over") for run in range(4)]
+        tests = [self.test(candidate, outcome, 2.3, run, how) for run, (outcome, how) in enumerate(words)]
         self.judge(candidate, "dissimilar", tests)
 
     def similar(self, candidate: int) -> int:
-        test = self.test(candidate, "similar", 0.12)
+        test = self.test(candidate, "similar", 0.12, failure="stuck")
         self.judge(candidate, "similar", [test])
         return test
 
@@ -218,8 +232,8 @@ def waiting(run: FakeRun) -> FakeRun:
     return run
 
 
-def finished(run: FakeRun) -> FakeRun:
-    """A run that ended with two models."""
+def _rounds(run: FakeRun) -> FakeRun:
+    """A run whose rounds left two models."""
     run.created().baseline()
     left = run.elements
     for keep, parts in ((6, 2), (2, 3)):
@@ -231,5 +245,19 @@ def finished(run: FakeRun) -> FakeRun:
     run.dissimilar(0)
     run.dissimilar(1)
     run.write("round_finished")
-    run.write("finished", minimal=True, reason="no candidate showed f")
+    return run
+
+
+def confirming(run: FakeRun) -> FakeRun:
+    """The rounds left two models, and two full runs are made of what is left."""
+    _rounds(run).write("confirm_started", round=None)
+    run.finish(run.confirm(), "similar", 0.12, failure="stuck")
+    run.finish(run.confirm("crate_00"), "other", 2.3, failure="tipped over")
+    run.live((run.confirm("crate_00", 1), 0.6), (run.confirm("crate_01"), 0.25))
+    return run
+
+
+def finished(run: FakeRun) -> FakeRun:
+    """A run that ended with two models."""
+    _rounds(run).write("finished", minimal=True, reason="no candidate showed f")
     return run

@@ -42,7 +42,7 @@ def test_between_baseline_and_round_the_partitioning_is_named(run):
     assert line == 2
     assert "11 models" in words
     assert "split by model2model" in words
-    assert "3 of 4 runs failed (75 %" in words
+    assert "Baseline: the robot got stuck in 3 of 4 runs (75 %" in words
 
 
 def test_a_first_run_is_line_5(run):
@@ -52,14 +52,14 @@ def test_a_first_run_is_line_5(run):
     line, words = told(run)
     assert line == 5
     assert "First run of part A (4 models), candidate 1 of 6" in words
-    assert "within 0.5 m" in words
+    assert "within 0.33 m" in words
 
 
 @pytest.mark.parametrize(
     ("outcome", "reason"),
     [
         ("pass", "the goal was reached"),
-        ("other", "failed elsewhere, 2.3 m from f's end"),
+        ("other", "the robot tipped over 2.3 m from f's end"),
         ("error", "broke"),
         ("timeout", "too long"),
     ],
@@ -67,7 +67,7 @@ def test_a_first_run_is_line_5(run):
 def test_a_rerun_is_line_7_and_says_why(run, outcome, reason):
     run.created().baseline()
     run.start_round(2)
-    run.test(0, outcome, 2.3)
+    run.test(0, outcome, 2.3, failure="tipped over" if outcome == "other" else "")
     run.start(0, 1)
     line, words = told(run)
     assert line == 7
@@ -82,7 +82,7 @@ def test_speculation_is_told(run):
 def test_waiting_tells_the_keys_and_the_sizes(run):
     line, words = told(fake_run.waiting(run))
     assert line == 10
-    assert "ended 0.12 m from f's end" in words
+    assert "got stuck 0.12 m from f's end" in words
     assert "a accepts it (11 → 4 models), x rejects" in words
 
 
@@ -117,6 +117,30 @@ def test_a_minimal_end_names_what_is_kept(run):
     assert "Minimal: 2 models left" in words
     assert "crate_00, crate_01" in words
     assert "95 % interval 30 % to 95 %" in words
+
+
+def test_full_runs_of_what_is_left_come_before_the_end(run):
+    line, words = told(fake_run.confirming(run))
+    assert line == 21
+    assert "Confirming what is left with full runs" in words
+    assert "run 2 of all that is left but crate_00" in words
+    run.write("finished", minimal=True, reason="no candidate showed f")
+    assert "f is not seen again; full runs confirm it." in told(run, "absent")[1]
+
+
+def test_how_a_baseline_run_failed_otherwise_is_counted(run):
+    run.created()
+    run.test(None, "other", 3.0, failure="fell")
+    state = fold(run.baseline().file.events())
+    assert "95 %); 1 run failed in another way." in baseline_sentence(state, 3)
+
+
+def test_files_that_do_not_say_how_a_robot_failed_are_worded_too(run):
+    run.created().baseline()
+    run.start_round(2)
+    run.test(0, "other", 2.3)
+    run.start(0, 1)
+    assert "the robot failed elsewhere, 2.3 m from f's end" in told(run)[1]
 
 
 def test_an_early_end_is_not_called_minimal(run):

@@ -93,12 +93,13 @@ async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
         assert [session.value(id) for id in ("iterations", "timeout", "epsilon", "seed", "jobs")] == [
             "3",
             "45",
-            "0.5",
+            "0.33",
             "0",
             "4",
         ]
         assert session.value("name") == "crates-1"
         assert session.method() == ["ddenv", "model2model", "failure-proximal"]
+        assert session.screen.query_one("#early-stop", Select).value == "off"
         assert not session.screen.query_one("#places").display
 
 
@@ -127,6 +128,19 @@ async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios
 
         reduction = read_parts(session.app.screen._poll.file)[0].reduction
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
+
+
+async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios, started):
+    own = fake_run.scenario() | {"failure": {"early_stop": True}}
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    async with Opened() as session:
+        choice = session.screen.query_one("#early-stop", Select)
+        assert choice.value == "on"
+        choice.value = "off"
+        await session.press("ctrl+s")
+        from ddenv.launch.runs import read_parts
+
+        assert not read_parts(session.app.screen._poll.file)[0].failure.early_stop
 
 
 async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
@@ -327,7 +341,7 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         assert session.screen.query_one("#timeout", Input).has_class("-wrong")
         session.screen._opened(scenarios / "crates.sdf")
         await session.settle()
-        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.5", "3", "2", "0", "4"]
+        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.33", "3", "2", "0", "4"]
         assert session.method() == ["ddenv", "model2model", "avg-trajectory-proximal"]
         assert not session.screen.query(".-wrong")
         assert session.wrong() == ""

@@ -16,14 +16,17 @@ async def settled(pilot):
 
 def baseline(run):
     run.created()
-    run.test(None, "failed")
+    run.test(None, "failed", failure="stuck")
     run.test(None, "pass", run=1)
     run.live((run.start(None, 2), 0.7), (run.start(None, 3), 0.3))
     return run
 
 
+MOMENTS = [baseline, fake_run.mid_round, fake_run.waiting, fake_run.confirming, fake_run.finished]
+
+
 @pytest.mark.parametrize("size", SIZES, ids=str)
-@pytest.mark.parametrize("moment", [baseline, fake_run.mid_round, fake_run.waiting, fake_run.finished])
+@pytest.mark.parametrize("moment", MOMENTS)
 def test_run_screen(snap_compare, run, moment, size):
     moment(run)
     if moment is not fake_run.finished:

@@ -14,7 +14,7 @@ from ddenv.runfile.state import Point
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.processes import last_line
 from ddenv.workbench.recent import recent_runs
-from ddenv.workbench.widgets.candidates import _candidates
+from ddenv.workbench.widgets.candidates import _candidates, _confirm
 from ddenv.workbench.widgets.chart import steps
 from ddenv.workbench.widgets.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.widgets.status import time_left
@@ -129,6 +129,17 @@ def test_rows_say_how_many_tests_of_how_many(run):
     assert rows["1"]["tests"] == "1/4"
     assert rows["1"]["verdict"].startswith("▶ 2")
     assert rows["3"]["tests"] == ""
+
+
+def test_full_runs_of_what_is_left_have_rows(run):
+    rows = _confirm(snapshot(fake_run.confirming(run)))
+    told = [(row["candidate"], row["models"], row["tests"], row["verdict"]) for row in rows.values()]
+    assert told == [
+        ("all left", "2", "run 1", "● stuck"),
+        ("- crate_00", "1", "run 1", "◇ tipped over"),
+        ("- crate_00", "1", "run 2", "▶ 26.8 s"),
+        ("- crate_01", "1", "run 1", "▶ 10.8 s"),
+    ]
 
 
 def test_tests_of_a_dead_engine_do_not_run(run):

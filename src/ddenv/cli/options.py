@@ -96,6 +96,11 @@ def reduction_options(command):
             ),
             click.option("--prior", metavar="spatial|uniform", help="Where probdd and splitting begin."),
             click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m."),
+            click.option(
+                "--early-stop/--no-early-stop",
+                default=None,
+                help="End a test when the robot is stuck for good; full runs confirm what is left.",
+            ),
             click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i."),
         )
     ):

@@ -22,8 +22,10 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
         "tests": state.tests_done,
         "outcomes": state.outcomes(),
         "deflake_runs": state.deflake_runs,
+        "ended_early": state.cut_tests,
         "rounds": state.rounds_done,
         "minimal": state.minimal,
+        "failure": state.failure or None,
         "failure_rate": None if state.baseline is None else state.baseline.rate,
         "wall_seconds": round(state.working_seconds, 3),
         "status": state.status,
@@ -39,9 +41,10 @@ def lines(state: RunState, path: Path) -> list[str]:
         return [f"run file: {path}"]
     what = "minimal environment" if state.minimal else "environment so far"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
+    early = f"; {state.cut_tests} ended early" if state.cut_tests else ""
     told = [
         f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names(state)}",
-        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs) in {count(state.rounds_done, 'round')}, "
+        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{early}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         f"run file: {path}",
     ]

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Sequence
 
-from ddenv.runfile.state import RunState
+from ddenv.runfile.failures import DEEDS
+from ddenv.runfile.state import Candidate, RunState
+
+CONFIRMING = "confirming what is left with full runs"
+# Of what is always the same.
+SAID = {
+    "paused": "paused from a workbench; it resumes from there too: attach with 'ddenv open'",
+    "resumed": "resumed",
+    "confirm_started": CONFIRMING,
+}
 
 
 def headline(state: RunState) -> str:
     """The state in one line, cut to the terminal's width."""
     models = f"{len(state.environment)} of {len(state.elements)} models"
-    where = "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
     running = state.tally["running"]
-    line = f"{state.status} · {where} · {models} · {state.tests_done} tests, {running} running"
+    line = f"{state.status} · {_where(state)} · {models} · {state.tests_done} tests, {running} running"
     return line[: shutil.get_terminal_size().columns - 1]
+
+
+def _where(state: RunState) -> str:
+    if state.confirming and not state.ended:
+        return CONFIRMING
+    return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
 
 
 def news(kind: str, before: RunState, after: RunState) -> str:
@@ -35,30 +50,36 @@ def news(kind: str, before: RunState, after: RunState) -> str:
             changed = after.round.candidates.changed_since(before.round.candidates)
             return "".join(
                 f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
+                f"{_ways(after, one)}"
                 for one in changed
             )
         case "waiting":
             waiting = after.round.candidates[after.waiting_candidate]
             return f"  {waiting.label} shows f and waits for accept or reject: attach with 'ddenv open'"
-        case "paused":
-            return "paused from a workbench; it resumes from there too: attach with 'ddenv open'"
-        case "resumed":
-            return "resumed"
         case "reduced":
             return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
         case "finished" | "engine_stopped" | "engine_failed":
             return f"{after.status}: {after.reason}"
-    return ""
+    return SAID.get(kind, "")
 
 
 def baseline(state: RunState) -> str:
     """What the baseline found, and how sure a re-run is to meet the failure."""
     found = state.baseline
     x, y, z = found.position
+    failure, others = state.failure or "ending", state.other_failures
+    also = f", {count(others, 'run')} failed in another way" if others else ""
     return (
         f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
-        f"{found.high:.0%}), ending at ({x:.2f}, {y:.2f}, {z:.2f}) m; {iterations(state)}"
+        f"{found.high:.0%}){also}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m; {iterations(state)}"
     )
+
+
+def _ways(state: RunState, one: Candidate) -> str:
+    """How a candidate's tests ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
+    tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
+    ways = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
+    return f" ({', '.join(f'{number} {way}' for way, number in ways.items())})" if ways else ""
 
 
 def iterations(state: RunState) -> str:

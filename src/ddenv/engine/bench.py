@@ -11,6 +11,7 @@ from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.told import told
+from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import ROBOT
@@ -18,6 +19,9 @@ from ddenv.runfile.store import ROBOT
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
 LIVE_PERIOD = 0.1
+# How many tests in a row may break: where the simulator itself is out of order (no licence, no display, a full disk), all of
+# them do, and the reduction would take it for the absence of f. In worlds that merely break a part of them, some do not.
+MOST_BROKEN = 25
 
 Wanted = list[tuple[Keep, int, int | None]]
 
@@ -33,37 +37,42 @@ class Bench:
         self._journal = journal
         self._pool = pool
         self._control = control
-        self._started: set[tuple[Keep, int]] = set()
+        self._started: set[tuple[Keep, int, bool]] = set()
         self._next_live = 0.0
         self._live_shown = False
+        self._broken = 0
 
     def work(self, phase: str, round: int | None, wanted: Callable[[], Wanted]) -> None:
         """Makes tests until none is wanted.
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is asked again at every look around. Raises Stopped, and UserError if nothing can be simulated.
+        them; it is asked again at every look around. Raises Stopped, and UserError if nothing can be simulated or all tests
+        break.
         """
+        full = self._journal.is_full(phase)
         while tests := wanted():
-            self._start([test for test in tests if test[:2] not in self._started], phase, round)
+            self._start([test for test in tests if (*test[:2], full) not in self._started], phase, round)
             self.tick()
 
     def _start(self, tests: Wanted, phase: str, round: int | None) -> None:
         # A step is the test that comes next in line; nothing runs ahead of it.
         free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+        full = self._journal.is_full(phase)
         for keep, run, candidate in tests[:free]:
             if not self._control.may_start():
                 return
             test = self._journal.start_test(phase, keep, run, round, candidate)
-            self._started.add((keep, run))
-            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed)
+            self._started.add((keep, run, full))
+            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
             self._control.started()
 
     def tick(self) -> None:
-        """Obeys commands, takes in what has finished, shows the running robots. Raises Stopped."""
+        """Obeys commands, takes in what has finished, shows the running robots. Raises Stopped, and UserError as `work`."""
         self._control.poll()
         finished = self._pool.finished(WAIT)
         for test, result in finished:
             self._record(test, result)
+            self._give_up_if_all_break(result)
         if self._pool.busy == 0:
             self._control.settled()
             if not finished:
@@ -71,6 +80,15 @@ class Bench:
         if time.monotonic() >= self._next_live:
             self._next_live = time.monotonic() + LIVE_PERIOD
             self._show_live()
+
+    def _give_up_if_all_break(self, result: RunResult | Broken) -> None:
+        """Raises UserError when nothing but broken tests has come for long."""
+        self._broken = self._broken + 1 if result.outcome in ("error", "timeout") else 0
+        if self._broken >= MOST_BROKEN:
+            raise UserError(
+                f"{self._broken} tests in a row broke, the last one: {result.failure}; "
+                f"mend that and go on with 'ddenv resume {self._journal.file.path}' (they count as without f)"
+            )
 
     def _show_live(self) -> None:
         live = self._pool.live()

@@ -10,6 +10,7 @@ import numpy as np
 
 from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
+from ddenv.engine.confirm import Confirmation
 from ddenv.engine.control import Control
 from ddenv.engine.evidence import Sight
 from ddenv.engine.journal import Journal, Keep, other_way
@@ -85,7 +86,16 @@ class Driver:
         if untried:
             why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
             reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"
-        self._end(not untried, reason)
+        tried = [name for name in self._journal.state.elements if name in kept and name not in untried]
+        doubt = self._confirm(kept, tried) if self._failure_spec.early_stop else ""
+        self._end(not untried and not doubt, doubt or reason)
+
+    def _confirm(self, kept: Keep, tried: list[str]) -> str:
+        """Makes the full runs that the end still lacks; returns what they contradict, or ""."""
+        self._journal.record_once("confirm_started")
+        confirmation = Confirmation(self._journal, kept, tried, self._reduction.iterations)
+        self._bench.work("confirm", None, confirmation.wanted)
+        return confirmation.doubt()
 
     def _end(self, minimal: bool, reason: str) -> None:
         # What ran ahead of time is not needed any more.
@@ -101,11 +111,11 @@ class Driver:
         runs = range(self._reduction.baseline_runs)
 
         def wanted() -> Wanted:
-            return [(everything, run, None) for run in runs if (everything, run) not in journal.ledger]
+            return [(everything, run, None) for run in runs if (everything, run, False) not in journal.ledger]
 
         self._bench.work("baseline", None, wanted)
         if journal.state.baseline is None:
-            tests = [journal.state.tests[journal.ledger[everything, run] - 1] for run in runs]
+            tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in runs]
             trajectories = {test.id: self._trajectory(test.id) for test in tests if test.outcome == "failed"}
             found = fix_failure(tests, trajectories, self._failure_spec, self._reduction.iterations)
             if isinstance(found, str):
@@ -211,7 +221,7 @@ class Driver:
         """The tests that a candidate's verdict rests on, in the order of runs."""
         tests = []
         for run in range(1 + self._reduction.iterations):
-            tests.append(self._journal.ledger[keep, run])
+            tests.append(self._journal.ledger[keep, run, False])
             if self._journal.state.tests[tests[-1] - 1].outcome == "similar":
                 break
         return tests

@@ -6,7 +6,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
@@ -23,15 +23,17 @@ def other_way(round: int) -> str:
 class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
-    `ledger` holds each finished test as (models, run) -> its id; a test in it is never made again. `decisions` are the
-    user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected: they stay refused
-    in later rounds, whatever is known of them. `partitions` are those of each round, as numbers of models.
+    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again. What the algorithm asked
+    for is there with full False, what ran to its end with full True, most tests as both: `early_stop` only changes runs that
+    it cuts. What only confirms stays out of the algorithm's sight, so that a resumed run takes the same way.
+    `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
+    they stay refused in later rounds, whatever is known of them. `partitions` are those of each round, as numbers of models.
     """
 
     def __init__(self, file: RunFile) -> None:
         self.file = file
         self.state = RunState()
-        self.ledger: dict[tuple[Keep, int], int] = {}
+        self.ledger: dict[tuple[Keep, int, bool], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
         self.refused: dict[Keep, str] = {}
         self.partitions: dict[int, list[list[int]]] = {}
@@ -52,10 +54,14 @@ class Journal:
             data["candidate"] = candidate
         self.record(kind, round=round, **data)
 
-    def is_similar(self, keep: Keep, run: int) -> bool | None:
-        """Whether a finished test showed f; None where it is not made yet."""
-        test = self.ledger.get((keep, run))
+    def is_similar(self, keep: Keep, run: int, full: bool = False) -> bool | None:
+        """Whether a finished test showed f; None where it is not made yet. With `full` only a run to the end counts."""
+        test = self.ledger.get((keep, run, full))
         return None if test is None else self.state.tests[test - 1].outcome == "similar"
+
+    def is_full(self, phase: str) -> bool:
+        """Whether tests of this phase run to the end even where the robot is stuck for good."""
+        return phase != "round" or not self.state.scenario["failure"].get("early_stop", False)
 
     def start_test(self, phase: str, keep: Keep, run: int, round: int | None, candidate: int | None) -> int:
         """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise.
@@ -67,7 +73,11 @@ class Journal:
         test = len(self.state.tests) + 1
         self._keeps[test] = keep
         seed = self.state.scenario["reduction"]["seed"] + run
-        self.record("test_started", test=test, phase=phase, round=round, candidate=candidate, run=run, seed=seed)
+        place = {"round": round, "candidate": candidate}
+        if phase == "confirm":
+            left_out = [name for name in self.state.environment if name not in keep]
+            place["without"] = self.state.elements.index(left_out[0]) if left_out else None
+        self.record("test_started", test=test, phase=phase, **place, run=run, seed=seed)
         return test
 
     def lose_running(self) -> None:
@@ -88,10 +98,9 @@ class Journal:
         if event.kind == "round_started":
             self.partitions[round] = data["partitions"]
         elif event.kind == "test_started":
-            self._keeps.setdefault(data["test"], self._keep_of(candidate))
+            self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
         elif event.kind == "test_finished":
-            test = self.state.tests[data["test"] - 1]
-            self.ledger[self._keeps[test.id], test.run] = test.id
+            self._enter(self.state.tests[data["test"] - 1])
         elif event.kind == "decided":
             self.decisions[round, candidate] = data["decision"]
             if data["decision"] == "reject":
@@ -99,8 +108,21 @@ class Journal:
         elif event.kind == "vetoed":
             self.refused.setdefault(self._keep_of(candidate), data["verdict"])
 
-    def _keep_of(self, candidate: int | None) -> Keep:
-        """The models of a test that was started in the current round, or of a baseline run."""
-        if candidate is None:
+    def _enter(self, test: Test) -> None:
+        keep = self._keeps[test.id]
+        if test.phase != "confirm":
+            self.ledger[keep, test.run, False] = test.id
+        if not test.cut:
+            self.ledger[keep, test.run, True] = test.id
+
+    def _keep_of_test(self, test: Test) -> Keep:
+        """The models of a test that has just started."""
+        if test.phase == "baseline":
             return frozenset(self.state.elements)
+        if test.phase == "confirm":
+            return frozenset(self.state.environment) - {test.without}
+        return self._keep_of(test.candidate)
+
+    def _keep_of(self, candidate: int) -> Keep:
+        """The models of a candidate of the current round."""
         return frozenset(self.state.round.candidates[candidate].models)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pebble import ProcessExpired, ProcessPool
 
 from ddenv.engine import worker
+from ddenv.engine.spawn import DrakeContext
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import COLUMNS, Live
@@ -19,6 +20,8 @@ from ddenv.world.scenario import Scenario
 
 # How often workers may die between two finished tests before the world is given up.
 MOST_BREAKS = 3
+# How much longer than its time limit a test of an own simulator may take: its command is ended by its worker, which tells why, s.
+MARGIN = 60.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class Job:
     test: int
     keep: frozenset[str]
     seed: int
+    full: bool
     slot: int
 
 
@@ -44,10 +48,11 @@ class Pool:
 
     def __init__(self, scenario: Scenario, world: World, robot: Model, jobs: int) -> None:
         self._jobs = jobs
-        self._context = multiprocessing.get_context("spawn")
+        # An own simulator gets the user's environment as it is.
+        self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
         self._progress = self._context.RawArray("d", jobs * COLUMNS)
         self._parts = (scenario, world, robot)
-        self._wall_timeout = scenario.simulation.wall_timeout
+        self._wall_timeout = scenario.simulation.wall_timeout + (0.0 if scenario.oracle is None else MARGIN)
         self._free = list(range(jobs))
         self._running: dict[Future, Job] = {}
         self._breaks = 0
@@ -70,9 +75,9 @@ class Pool:
     def busy(self) -> int:
         return len(self._running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int) -> None:
-        """Starts a test on an idle worker."""
-        job = Job(test, keep, seed, self._free.pop(0))
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True) -> None:
+        """Starts a test on an idle worker. One that is not `full` ends as soon as the robot is stuck for good."""
+        job = Job(test, keep, seed, full, self._free.pop(0))
         try:
             self._schedule(job)
         except RuntimeError:
@@ -81,7 +86,7 @@ class Pool:
 
     def _schedule(self, job: Job) -> None:
         self._progress[job.slot * COLUMNS] = math.nan
-        work = (job.keep, job.seed, job.slot)
+        work = (job.keep, job.seed, job.full, job.slot)
         self._running[self._pool.schedule(worker.run_test, args=work, timeout=self._wall_timeout)] = job
 
     def _start_again(self, jobs: list[Job]) -> None:

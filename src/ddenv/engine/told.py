@@ -14,12 +14,13 @@ def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
     """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
 
     `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
-    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None.
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None. `cut` says that it
+    was ended before its time because the robot was stuck for good.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
         unnoticed = {"first_sensed": {}, "first_touched": {}}
-        return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed}
+        return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed, "cut": False}
     outcome, distance = result.outcome, None
     if failure is not None:
         judgement = judge(result, failure)
@@ -34,6 +35,7 @@ def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
         "wall_seconds": result.wall_seconds,
         "first_sensed": _to_ms(result.first_sensed),
         "first_touched": _to_ms(result.first_touched),
+        "cut": result.cut,
     }
 
 

@@ -100,7 +100,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
     try:
         while shown < len(trials):
             while pool.idle and started < len(trials):
-                pool.submit(started, trials[started].keep, trials[started].seed)
+                pool.submit(started, trials[started].keep, trials[started].seed, full=True)
                 started += 1
             for index, result in pool.finished(1.0):
                 trial = trials[index]

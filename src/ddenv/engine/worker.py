@@ -1,4 +1,4 @@
-"""What a worker process does: build the world's template once, then run one test at a time in it."""
+"""What a worker process does: prepare the simulator once, then run one test at a time in it."""
 
 from __future__ import annotations
 
@@ -6,16 +6,29 @@ import os
 import signal
 import threading
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
-_template: Template | UserError
+
+class Simulator(Protocol):
+    """Runs the robot in parts of one world."""
+
+    def run(
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        full: bool = True,
+    ) -> RunResult: ...
+
+
+_simulator: Simulator | UserError
 _progress: Any
 
 
@@ -24,26 +37,37 @@ def prepare(scenario: Scenario, world: World, robot: Model, progress: Any) -> No
 
     What is wrong with the world is kept, and told by every test: an exception here would only break the pool.
     """
-    global _template, _progress
+    global _simulator, _progress
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
     _progress = progress
     try:
-        _template = Template(world, robot, scenario)
+        _simulator = _simulator_of(scenario, world, robot)
     except UserError as error:
-        _template = error
+        _simulator = error
 
 
-def run_test(keep: frozenset[str], seed: int, slot: int) -> RunResult:
+def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
+    if scenario.oracle is not None:
+        from ddenv.robot.external.simulator import ExternalSimulator
+
+        return ExternalSimulator(world, scenario)
+    # Drake takes a second to load, and is not there for those who have no use for it.
+    from ddenv.robot.template import Template
+
+    return Template(world, robot, scenario)
+
+
+def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResult:
     """One test, with its progress in `slot` of the shared memory."""
-    if isinstance(_template, UserError):
-        raise _template
+    if isinstance(_simulator, UserError):
+        raise _simulator
     start = slot * COLUMNS
 
     def report(time_s: float, pose: tuple[float, ...]) -> None:
         _progress[start : start + COLUMNS] = (time_s, *pose)
 
-    return _template.run(keep, seed, report)
+    return _simulator.run(keep, seed, report, full)
 
 
 def _follow_parent(parent: int) -> None:

@@ -9,38 +9,90 @@ from ddenv.robot.recording import RECORD_PERIOD
 from ddenv.world.scenario import Scenario
 
 
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A step of the plant at which something is due, its time (s), and what that is."""
+
+    step: int
+    time: float
+    record: bool
+    command: bool
+    compass: bool
+    imu: bool
+    odometry: bool
+    lidar: bool
+
+
 @dataclass(frozen=True)
 class Clock:
     """Time counted in steps of the plant, so that every run does everything at the same instants to the last bit.
 
-    `step` is in s; commands are due every `control_every` steps, rows of the recording every `record_every`, until `last`.
+    `step` is in s; `last` is the step at which time is up. Each of the others is the number of steps between two rows of the
+    recording, two commands, two readings of a sensor.
     """
 
     step: float
-    control_every: int
-    record_every: int
     last: int
+    record: int
+    command: int
+    compass: int
+    imu: int
+    odometry: int
+    lidar: int | None
 
     @classmethod
     def of(cls, scenario: Scenario) -> Clock:
-        step = scenario.simulation.time_step
-        seconds = (scenario.controller.period, RECORD_PERIOD, scenario.failure.timeout)
-        return cls(step, *(max(1, round(period / step)) for period in seconds))
+        sensors, step = scenario.sensors, scenario.simulation.time_step
+
+        def steps(period: float) -> int:
+            return max(1, round(period / step))
+
+        return cls(
+            step=step,
+            last=steps(scenario.failure.timeout),
+            record=steps(RECORD_PERIOD),
+            command=steps(scenario.controller.period),
+            compass=steps(1 / sensors.compass_rate),
+            imu=steps(1 / sensors.imu_rate),
+            odometry=steps(1 / sensors.odometry_rate),
+            lidar=steps(1 / sensors.lidar.rate) if sensors.lidar else None,
+        )
+
+    @property
+    def command_period(self) -> float:
+        """The time between two commands, s."""
+        return self.command * self.step
 
     @property
     def period(self) -> float:
-        """The longest time between two steps at which something is due, s."""
-        return min(self.control_every, self.record_every) * self.step
+        """The longest time between two ticks, s."""
+        return min(self._every) * self.step
 
-    def next(self, step: int) -> int:
-        """The next step at which something is due."""
-        due = min(step - step % every + every for every in (self.control_every, self.record_every))
-        return min(due, self.last)
+    @property
+    def _every(self) -> tuple[int, ...]:
+        both = self.record, self.command, self.compass, self.imu, self.odometry, self.lidar
+        return tuple(steps for steps in both if steps)
 
-    def steps(self) -> Iterator[int]:
-        """All steps at which something is due, from 0."""
-        step = 0
-        yield step
-        while step < self.last:
-            step = self.next(step)
-            yield step
+    def ticks(self) -> Iterator[Tick]:
+        """All steps at which something is due, from 0 to the last."""
+        step, every = 0, self._every
+        while True:
+            yield self._tick(step)
+            if step == self.last:
+                return
+            step = min(self.last, *(step - step % steps + steps for steps in every))
+
+    def _tick(self, step: int) -> Tick:
+        def due(steps: int | None) -> bool:
+            return bool(steps) and step % steps == 0
+
+        return Tick(
+            step=step,
+            time=step * self.step,
+            record=due(self.record),
+            command=due(self.command),
+            compass=due(self.compass),
+            imu=due(self.imu),
+            odometry=due(self.odometry),
+            lidar=due(self.lidar),
+        )

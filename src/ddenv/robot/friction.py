@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydrake.geometry import AddContactMaterial, ProximityProperties
 from pydrake.multibody.plant import CoulombFriction
 
-from ddenv.robot.drive import is_wheel
+from ddenv.robot.drive import Drive, turned_links
 from ddenv.world.model import Model
 
 # Every surface has the same compliance, written down because Drake would otherwise derive it from the masses of the
@@ -15,9 +15,9 @@ STIFFNESS = 2e5  # N/m
 DISSIPATION = 5.0  # s/m, Hunt-Crossley
 
 
-def wheel_friction(robot: Model) -> float:
-    """The friction coefficient of the robot's driven wheels, the largest if they differ; 0 for a robot without."""
-    wheels = {joint.child for joint in robot.joints if is_wheel(joint)}
+def wheel_friction(robot: Model, drive: Drive) -> float:
+    """The friction coefficient of the robot's driven wheels, the largest if they differ."""
+    wheels = turned_links(robot, drive.joints)
     return max((one.mu for link in robot.links if link.name in wheels for one in link.collisions), default=0.0)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -72,10 +72,12 @@ class Notice:
         if len(self._moving):
             self._boxes.append(self._sleep.boxes())
 
-    def first_sensed(self) -> dict[str, float]:
-        """When (s) each model was seen or touched first, in the order of time."""
+    def first_sensed(self, measured: Mapping[str, float]) -> dict[str, float]:
+        """When (s) each model was seen or touched first, in the order of time; `measured` is when the lidar first met it."""
         # All rows at once: looking at each in its time would cost many times as much.
         first = dict(self.first_touched)
+        for name, met in measured.items():
+            first[name] = min(met, first.get(name, math.inf))
         for name, seen in self._seen():
             first[name] = min(seen, first.get(name, math.inf))
         return dict(sorted(first.items(), key=lambda item: item[1]))

@@ -55,7 +55,7 @@ def judge_trajectory(trajectory: np.ndarray, failure: Failure) -> Judgement:
 
 
 def trajectory_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean distance between two trajectories at equal times, m; the shorter one waits at its end."""
+    """Mean distance between two trajectories at equal times, m; the shorter one (of a run that was cut) waits at its end."""
     times = np.union1d(a[:, 0], b[:, 0])
     gaps = [np.interp(times, a[:, 0], a[:, axis]) - np.interp(times, b[:, 0], b[:, axis]) for axis in (1, 2, 3)]
     return float(np.linalg.norm(gaps, axis=0).mean())

@@ -15,9 +15,9 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.robot.drive import is_wheel
+from ddenv.robot.drive import Drive
 from ddenv.robot.friction import surface, wheel_friction, world_friction
-from ddenv.robot.joints import add_joint, anchored
+from ddenv.robot.joints import add_joint, anchored, is_fixed
 from ddenv.robot.place import spatial_inertia, transform
 from ddenv.robot.shapes import drake_shapes, solid_bounds
 from ddenv.world.extent import Bounds
@@ -60,7 +60,7 @@ class Built:
     moving: dict[str, Body]
 
 
-def build(world: World, robot: Model, simulation: Simulation, motor_gain: float) -> Built:
+def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
     """The finished plant. `motor_gain` (N m s/rad) turns a wheel's speed error into torque.
 
     Raises ValueError or RuntimeError for what cannot be simulated, such as a moving link without inertia.
@@ -75,12 +75,12 @@ def build(world: World, robot: Model, simulation: Simulation, motor_gain: float)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
-    wheels = wheel_friction(robot)
+    wheels = wheel_friction(robot, drive)
     static = {model.name: _add_static(plant, model, wheels) for model in world.models}
     # The order in which moving models are added decides the order of the solver's unknowns, hence the last bits of every
     # result: it is always the file's order, with the robot first.
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
-    _add_motors(plant, robot, driver, motor_gain)
+    _add_motors(plant, robot, drive, driver, motor_gain)
     moving = {
         model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
         for model in world.models
@@ -125,13 +125,25 @@ def _add_moving(
 
 
 def _inertia(model: Model, link: Link) -> SpatialInertia:
-    if link.inertia is None:
-        raise ValueError(f"link '{link.name}' of the moving model '{model.name}' has no <inertial>")
-    return spatial_inertia(link.inertia, link.pose)
+    if link.inertia is not None:
+        return spatial_inertia(link.inertia, link.pose)
+    if not _weighs(model, link):
+        why = "has no <inertial>, nor has any that is fixed to it"
+        raise ValueError(f"link '{link.name}' of the moving model '{model.name}' {why}")
+    return SpatialInertia.Zero()
 
 
-def _add_motors(plant: MultibodyPlant, robot: Model, body: Body, gain: float) -> None:
-    for joint in filter(is_wheel, robot.joints):
+def _weighs(model: Model, link: Link) -> bool:
+    """Whether `link`, or anything that fixed joints hold to it, has a mass."""
+    together = {link.name}
+    pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
+    while new := {name for pair in pairs if pair & together for name in pair} - together:
+        together |= new
+    return any(each.inertia is not None for each in model.links if each.name in together)
+
+
+def _add_motors(plant: MultibodyPlant, robot: Model, drive: Drive, body: Body, gain: float) -> None:
+    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
         actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, body.instance), joint.effort)
         actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))
 

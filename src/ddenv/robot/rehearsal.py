@@ -160,18 +160,18 @@ class Rehearsals:
         states = [self._hold.state()[entries]]
         motions, paces = [links.observe(plant, self._plant_context, everything)], [np.zeros(len(everything))]
         calm = 0.0
-        for before, step in pairwise(self._clock.steps()):
-            simulator.AdvanceTo(step * self._clock.step)
+        for before, tick in pairwise(self._clock.ticks()):
+            simulator.AdvanceTo(tick.time)
             states.append(self._hold.state()[entries])
             if not np.isfinite(states[-1]).all():
                 raise ValueError("not finite")
-            seconds = (step - before) * self._clock.step
+            seconds = (tick.step - before.step) * self._clock.step
             motions.append(links.observe(plant, self._plant_context, everything))
             paces.append(links.pace(everything, motions[-2], motions[-1], seconds))
             rests = ((paces[-1] < SLOW) | motions[-1].below(self._floor)).all()
             calm = calm + seconds if rests else 0.0
             self._hold.apply()
-            if calm >= CALM or step * self._clock.step >= self._longest:
+            if calm >= CALM or tick.time >= self._longest:
                 break
         return Script(pile, entries, np.array(states), tuple(motions), tuple(paces), rests=calm >= CALM)
 

@@ -13,12 +13,13 @@ from ddenv.world.pose import Vector
 class RunResult:
     """One run of the robot.
 
-    `outcome` is "pass" (goal reached), "failed" or "error" (the simulation broke). `failure` is empty for a pass, "timeout"
-    or "fell" for a failure, and for an error "not-finite" or the first line of what Drake said.
+    `outcome` is "pass" (goal reached), "failed" or "error" (the simulation broke). `failure` is empty for a pass, a word of
+    `kind_of` for a failure, and for an error "not-finite" or the first line of what Drake said.
     `trajectory` has one row every 0.1 s and one at the end: t (s), x, y, z (m), qw, qx, qy, qz of the robot's first link in
     the world frame. `motions` holds the same for each dynamic model that moved.
     `first_sensed` and `first_touched` tell by name when (s) the robot first had a model in view or touched it, and when it
     first touched it; models that it never did are absent. Every model that was touched was sensed by then.
+    `cut` says that the run was ended before its time because the robot was stuck for good.
     """
 
     outcome: str
@@ -30,6 +31,7 @@ class RunResult:
     seed: int
     first_sensed: dict[str, float] = field(default_factory=dict)
     first_touched: dict[str, float] = field(default_factory=dict)
+    cut: bool = False
 
     @property
     def end_pose(self) -> tuple[float, ...]:

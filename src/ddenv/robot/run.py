@@ -10,26 +10,31 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from ddenv.robot.clock import Clock
+from ddenv.robot.autonomy import Autonomy
+from ddenv.robot.clock import Clock, Tick
 from ddenv.robot.drive import Drive
-from ddenv.robot.estimate import Estimate, advance
-from ddenv.robot.navigate import Command, Navigator
+from ddenv.robot.kinds import kind_of
 from ddenv.robot.notice import Notice
 from ddenv.robot.observe import Observer, PoseRow
+from ddenv.robot.own import ControllerFailed
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.recording import Recording
 from ddenv.robot.result import RunResult
-from ddenv.robot.sensors import SensorSuite
+from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sleep import Sleep
+from ddenv.robot.stuck import Stuck
 from ddenv.world.scenario import Scenario
 
 Progress = Callable[[float, PoseRow], None]
+# Outcome, failure, and whether the run was cut short.
+End = tuple[str, str, bool]
 
 
 class Run:
     """One run in a context that has been prepared: start poses set, removed models switched off.
 
-    `kept` are the moving models that it records; `floor` (m) is the height below which the robot has fallen out of the world.
+    `kept` are the moving models that it records; `floor` (m) is the height below which the robot has fallen out of the world. With
+    `stuck` the run ends as soon as that finds the robot stuck for good.
     """
 
     def __init__(
@@ -41,15 +46,22 @@ class Run:
         clock: Clock,
         sleep: Sleep,
         notice: Notice,
+        autonomy: Autonomy,
+        lidar: Lidar | None,
+        stuck: Stuck | None,
         floor: float,
         kept: Sequence[Body],
         seed: int,
     ) -> None:
-        self._scenario = scenario
+        self._goal = scenario.goal
+        self._skid = scenario.controller.skid
         self._drive = drive
         self._clock = clock
         self._sleep = sleep
         self._notice = notice
+        self._autonomy = autonomy
+        self._lidar = lidar
+        self._stuck = stuck
         self._floor = floor
         self._kept = kept
         self._seed = seed
@@ -57,65 +69,65 @@ class Run:
         self._motors = built.plant.get_desired_state_input_port(built.robot.instance)
         self._observer = Observer(built, drive, self._context)
         self._simulator = Simulator(built.diagram, context)
-        self._sensors = SensorSuite(scenario.sensors, seed)
-        self._navigator = Navigator(scenario.goal, scenario.controller)
         self._recording = Recording()
 
     def execute(self, progress: Progress | None) -> RunResult:
         """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is the caller's."""
         started = time.perf_counter()
-        outcome, failure, step = self._loop(progress)
-        first_sensed = self._notice.first_sensed()
+        outcome, failure, cut, seconds = self._loop(progress)
+        trajectory = self._recording.trajectory()
+        if outcome == "failed":
+            failure = kind_of(trajectory, fell=failure == "fell", arrived=self._autonomy.arrived)
         return RunResult(
             outcome=outcome,
             failure=failure,
-            trajectory=self._recording.trajectory(),
+            trajectory=trajectory,
             motions=self._recording.motions(),
-            simulated_seconds=step * self._clock.step,
+            simulated_seconds=seconds,
             wall_seconds=time.perf_counter() - started,
             seed=self._seed,
-            first_sensed=first_sensed,
+            first_sensed=self._notice.first_sensed(self._lidar.first_seen if self._lidar else {}),
             first_touched=self._notice.first_touched,
+            cut=cut,
         )
 
-    def _loop(self, progress: Progress | None) -> tuple[str, str, int]:
-        """Outcome, failure, and the step at which the run ended."""
-        truth = self._observer.truth()
-        # The robot knows where it starts.
-        estimate = Estimate(truth.x, truth.y, truth.heading)
-        step = 0
-        while True:
-            self._sleep.tick(step)
-            now, pose = step * self._clock.step, self._observer.robot()
-            end = self._end(pose, step)
-            if end is not None or step % self._clock.record_every == 0:
-                self._record(now, pose, progress)
-                self._notice.look(now, pose[:3], truth.heading)
-            if end is not None:
-                self._notice.feel(now, pose[:3])
-                return (*end, step)
-            if step % self._clock.control_every == 0:
-                if step > 0:
-                    measured = self._sensors.measure(truth)
-                    estimate = advance(
-                        estimate, measured, self._scenario.sensors, self._clock.control_every * self._clock.step
-                    )
-                self._command(self._navigator.command(estimate))
-            self._notice.feel(now, pose[:3])
-            step = self._clock.next(step)
-            problem = self._simulate(step * self._clock.step)
+    def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
+        """Outcome, failure, whether the run was cut short, and when (s) it ended."""
+        for tick in self._clock.ticks():
+            problem = self._simulate(tick.time) if tick.step else ""
             if problem:
-                return "error", problem, step
-            truth = self._observer.truth()
+                return "error", problem, False, tick.time
+            self._sleep.tick(tick.step)
+            if self._kept:
+                # What is played back has been put in its place.
+                self._observer.look()
+            pose = self._observer.robot()
+            truth = self._observer.truth(pose)
+            end = self._end(pose, tick)
+            if end is not None or tick.record:
+                self._record(tick.time, pose, progress)
+                self._notice.look(tick.time, pose[:3], truth.heading)
+            if end is None:
+                scan = self._lidar.scan(tick.time, pose, *self._sleep.poses()) if tick.lidar else None
+                self._autonomy.sense(tick, truth, scan)
+                end = self._command(tick) if tick.command else None
+            self._notice.feel(tick.time, pose[:3])
+            if end is not None:
+                return *end, tick.time
+        raise AssertionError("a clock's last tick ends the run")
 
-    def _end(self, pose: PoseRow, step: int) -> tuple[str, str] | None:
-        """Outcome and failure of a run that ends here, or None."""
-        goal = self._scenario.goal
+    def _end(self, pose: PoseRow, tick: Tick) -> End | None:
+        """How a run ends that ends here, or None."""
+        goal = self._goal
         if math.hypot(goal.x - pose[0], goal.y - pose[1]) <= goal.tolerance:
-            return "pass", ""
+            return "pass", "", False
         if pose[2] < self._floor:
-            return "failed", "fell"
-        return ("failed", "timeout") if step >= self._clock.last else None
+            return "failed", "fell", False
+        if tick.step >= self._clock.last:
+            return "failed", "", False
+        if self._stuck is not None and tick.record and self._stuck.update(tick.time, pose):
+            return "failed", "", True
+        return None
 
     def _simulate(self, until: float) -> str:
         """Simulates up to the time `until`; returns what went wrong, or ""."""
@@ -123,14 +135,19 @@ class Run:
             self._simulator.AdvanceTo(until)
         # Drake raises SystemExit where a condition of its own failed.
         except (RuntimeError, ValueError, SystemExit) as error:
-            if not self._observer.is_finite() or "nan" in str(error).lower():
+            if not self._observer.look() or "nan" in str(error).lower():
                 return "not-finite"
             return (str(error).strip() or type(error).__name__).splitlines()[0]
-        return "" if self._observer.is_finite() else "not-finite"
+        return "" if self._observer.look() else "not-finite"
 
-    def _command(self, command: Command) -> None:
-        speeds = self._drive.wheel_speeds(command, self._scenario.controller.skid)
+    def _command(self, tick: Tick) -> End | None:
+        """Turns the wheels as the controller wants; returns how the run ends if that fails."""
+        try:
+            speeds = self._drive.wheel_speeds(self._autonomy.command(tick), self._skid)
+        except ControllerFailed as failed:
+            return "error", str(failed), False
         self._motors.FixValue(self._context, np.concatenate([np.zeros_like(speeds), speeds]))
+        return None
 
     def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
         self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._kept})

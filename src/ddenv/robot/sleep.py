@@ -106,6 +106,12 @@ class Sleep:
         low, high = self._motion.low, self._motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
 
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where all links of the kept models were at the last tick: places (L, 3) m and turns (L, 3, 3)."""
+        if self._never:
+            self._look(np.arange(len(self._kept)), 0.0)
+        return self._motion.places, self._motion.turns
+
     def end(self) -> None:
         """Leaves the context without any moving model that something could touch."""
         self._presence.part([body for body, awake in zip(self._kept, self._awake, strict=True) if awake], ())

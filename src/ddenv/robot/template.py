@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 from ddenv.errors import UserError
+from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Clock
-from ddenv.robot.drive import find_drive
+from ddenv.robot.drive import Drive, find_drive, footprint
 from ddenv.robot.hold import Hold
 from ddenv.robot.notice import Notice
 from ddenv.robot.place import transform
+from ddenv.robot.own import controllers
 from ddenv.robot.plant import Body, Built, build
 from ddenv.robot.presence import Presence
+from ddenv.robot.protocol import Setup
 from ddenv.robot.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
 from ddenv.robot.run import Run
+from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.sensing.obstacles import Obstacles
+from ddenv.robot.sensing.suite import SensorSuite
 from ddenv.robot.sleep import Sleep
+from ddenv.robot.stuck import Stuck, seconds_for
 from ddenv.robot.surroundings import Surroundings
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
@@ -36,16 +44,20 @@ class Template:
     """
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
-        """Raises UserError for a robot that cannot drive, and for a world that Drake cannot simulate."""
+        """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
         self._scenario = scenario
-        self._drive = find_drive(robot)
-        self._built = _build(world, robot, scenario)
+        self._drive = find_drive(robot, scenario.robot.wheels)
+        self._controllers = controllers(scenario.controller, scenario.folder)
+        self._built = _build(world, robot, self._drive, scenario)
         self._surroundings = Surroundings.of(world, robot, self._built)
         self._names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
         self._always = self._names & frozenset(scenario.protected) | grounds
         self._floor = lowest(world) - FALL
         self._clock = Clock.of(scenario)
+        self._setup = _setup(robot, self._drive, self._clock, scenario)
+        self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
+        self._models = {model.name: model for model in world.models}
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
         self._place()
@@ -63,11 +75,13 @@ class Template:
         keep: frozenset[str],
         seed: int,
         progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        full: bool = True,
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`; protected models and grounds are always there.
 
         `progress(time, pose)` is told the simulated time (s) and the robot's x, y, z (m), qw, qx, qy, qz at each recorded
-        sample. Raises ValueError for names that the world does not have.
+        sample. A run that is not `full` ends as soon as the robot is stuck for good. Raises ValueError for names that the world
+        does not have.
         """
         unknown = keep - self._names
         if unknown:
@@ -77,6 +91,7 @@ class Template:
         present = self._names - removed
         with self._presence.without(removed), self._asleep(kept, present) as sleep:
             notice = Notice(self._surroundings, self._scenario.sensors, self._plant_context, sleep, kept, present)
+            suite = SensorSuite(self._scenario.sensors, seed)
             run = Run(
                 self._built,
                 self._context,
@@ -85,11 +100,27 @@ class Template:
                 self._clock,
                 sleep,
                 notice,
+                self._autonomy(suite, seed),
+                self._lidar(present, kept, suite),
+                None if full else Stuck(seconds_for(self._scenario.controller)),
                 self._floor,
                 kept,
                 seed,
             )
             return run.execute(progress)
+
+    def _autonomy(self, suite: SensorSuite, seed: int) -> Autonomy:
+        scenario, setup = self._scenario, replace(self._setup, seed=seed)
+        controller = self._controllers(setup)
+        return Autonomy(
+            scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
+        )
+
+    def _lidar(self, present: frozenset[str], kept: Sequence[Body], suite: SensorSuite) -> Lidar | None:
+        settings = self._scenario.sensors.lidar
+        if settings is None or self._obstacles is None:
+            return None
+        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
 
     @contextmanager
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[Sleep]:
@@ -122,11 +153,33 @@ class Template:
                     plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, link, transform(origin @ pose))
 
 
-def _build(world: World, robot: Model, scenario: Scenario) -> Built:
+def _setup(robot: Model, drive: Drive, clock: Clock, scenario: Scenario) -> Setup:
+    settings, goal, spawn = scenario.controller, scenario.goal, scenario.robot.spawn
+    return Setup(
+        goal=(goal.x, goal.y),
+        tolerance=goal.tolerance,
+        start=(spawn.x, spawn.y, spawn.yaw),
+        joints=drive.joints,
+        left=drive.left,
+        radius=drive.radius,
+        track=drive.track,
+        footprint=footprint(robot),
+        period=clock.command_period,
+        speed=settings.speed,
+        acceleration=settings.acceleration,
+        turn_rate=settings.turn_rate,
+        settings=settings,
+        options=settings.options,
+    )
+
+
+def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
     try:
         spawn, goal = scenario.robot.spawn, scenario.goal
         places = [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
-        built = build(with_ground_boxes(world, places), robot, scenario.simulation, scenario.controller.motor_gain)
+        built = build(
+            with_ground_boxes(world, places), robot, drive, scenario.simulation, scenario.controller.motor_gain
+        )
     except (ValueError, RuntimeError, SystemExit) as error:
         raise UserError(f"{world.path}: cannot be simulated: {error}") from error
     if not built.robot.base.is_floating_base_body():

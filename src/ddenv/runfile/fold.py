@@ -4,10 +4,10 @@ The kinds of events, with their data (models are numbers into the run's `element
 
     created              scenario {...}, elements [names]
     engine_started       pid, jobs
-    test_started         test, phase, round, candidate, run, seed
+    test_started         test, phase, round, candidate, run, seed; where phase is "confirm" also without: model or null
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
-                         first_sensed [[model, s]], first_touched [[model, s]] (both absent in files of version 1);
-                         trajectories beside it
+                         first_sensed [[model, s]], first_touched [[model, s]] (both absent in files of version 1),
+                         cut (absent before version 3); trajectories beside it
     test_lost            test: it was running when the engine died
     baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
     round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]]
@@ -16,6 +16,7 @@ The kinds of events, with their data (models are numbers into the run's `element
     decided              candidate, decision: accept or reject
     reduced              candidate, environment [..], evidence_test
     round_finished
+    confirm_started      the rounds are over, and what is left is run in full
     paused / resumed
     accept_mode          mode
     vetoed               candidate, verdict: vetoed, or rejected if the same models were rejected in an earlier round
@@ -76,6 +77,10 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
     }
 
 
+def _confirm_started(_: RunState, __: Data, ___: float) -> Changes:
+    return {"confirming": True}
+
+
 def _paused(state: RunState, _: Data, __: float) -> Changes:
     return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
 
@@ -132,6 +137,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "decided": fold_rounds.decided,
     "reduced": fold_rounds.reduced,
     "round_finished": fold_rounds.round_finished,
+    "confirm_started": _confirm_started,
     "paused": _paused,
     "resumed": _resumed,
     "accept_mode": _accept_mode,

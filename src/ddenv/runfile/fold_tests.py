@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ddenv.runfile.failures import as_now
 from ddenv.runfile.fold_rounds import tried, with_candidate
 from ddenv.runfile.state import Baseline, Point, RunState, Test
-from ddenv.runfile.values import Changes, Data, moments, number, vector
+from ddenv.runfile.values import Changes, Data, moments, names, number, vector
 
 
 def test_started(state: RunState, data: Data, _: float) -> Changes:
     round, candidate = data["round"], data["candidate"]
-    test = Test(int(data["test"]), str(data["phase"]), round, candidate, int(data["run"]), int(data["seed"]))
+    without = data.get("without")
+    test = Test(
+        id=int(data["test"]),
+        phase=str(data["phase"]),
+        round=round,
+        candidate=candidate,
+        run=int(data["run"]),
+        seed=int(data["seed"]),
+        without=None if without is None else names(state.elements, [without])[0],
+    )
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
     changes = {"tests": state.tests.added(test), **_counts(state, None, test)}
@@ -27,13 +37,14 @@ def test_finished(state: RunState, data: Data, _: float) -> Changes:
     distance, pose = data["distance"], data["end_pose"]
     values = {
         "outcome": str(data["outcome"]),
-        "failure": str(data["failure"]),
+        "failure": as_now(str(data["failure"])),
         "distance": None if distance is None else number(distance),
         "end_pose": None if pose is None else vector(pose, 7),
         "simulated_seconds": number(data["simulated_seconds"]),
         "wall_seconds": number(data["wall_seconds"]),
         "first_sensed": moments(state.elements, data.get("first_sensed", ())),
         "first_touched": moments(state.elements, data.get("first_touched", ())),
+        "cut": bool(data.get("cut", False)),
     }
     return _with_test(state, int(data["test"]), values)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any
 
 from ddenv.runfile.persistent import PersistentTuple
@@ -18,11 +18,12 @@ _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 class Test:
     """One run of the robot.
 
-    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline" or
-    "round". `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's
-    end the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal.
-    `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the simulated time it
-    was first so, s; empty in files of version 1.
+    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
+    "round" or "confirm": a full run of what is left, or of that without the model `without`. `run` is i of seed = base + i: above
+    0 in a round it is a re-run (deflaking). `distance` is how far from f's end the robot ended, m. `end_pose` is x, y, z m,
+    qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see `ddenv.runfile.failures`. `first_sensed` and
+    `first_touched` are the models that the robot sensed or touched, each with the simulated time it was first so, s; empty in files
+    of version 1. `cut` says that it was ended before its time because the robot was stuck for good.
     """
 
     id: int
@@ -39,6 +40,8 @@ class Test:
     wall_seconds: float = 0.0
     first_sensed: tuple[tuple[str, float], ...] = ()
     first_touched: tuple[tuple[str, float], ...] = ()
+    cut: bool = False
+    without: str | None = None
 
     @property
     def is_finished(self) -> bool:
@@ -157,6 +160,7 @@ class RunState:
     stopped    the engine was stopped; it can be resumed
     failed     the engine could not go on: `reason` says why
 
+    `confirming` says that the rounds are over, and that what is left is run in full because tests were cut.
     `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how
     long engines have worked on it up to their ends, s; `started_at` (Unix time, s) is set while one works.
     """
@@ -176,6 +180,7 @@ class RunState:
     tests: PersistentTuple[Test] = field(default_factory=PersistentTuple)
     tally: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TALLY, 0))
     deflake_runs: int = 0
+    confirming: bool = False
     history: tuple[Point, ...] = ()
     evidence_test: int | None = None
     minimal: bool = False
@@ -193,6 +198,24 @@ class RunState:
         return state
 
     @property
+    def failure(self) -> str:
+        """How the robot failed in f, in a word; "" where that is not known."""
+        if self.baseline is None or not 0 < self.baseline.failure_test <= len(self.tests):
+            return ""
+        return self.tests[self.baseline.failure_test - 1].failure
+
+    @property
+    def other_failures(self) -> int:
+        """How many baseline runs failed, but not as f did; 0 until f is fixed."""
+        baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
+        return sum(test.outcome == "other" for test in baseline)
+
+    @property
+    def cut_tests(self) -> int:
+        """How many tests were ended before their time."""
+        return sum(test.cut for test in self.tests)
+
+    @property
     def finished_tests(self) -> tuple[Test, ...]:
         """Gathered at each call: ask for `tests_done` where their number is enough."""
         return tuple(test for test in self.tests if test.is_finished)
@@ -201,6 +224,12 @@ class RunState:
     def tests_done(self) -> int:
         """How many tests are finished."""
         return len(self.tests) - sum(self.tally[outcome] for outcome in UNFINISHED)
+
+    @property
+    def confirm_tests(self) -> tuple[Test, ...]:
+        """The full runs of what is left, in the order they were started."""
+        # Nothing but them is started after the rounds.
+        return tuple(takewhile(lambda test: test.phase == "confirm", reversed(self.tests)))[::-1]
 
     @property
     def running_tests(self) -> tuple[Test, ...]:

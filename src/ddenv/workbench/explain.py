@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ddenv.runfile.failures import DEEDS, deed
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.workbench.listings import DDENV, Lines, Step, is_sweep, listing
 from ddenv.workbench.poll import Snapshot
@@ -49,6 +50,8 @@ def _happening(snapshot: Snapshot) -> Happening:
         return None, STANDING[snapshot.status](state)
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
+    if state.confirming:
+        return _with_pause(state, ("returned", _confirming(snapshot)))
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(state, options)))
     if state.waiting_candidate is not None:
@@ -61,9 +64,10 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
     base = state.baseline
     if base is None:
         return ""
+    others = f"; {count(state.other_failures, 'run')} failed in another way" if state.other_failures else ""
     sentence = (
-        f"Baseline: {base.failures} of {count(base.runs, 'run')} failed "
-        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)})."
+        f"Baseline: the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')} "
+        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){others}."
     )
     if base.rate >= 1.0:
         return sentence
@@ -148,7 +152,8 @@ def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
     test = _last(state, candidate, "similar")
     if test is None or not metres(test.distance, 2):
         return "the robot failed as in f."
-    return f"the robot ended {metres(test.distance, 2)} from f's end (similar is up to {options.epsilon:g} m)."
+    did = deed(test.failure) if test.failure in DEEDS else "ended"
+    return f"the robot {did} {metres(test.distance, 2)} from f's end (similar is up to {options.epsilon:g} m)."
 
 
 def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
@@ -201,13 +206,28 @@ def _why_again(before: Test | None) -> str:
         return "another seed is tried at the same time."
     reasons = {
         "pass": "the goal was reached.",
-        "other": f"the robot failed elsewhere, {metres(before.distance)} from f's end."
-        if metres(before.distance)
-        else "the robot failed, but not as in f.",
+        "other": _otherwise(before),
         "error": "the simulation broke.",
         "timeout": "the test took too long on the clock.",
     }
     return f"last time {reasons.get(before.outcome, 'f was not seen.')}"
+
+
+def _otherwise(test: Test) -> str:
+    away = metres(test.distance)
+    if not away:
+        return f"the robot {deed(test.failure)}, but not as in f."
+    return f"the robot {deed(test.failure)}{'' if test.failure in DEEDS else ' elsewhere,'} {away} from f's end."
+
+
+def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
+    """The rounds are over, and what they rest on is made sure of."""
+    first = "Confirming what is left with full runs: tests were ended as soon as the robot was stuck for good."
+    running = [test for test in snapshot.running if test.phase == "confirm"]
+    if not running:
+        return (first,)
+    what = f"all that is left but {plain(running[0].without)}" if running[0].without else "all that is left"
+    return (first, f"Now run {running[0].run + 1} of {what}.")
 
 
 def _reduced(state: RunState, current: Round, options: Settings) -> Happening:
@@ -236,8 +256,9 @@ def _finished(state: RunState) -> Happening:
         return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
     single = len(state.environment) == 1
     proof = f"without {'it' if single else 'any one of them'} f is not seen again"
+    sure = "; full runs confirm it" if state.confirming else ""
     return "returned", (
-        f"Minimal: {kept} left, and {proof}.",
+        f"Minimal: {kept} left, and {proof}{sure}.",
         f"Kept: {_names(state)}.",
         baseline_sentence(state, options.iterations),
     )

@@ -38,6 +38,7 @@ PLACES = (
     Field("goal_x", "goal x m", float, "where the robot has to go, m"),
     Field("goal_y", "goal y m", float, "where the robot has to go, m"),
 )
+EARLY_STOP = {"off": False, "on": True}
 NAME = Field("name", "run name", str, "what the run is called: a file in the runs folder")
 
 

@@ -19,7 +19,7 @@ class Settings:
     growth: str = "paper"
     iterations: int = 3
     baseline_runs: int = 10
-    epsilon: float = 0.5
+    epsilon: float = 0.33
     timeout: float = 45.0
 
 

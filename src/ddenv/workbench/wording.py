@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ddenv.runfile.failures import DEEDS
+from ddenv.runfile.state import Test
+
 # Every status and verdict has a sign of its own, so that nothing is told by colour alone.
 STATUS = {
     "created": ("○", "not started"),
     "starting": ("◌", "engine starts"),
     "baseline": ("▶", "baseline"),
     "running": ("▶", "running"),
+    "confirming": ("▶", "confirming"),
     "paused": ("‖", "paused"),
     "waiting": ("?", "waiting"),
     "finished": ("■", "finished"),
@@ -33,6 +37,12 @@ VERDICT = {
     "vetoed": "⊘ vetoed",
     "rejected": "✗ rejected",
 }
+
+
+def outcome(test: Test) -> str:
+    """How a test ended, with the failure's own word where there is one."""
+    words = OUTCOME.get(test.outcome, "")
+    return f"{words[0]} {test.failure}" if words and test.failure in DEEDS else words
 
 
 def plain(text: Any) -> str:

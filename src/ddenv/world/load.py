@@ -51,7 +51,8 @@ def load_scenario(path: Path) -> Scenario:
     robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
     model_path = tuple(folder / each for each in scenario.reading.model_path)
     reading = scenario.reading.model_copy(update={"model_path": model_path})
-    return scenario.model_copy(update={"world": folder / scenario.world, "robot": robot, "reading": reading})
+    places = {"world": folder / scenario.world, "folder": folder / scenario.folder}
+    return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
 
 
 def validate(data: dict[str, Any], where: str) -> Scenario:

@@ -1,4 +1,4 @@
-"""Reads an SDF world or model file into plain data (`ddenv.world.model`).
+"""Reads an SDF world or model file, or a URDF robot, into plain data (`ddenv.world.model`).
 
 We read SDF ourselves because Drake's parser refuses many files that simulators accept, and drops parts of others without
 a word. What this reader replaces or ignores it notes (`World.notes`); what it does not understand it refuses with the file,
@@ -22,7 +22,8 @@ from ddenv.world.sdf.context import Context, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.state import Saved, read_state
 from ddenv.world.sdf.unread import note_unread
-from ddenv.world.sdf.xml import Element, complain, name_of, numbers
+from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
+from ddenv.world.urdf.robot import ROOT, massless, to_sdf, without_mass
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # What would put models into the world that this reader does not see.
@@ -55,23 +56,30 @@ def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
 
 
 def read_model(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None] | None = None) -> Model:
-    """The one model in the SDF file `path`, such as a robot. Raises UserError."""
+    """The one model in the SDF or URDF file `path`, such as a robot. Raises UserError."""
     return parse_model(read_bytes(path), path, reading, disk_of(path, reading, tell))
 
 
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, or else from the disk."""
     context = Context(resources or disk_of(path, reading, None), reading)
-    root = sdf_root(text, path)
+    urdf = _urdf_root(text, path)
+    root = sdf_root(text, path) if urdf is None else to_sdf(urdf, context)
     scope = Scope(root, (path,), context)
     if len(scope.parts) != 1:
         raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")
     try:
         model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
         context.complain_of_missing()
-        return model
+        return model if urdf is None else without_mass(model, massless(urdf))
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
+
+
+def _urdf_root(text: bytes, path: Path) -> Element | None:
+    """The `<robot>` of a URDF file; None for any other file."""
+    root = parse(text, path) if f"<{ROOT}".encode() in text else None
+    return root if root is not None and root.tag == ROOT else None
 
 
 def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) -> Disk:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -50,11 +50,22 @@ class Reading(Section):
 PLAIN = Reading()
 
 
+class Wheels(Section):
+    """The joints of the robot's driven wheels by name, those on its left and those on its right."""
+
+    left: tuple[str, ...] = Field(min_length=1)
+    right: tuple[str, ...] = Field(min_length=1)
+
+
 class Robot(Section):
-    """`model` is an SDF file, relative to the scenario's folder."""
+    """`model` is an SDF or URDF file, relative to the scenario's folder.
+
+    Without `wheels`, every joint that turns about one axis is a driven wheel, on the side of the model's x axis where it is.
+    """
 
     model: Path
     spawn: Spawn
+    wheels: Wheels | None = None
 
 
 class Goal(Section):
@@ -65,16 +76,35 @@ class Goal(Section):
     tolerance: Positive = 0.5
 
 
-class Sensors(Section):
-    """Standard deviations of what is wrong with the robot's measurements, and the view of its range sensor.
+class Lidar(Section):
+    """A range sensor that turns about the robot's vertical; by default a SICK LMS1xx as a Husky carries it.
 
-    The noise is drawn anew at every reading, a `*_bias` once in a run.
+    `x`, `y`, `z` (m) are its place in the frame of the robot's first link. Beams are spread evenly over `angle`, the middle one
+    straight ahead.
+    """
+
+    rate: Positive = Field(10.0, description="scans a second, Hz")
+    beams: int = Field(541, ge=2, le=10_000)
+    angle: Positive = Field(math.radians(270), le=math.tau, description="field of view, rad")
+    range: Positive = Field(20.0, description="nothing beyond is measured, m")
+    nearest: NotNegative = Field(0.05, description="nothing nearer is measured, m")
+    noise: NotNegative = Field(0.01, description="standard deviation of a range, m")
+    x: Finite = 0.30
+    y: Finite = 0.0
+    z: Finite = 0.36
+
+
+class Sensors(Section):
+    """Standard deviations of what is wrong with the robot's measurements, how often it measures, and its range sensor.
+
+    The noise is drawn anew at every reading, a `*_bias` once in a run. A period is rounded to whole time steps.
     """
 
     compass: NotNegative = Field(0.02, description="compass heading, rad")
     compass_bias: NotNegative = Field(0.0, description="constant error of the compass, rad")
     gyro: NotNegative = Field(0.01, description="IMU yaw rate, rad/s")
     gyro_bias: NotNegative = Field(0.0, description="constant error of the yaw rate, rad/s")
+    tilt: NotNegative = Field(0.005, description="IMU roll and pitch, rad")
     odometry: NotNegative = Field(0.02, description="wheel speeds, as a fraction of the speed")
     odometry_bias: NotNegative = Field(
         0.0, description="constant error of the wheel speeds, as a fraction of the speed"
@@ -83,26 +113,53 @@ class Sensors(Section):
         0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
     )
     view_angle: Positive = Field(math.tau, le=math.tau, description="field of view about its heading, rad")
+    compass_rate: Positive = Field(10.0, description="readings a second, Hz")
+    imu_rate: Positive = Field(20.0, description="readings a second, Hz")
+    odometry_rate: Positive = Field(20.0, description="readings a second, Hz")
+    lidar: Lidar | None = Field(None, description="a robot without one is blind")
+
+
+class Planner(Section):
+    """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees rolls along with the robot."""
+
+    size: Positive = Field(12.0, le=100, description="length and width of the map, m")
+    resolution: Positive = Field(0.1, description="of the map, m")
+    padding: NotNegative = Field(0.05, description="kept free around the robot, m")
+    inflation: NotNegative = Field(0.6, description="how far from obstacles they still cost, m")
+    look_ahead: Positive = Field(0.8, description="how far ahead on its plan the robot aims, m")
+    replan: Positive = Field(2.0, description="longest time between two plans, s")
+    patience: Positive = Field(4.0, description="time without progress before the robot tries to recover, s")
+    recoveries: int = Field(6, ge=0, description="attempts to recover in a row before the robot gives up")
+    lowest: Finite = Field(0.1, description="what is seen lower than this above where the robot stands is no obstacle, m")
 
 
 class Controller(Section):
-    """Go-to-goal driving at a fixed period."""
+    """Who drives the robot, at a fixed period, and within which limits.
 
+    `use` is `straight` (to the goal in a straight line), `costmap` (around what the lidar sees, see `planner`), or your own
+    `module:Class`, whose module is searched in the scenario's folder first and which is given `options`.
+    """
+
+    use: str = Field("straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
+    options: dict[str, Any] = {}
     period: Positive = Field(0.05, description="time between two commands, s; a whole number of time steps")
     speed: Positive = Field(1.0, description="greatest forward speed, m/s")
     acceleration: Positive = Field(1.0, description="greatest growth of the forward speed, m/s^2")
     turn_rate: Positive = Field(1.0, description="greatest commanded turn rate, rad/s")
     heading_gain: Positive = Field(1.5, description="turn rate for an error of the heading, 1/s")
-    skid: Positive = Field(0.48, le=1, description="part of a commanded turn that a skid-steered robot carries out")
+    skid: Positive = Field(0.48, le=1, description="part of a commanded turn that is carried out; 1 without skidding")
     motor_gain: Positive = Field(30.0, description="wheel torque for an error of its speed, N m s/rad")
+    planner: Planner = Planner()
+    answer_within: Positive = Field(1.0, description="real time that an own controller has for a command, s")
 
 
 class FailureSpec(Section):
     """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
 
-    epsilon: Positive = Field(0.5, description="greatest distance from the end of f, m")
+    epsilon: Positive = Field(0.33, description="greatest distance from the end of f, m")
     timeout: Positive = Field(45.0, description="simulated time the robot has, s")
     similarity: Literal["end-pose", "trajectory"] = "end-pose"
+    early_stop: bool = Field(False, description="ends a run when the robot is stuck for good")
 
 
 class Reduction(Section):
@@ -134,17 +191,32 @@ class Simulation(Section):
     wall_timeout: Positive = 120.0
 
 
+class Oracle(Section):
+    """A program that runs the robot in place of Drake: any simulator.
+
+    `command` is started in the scenario's folder, without a shell; `{world}` stands for an SDF file, `{seed}` for a number and
+    `{log}` for the file of its pose log (without it, what the command prints).
+    """
+
+    command: str = Field(min_length=1)
+
+
 class Scenario(Section):
-    """Everything one reduction needs to know. `world` is an SDF file, relative to the scenario's folder."""
+    """Everything one reduction needs to know. `world` is an SDF file, relative to the scenario's folder.
+
+    `folder` is where an own controller's module and an oracle's command are found, by default the scenario's folder.
+    """
 
     name: str = Field(min_length=1, max_length=80)
     description: str = ""
     world: Path
+    folder: Path = Path()
     reading: Reading = PLAIN
     robot: Robot
     goal: Goal
     sensors: Sensors = Sensors()
     controller: Controller = Controller()
+    oracle: Oracle | None = Field(None, description="another simulator than Drake")
     failure: FailureSpec = FailureSpec()
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()

@@ -1,4 +1,4 @@
-"""The table of this round's candidates, or of the baseline's runs before the first round."""
+"""The table of this round's candidates, of the baseline's runs before the first round, or of the full runs after the last."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from textual.widgets import DataTable
 from ddenv.runfile.state import Candidate, Test
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.settings import settings
-from ddenv.workbench.wording import OUTCOME, VERDICT, metres, plain
+from ddenv.workbench.wording import VERDICT, metres, outcome, plain, shorten
 
 # Name, width in cells with the space between columns, and whether it stays when there is little room.
 COLUMNS = (
     ("#", 3, True),
-    ("candidate", 12, True),
+    ("candidate", 11, True),
     ("models", 6, True),
     ("distance", 10, False),
     ("tests", 7, True),
-    ("verdict", 14, True),
+    ("verdict", 15, True),
 )
+# Of a model's name so many letters, with what stands before it.
+NAME = 10
 # By row key, then by column.
 Rows = dict[str, dict[str, str]]
 RIGHT = ("models", "distance", "tests")
@@ -69,7 +71,11 @@ class Candidates(DataTable):
         return self._round[row] if 0 <= row < len(self._round) else None
 
     def show(self, snapshot: Snapshot) -> None:
-        current = snapshot.state.round
+        state, current = snapshot.state, snapshot.state.round
+        if state.confirming and not state.ended:
+            self._round = ()
+            self._fill(("confirm",), _confirm(snapshot))
+            return
         self._round = current.candidates if current else ()
         rows = _candidates(snapshot) if current else _baseline(snapshot)
         self._fill(("round", current.number) if current else ("baseline",), rows)
@@ -176,11 +182,27 @@ def _seconds(snapshot: Snapshot, test: Test) -> str:
 def _baseline(snapshot: Snapshot) -> Rows:
     rows = {}
     for test in snapshot.state.tests:
-        running = test.outcome == "running" and snapshot.engine == "alive"
-        verdict = f"▶{_seconds(snapshot, test)}" if running else OUTCOME.get(test.outcome, "")
         models = str(len(snapshot.state.elements))
-        rows[f"t{test.id}"] = _row(str(test.id), f"run {test.run + 1}", models, metres(test.distance), "", verdict)
+        words = f"run {test.run + 1}", models, metres(test.distance), "", _ended(snapshot, test)
+        rows[f"t{test.id}"] = _row(str(test.id), *words)
     return rows
+
+
+def _confirm(snapshot: Snapshot) -> Rows:
+    rows = {}
+    left = len(snapshot.state.environment)
+    for number, test in enumerate(snapshot.state.confirm_tests, start=1):
+        name = "all left" if test.without is None else f"- {plain(test.without)}"
+        models, run = left - (test.without is not None), f"run {test.run + 1}"
+        rows[f"t{test.id}"] = _row(
+            str(number), shorten(name, NAME), str(models), metres(test.distance), run, _ended(snapshot, test)
+        )
+    return rows
+
+
+def _ended(snapshot: Snapshot, test: Test) -> str:
+    running = test.outcome == "running" and snapshot.engine == "alive"
+    return f"▶{_seconds(snapshot, test)}" if running else outcome(test)
 
 
 def _row(*words: str) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 from textual import on
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Reduction, Scenario
 
 MODES = ("automatic", "ask")
+EARLY_STOP = "on: a test ends when the robot is stuck for good; full runs confirm what is left"
 MARK = "✗ "
 METHOD: dict[Kind, str] = {
     "algorithm": "how the environment is searched",
@@ -60,6 +61,8 @@ class OptionsForm(Vertical):
             with Grid(classes="grid"):
                 for field in form.OPTIONS:
                     yield from _field(field)
+                yield Label("early stop", markup=False)
+                yield _select("early-stop", tuple(form.EARLY_STOP), EARLY_STOP)
             with Grid(id="places", classes="grid"):
                 for field in form.PLACES:
                     yield from _field(field)
@@ -77,10 +80,12 @@ class OptionsForm(Vertical):
         self.ask_for_places(False)
 
     @property
-    def method(self) -> dict[str, str]:
-        """The chosen algorithm and pair, by the scenario's keys."""
+    def method(self) -> dict[str, Any]:
+        """The chosen algorithm and pair, and whether tests may end early, by the scenario's keys."""
         names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
-        return {"algorithm": names["algorithm"], "pair": f"{names['partitioning']}/{names['prioritization']}"}
+        pair = f"{names['partitioning']}/{names['prioritization']}"
+        early = form.EARLY_STOP[str(self.query_one("#early-stop", Select).value)]
+        return {"algorithm": names["algorithm"], "pair": pair, "early_stop": early}
 
     @property
     def accept_mode(self) -> str:
@@ -112,6 +117,8 @@ class OptionsForm(Vertical):
             field = self.query_one(f"#{id}", Input)
             field.value = text
             field.remove_class("-wrong")
+        early = scenario.failure.early_stop
+        self.query_one("#early-stop", Select).value = next(word for word, on in form.EARLY_STOP.items() if on is early)
         self._show_method(scenario.reduction)
 
     def _show_method(self, reduction: Reduction) -> None:

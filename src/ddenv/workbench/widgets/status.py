@@ -74,7 +74,8 @@ class Status(Line):
     def facts(self, width: int) -> tuple[tuple[str, str], ...]:
         """(name, text) in the order of the screen."""
         snapshot = self._snapshot
-        sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))
+        status = "confirming" if snapshot.status == "running" and snapshot.state.confirming else snapshot.status
+        sign, word = STATUS.get(status, ("·", status))
         mode = "accept: ask" if snapshot.state.accept_mode == "ask" else ""
         facts = (
             ("state", f"{sign} {word}"),

@@ -1,0 +1,124 @@
+"""Runs the robot in random parts of a world, each seed twice: to the end, and ended early where it is stuck for good.
+
+    python benchmarks/early_stop.py [--scenario ditch] [--environments N] [--seeds S] [--jobs N]
+
+f is fixed from the scenario's baseline, as a reduction does it. A verdict differs where early stop makes another outcome of a run:
+similar, other or pass. The parts are of all sizes, from a single model to all but one.
+"""
+
+import argparse
+import multiprocessing
+import os
+import random
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ddenv.engine.baseline import fix_failure
+from ddenv.launch.scenarios import load_parts
+from ddenv.reduction.statistics import wilson_interval
+from ddenv.robot.oracle import Failure, judge
+from ddenv.robot.result import RunResult
+from ddenv.robot.template import Template
+from ddenv.runfile.state import Test
+from ddenv.world.load import find_scenario, load_scenario
+from ddenv.world.scenario import Scenario
+
+Asked = tuple[frozenset[str], int]
+
+
+@dataclass(frozen=True)
+class Both:
+    """The same test to its end and with early stop."""
+
+    full: RunResult
+    early: RunResult
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--scenario", default="ditch", help="a bundled name or a YAML file")
+    parser.add_argument("--environments", type=int, default=100, help="random parts of the world")
+    parser.add_argument("--seeds", type=int, default=4, help="runs of each part")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args()
+    scenario = load_scenario(find_scenario(options.scenario))
+    world, _ = load_parts(scenario)
+    elements = world.elements(frozenset(scenario.protected))
+    asked = tests(elements, options.environments, options.seeds, scenario.reduction.seed)
+    whole = [(frozenset(elements), scenario.reduction.seed + run) for run in range(scenario.reduction.baseline_runs)]
+    with multiprocessing.get_context("spawn").Pool(options.jobs, prepare, (scenario,)) as pool:
+        failure = fixed(scenario, pool.map(full_run, whole))
+        pairs = list(pool.imap_unordered(both_runs, asked))
+    print(
+        "| scenario | tests | ended early | verdicts that differ | at most (95 %) | simulated time, s | wall time, s |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    print(row(scenario.name, pairs, failure))
+    for pair in pairs:
+        if differs(pair, failure):
+            print(f"differs: {words(pair.early, failure)}, in full {words(pair.full, failure)}")
+
+
+def tests(elements: tuple[str, ...], environments: int, seeds: int, first: int) -> list[Asked]:
+    """Random parts of all sizes, each with so many seeds from `first` on."""
+    chance = random.Random(0)
+    parts = [frozenset(chance.sample(elements, chance.randrange(1, len(elements)))) for _ in range(environments)]
+    return [(part, first + run) for part in parts for run in range(seeds)]
+
+
+def prepare(scenario: Scenario) -> None:
+    """Builds the world once in each process."""
+    global _template
+    _template = Template(*load_parts(scenario), scenario)
+
+
+def full_run(asked: Asked) -> RunResult:
+    return _template.run(*asked, full=True)
+
+
+def both_runs(asked: Asked) -> Both:
+    return Both(_template.run(*asked, full=True), _template.run(*asked, full=False))
+
+
+def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
+    """f as the engine fixes it from the runs of the whole world."""
+    ran = [
+        Test(number, "baseline", None, None, number, result.seed, result.outcome, end_pose=result.end_pose)
+        for number, result in enumerate(results)
+    ]
+    trajectories = {number: result.trajectory for number, result in enumerate(results)}
+    spec = scenario.failure
+    found = fix_failure(ran, trajectories, spec, scenario.reduction.iterations)
+    if isinstance(found, str):
+        raise SystemExit(found)
+    return Failure(found["position"], trajectories[found["failure_test"]], spec.epsilon, spec.similarity)
+
+
+def differs(pair: Both, failure: Failure) -> bool:
+    """Whether early stop makes another outcome of it, with either similarity."""
+    ways = [replace(failure, similarity=similarity) for similarity in ("end-pose", "trajectory")]
+    return any(judge(pair.full, way).outcome != judge(pair.early, way).outcome for way in ways)
+
+
+def words(result: RunResult, failure: Failure) -> str:
+    found = judge(result, failure)
+    return f"{found.outcome} {result.failure} {found.distance:.2f} m from f after {result.simulated_seconds:.1f} s"
+
+
+def row(name: str, pairs: list[Both], failure: Failure) -> str:
+    wrong = sum(differs(pair, failure) for pair in pairs)
+    cut = sum(pair.early.cut for pair in pairs)
+    most = f"{wilson_interval(wrong, cut)[1]:.1%} of those ended early" if cut else "-"
+    times = [saved(pairs, "simulated_seconds"), saved(pairs, "wall_seconds")]
+    return f"| {name} | {len(pairs)} | {cut} | {wrong} | {most} | {' | '.join(times)} |"
+
+
+def saved(pairs: list[Both], what: str) -> str:
+    """Time of all full runs, of all that may end early, and how much less that is."""
+    full, early = (np.sum([getattr(getattr(pair, kind), what) for pair in pairs]) for kind in ("full", "early"))
+    return f"{full:.0f} -> {early:.0f} ({1 - early / full:.0%} less)"
+
+
+if __name__ == "__main__":
+    main()

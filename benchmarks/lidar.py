@@ -1,0 +1,120 @@
+"""How long one scan of the lidar takes, on a drive across worlds of simple shapes; no simulator is needed for that.
+
+python benchmarks/lidar.py
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.sensing.obstacles import Obstacles
+from ddenv.world import scenario
+from ddenv.world.model import Box, Collision, Cylinder, Link, Model, Plane, Shape, World
+from ddenv.world.pose import Pose
+
+SCANS = 300
+REPEATS = 5
+# How high the robot's first link is on flat ground, and how far it pitches and rolls on its way, m and rad.
+HEIGHT = 0.13
+TILT = 0.03
+# How far it drives, m.
+WAY = 8.0
+
+
+def model(name: str, shape: Shape, pose: Pose, static: bool = True) -> Model:
+    """One shape."""
+    link = Link("link", pose, None, (Collision("collision", shape, pose, 1.0),), ())
+    return Model(name, pose, static, (link,), (), (), 1)
+
+
+def ground() -> Model:
+    return model("ground", Plane((100.0, 100.0)), Pose())
+
+
+def around(random: np.random.Generator, nearest: float, farthest: float) -> tuple[float, float]:
+    """A place so far from the middle of the way."""
+    distance, angle = random.uniform(nearest, farthest), random.uniform(-math.pi, math.pi)
+    return WAY / 2 + distance * math.cos(angle), distance * math.sin(angle)
+
+
+def barrels(random: np.random.Generator) -> tuple[Model, ...]:
+    """Ten barrels, and fourteen patches on the ground that are no obstacles."""
+    upright = [Pose((*around(random, 2.0, 9.0), 0.5)) for _ in range(10)]
+    flat = [Pose((*around(random, 0.0, 9.0), 0.01)) for _ in range(14)]
+    return (
+        ground(),
+        *(model(f"barrel {number}", Cylinder(0.3, 1.0), pose) for number, pose in enumerate(upright)),
+        *(model(f"patch {number}", Box((3.0, 3.0, 0.02)), pose) for number, pose in enumerate(flat)),
+    )
+
+
+def boards(random: np.random.Generator) -> tuple[Model, ...]:
+    """32 boards in all directions that can move, and three walls."""
+    places = [(*around(random, 1.0, 6.0), random.uniform(0.2, 0.8)) for _ in range(32)]
+    turns = random.uniform(-math.pi, math.pi, (32, 3))
+    poses = [Pose.from_rpy(*place, *turn) for place, turn in zip(places, turns, strict=True)]
+    walls = [Pose((WAY / 2, y, 1.0)) for y in (-7.0, 7.0, 9.0)]
+    return (
+        ground(),
+        *(model(f"board {number}", Box((1.2, 0.14, 0.03)), pose, static=False) for number, pose in enumerate(poses)),
+        *(model(f"wall {number}", Box((20.0, 0.2, 2.0)), pose) for number, pose in enumerate(walls)),
+    )
+
+
+def boxes(random: np.random.Generator, count: int = 200) -> tuple[Model, ...]:
+    """Boxes on the ground all around."""
+    poses = [Pose.from_rpy(*around(random, 1.5, 12.0), 0.4, 0, 0, random.uniform(0, math.pi)) for _ in range(count)]
+    sizes = random.uniform(0.4, 1.0, (count, 2))
+    return (
+        ground(),
+        *(
+            model(f"box {number}", Box((*size, 0.8)), pose)
+            for number, (size, pose) in enumerate(zip(sizes, poses, strict=True))
+        ),
+    )
+
+
+def rubble(random: np.random.Generator) -> tuple[Model, ...]:
+    """5,000 low boxes on the ground, over which the beams go."""
+    poses = [Pose((*around(random, 0.0, 20.0), 0.05)) for _ in range(5000)]
+    return ground(), *(model(f"stone {number}", Box((0.4, 0.4, 0.1)), pose) for number, pose in enumerate(poses))
+
+
+def measure(models: tuple[Model, ...]) -> tuple[float, float]:
+    """ms a scan, and the part of all beams that met something."""
+    world = World(Path("world.sdf"), "world", b"", (0.0, 0.0, -9.81), models)
+    moving = [one for one in models if not one.static]
+    places = np.array([one.pose.position for one in moving]).reshape(-1, 3)
+    turns = np.array([one.pose.rotation() for one in moving]).reshape(-1, 3, 3)
+    names, obstacles = frozenset(one.name for one in models), Obstacles.of(world)
+    poses = []
+    for part in np.linspace(0.0, 1.0, SCANS).tolist():
+        roll, pitch = TILT * math.sin(40 * part), TILT * math.sin(70 * part)
+        pose = Pose.from_rpy(WAY * part, 0.0, HEIGHT, roll, pitch, 0.3 * math.sin(9 * part))
+        poses.append((*pose.position, *pose.quaternion))
+    times, met = [], 0
+    for _ in range(REPEATS):
+        lidar = Lidar(scenario.Lidar(), obstacles, names, moving, np.random.default_rng(0))
+        start = time.perf_counter()
+        scans = [lidar.scan(0.1 * number, pose, places, turns) for number, pose in enumerate(poses)]
+        times.append(time.perf_counter() - start)
+        met = sum(int(np.isfinite(scan.ranges).sum()) for scan in scans)
+    return 1000 * sorted(times)[REPEATS // 2] / SCANS, met / (SCANS * len(scans[0].ranges))
+
+
+def main() -> None:
+    print("| world | models | a scan, ms | beams that end on something, % |\n|---|---|---|---|")
+    worlds = {"barrels and flat patches": barrels, "boards that move": boards, "boxes": boxes, "low stones": rubble}
+    for name, make in worlds.items():
+        models = make(np.random.default_rng(1))
+        milliseconds, met = measure(models)
+        print(f"| {name} | {len(models)} | {milliseconds:.3f} | {100 * met:.0f} |")
+
+
+if __name__ == "__main__":
+    main()

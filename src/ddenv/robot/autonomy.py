@@ -1,0 +1,96 @@
+"""The robot's own side of a run: what it measures, where it believes it is, and how its controller wants to move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ddenv.robot.clock import Clock, Tick
+from ddenv.robot.drive import Drive
+from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
+from ddenv.robot.sensing.estimate import Filter
+from ddenv.robot.sensing.readings import Imu, Scan
+from ddenv.robot.sensing.suite import SensorSuite, Truth
+from ddenv.world.scenario import Sensors
+
+
+class Autonomy:
+    """The sensors, the filter and the controller of one run. The controller sees what is measured, never the truth."""
+
+    def __init__(
+        self,
+        settings: Sensors,
+        suite: SensorSuite,
+        drive: Drive,
+        skid: float,
+        clock: Clock,
+        start: tuple[float, float, float],
+        controller: Any,
+    ) -> None:
+        """`start` (x, y in m, heading in rad) is what the robot knows of its place when it starts."""
+        self._suite = suite
+        self._left = [number for number, left in enumerate(drive.left) if left]
+        self._right = [number for number, left in enumerate(drive.left) if not left]
+        self._radius = drive.radius
+        self._track = drive.track
+        self._skid = skid
+        self._step = clock.step
+        self._controller = controller
+        self._filter = Filter(*start, settings)
+        self._advanced = 0
+        self._wheels = (0.0,) * len(drive.joints)
+        self._imu = Imu(0.0, 0.0, 0.0)
+        # What was measured since the last command.
+        self._new_wheels: tuple[float, ...] | None = None
+        self._new_imu: Imu | None = None
+        self._new_compass: float | None = None
+        self._new_scan: Scan | None = None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the controller believes that the robot is at its goal, or has given up to get there."""
+        return bool(getattr(self._controller, "arrived", False) or getattr(self._controller, "gave_up", False))
+
+    def sense(self, tick: Tick, truth: Truth, scan: Scan | None) -> None:
+        """What is due at `tick` is measured, and the filter takes it in."""
+        if tick.odometry:
+            self._wheels = self._new_wheels = self._suite.odometry(truth.wheels)
+        if tick.imu:
+            self._imu = self._new_imu = self._suite.imu(truth)
+        if tick.odometry or tick.imu:
+            self._advance(tick.step)
+        if tick.compass:
+            self._new_compass = self._suite.compass(truth)
+            if tick.step:
+                self._filter.correct(self._new_compass)
+        if scan is not None:
+            self._new_scan = scan
+
+    def command(self, tick: Tick) -> Twist | WheelSpeeds:
+        """What the controller wants until it is asked again. Raises ControllerFailed."""
+        reading = Reading(
+            time=tick.time,
+            estimate=self._filter.estimate,
+            wheels=self._new_wheels,
+            imu=self._new_imu,
+            compass=self._new_compass,
+            scan=self._new_scan,
+        )
+        self._new_wheels = self._new_imu = self._new_compass = self._new_scan = None
+        return self._controller.step(reading)
+
+    def _advance(self, step: int) -> None:
+        if step == self._advanced:
+            return
+        left, right = self._rim_speed(self._left), self._rim_speed(self._right)
+        self._filter.advance(
+            speed=(left + right) / 2,
+            wheel_rate=self._skid * (right - left) / self._track,
+            gyro_rate=self._imu.yaw_rate,
+            pitch=self._imu.pitch,
+            seconds=(step - self._advanced) * self._step,
+        )
+        self._advanced = step
+
+    def _rim_speed(self, wheels: list[int]) -> float:
+        """How fast the rims of `wheels` go, on average, m/s."""
+        return self._radius * sum([self._wheels[number] for number in wheels]) / len(wheels)

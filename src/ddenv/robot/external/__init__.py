@@ -1,0 +1,1 @@
+"""The robot in another simulator: a user's own command runs it."""

@@ -1,0 +1,75 @@
+"""The command of an oracle: its words, checked, and what is put in for its placeholders."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.schemas import nearest
+from ddenv.world.files.access import Unusable, size_of
+from ddenv.world.scenario import Scenario
+
+PLACEHOLDERS = ("world", "seed", "log")
+KEY = "oracle.command"
+_PLACEHOLDER = re.compile(r"\{(\w+)\}")
+
+
+def command_words(scenario: Scenario) -> tuple[str, ...]:
+    """The words of the scenario's oracle, the program's first as a path or a name on PATH, placeholders as they stand.
+
+    Raises UserError for what can be known to fail: an unknown placeholder, a program that is not there or cannot be executed.
+    """
+    try:
+        words = shlex.split(scenario.oracle.command)
+    except ValueError as error:
+        raise UserError(f"{KEY}: {str(error).lower()} in: {scenario.oracle.command}") from None
+    if not words or not words[0]:
+        raise UserError(f"{KEY}: names no program")
+    if any("\0" in word for word in words):
+        raise UserError(f"{KEY}: has a NUL byte")
+    for name in (name for word in words for name in _PLACEHOLDER.findall(word)):
+        if name not in PLACEHOLDERS:
+            raise UserError(
+                f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
+                "use {world}, {seed} and {log}; there is no shell that knows others"
+            )
+    return _program(words[0], scenario.folder), *words[1:]
+
+
+def _program(word: str, folder: Path) -> str:
+    """The path of the program, relative ones from `folder`."""
+    path = folder.absolute() / word
+    if "/" not in word:
+        if found := shutil.which(word):
+            return str(Path(found).absolute())
+        beside = "" if _why_no_file(path) else f"; there is one in {folder}: write ./{word}"
+        raise UserError(f"{KEY}: no program '{word}' on PATH{beside}")
+    if why := _why_no_file(path):
+        raise UserError(f"{KEY}: {path}: {why}")
+    if not os.access(path, os.X_OK):
+        raise UserError(f"{KEY}: {path}: is not executable; 'chmod +x' makes it so")
+    return str(path)
+
+
+def _why_no_file(path: Path) -> str:
+    """Why `path` is no file that could be a program, or ""."""
+    try:
+        size_of(path)
+    except Unusable as error:
+        return str(error)
+    return ""
+
+
+def filled(words: tuple[str, ...], values: Mapping[str, str]) -> list[str]:
+    """`words` with `values` in the place of their placeholders; the program stays as it is."""
+    program, *rest = words
+    return [program, *(_PLACEHOLDER.sub(lambda match: values[match[1]], word) for word in rest)]
+
+
+def has_placeholder(words: tuple[str, ...], name: str) -> bool:
+    return any(name in _PLACEHOLDER.findall(word) for word in words[1:])

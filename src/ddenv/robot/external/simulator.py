@@ -1,0 +1,175 @@
+"""A scenario's own simulator: every run writes the world that is left to a file and starts the user's command on it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.errors import UserError
+from ddenv.robot.external.command import command_words, filled, has_placeholder
+from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
+from ddenv.robot.external.process import Ended, running, watch
+from ddenv.robot.result import RunResult
+from ddenv.world.files.resolve import ENVIRONMENT
+from ddenv.world.model import World
+from ddenv.world.placement import spawn_pose
+from ddenv.world.scenario import Scenario
+from ddenv.world.write import without
+
+# What the command's exit codes mean; all others are errors.
+OUTCOMES = {0: ("pass", ""), 1: ("failed", "timeout")}
+
+
+class ExternalSimulator:
+    """Runs as `ddenv.robot.template.Template` has them, by a command. What it should do is told in docs/any-simulator.md."""
+
+    def __init__(self, world: World, scenario: Scenario) -> None:
+        """Raises UserError for a command that cannot be started."""
+        self._world = world
+        self._scenario = scenario
+        self._words = command_words(scenario)
+        self._names = frozenset(model.name for model in world.models)
+        self._removable = frozenset(world.elements(frozenset(scenario.protected)))
+
+    def run(
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        full: bool = True,
+    ) -> RunResult:
+        """Runs the robot in the world with the models `keep`; those that cannot be removed are always there.
+
+        `progress(time, pose)` is told the simulated time (s) and the robot's x, y, z (m), qw, qx, qy, qz of what the command
+        prints. `full` changes nothing: a command ends its runs itself. Whatever it does becomes a result. Raises ValueError for
+        names that the world does not have, and UserError where no temporary file can be written.
+        """
+        unknown = keep - self._names
+        if unknown:
+            raise ValueError(f"no such model: {min(unknown)}")
+        started = time.perf_counter()
+        with _temporary_folder() as folder:
+            file = folder / self._scenario.world.name
+            _write(file, without(self._world, self._removable - keep))
+            ended, log = self._execute(file, seed, progress)
+        outcome, failure, trajectory = self._judged(ended, log)
+        return RunResult(
+            outcome=outcome,
+            failure=failure,
+            trajectory=trajectory,
+            motions={},
+            simulated_seconds=float(trajectory[-1, 0]),
+            wall_seconds=time.perf_counter() - started,
+            seed=seed,
+        )
+
+    def _execute(
+        self, world: Path, seed: int, progress: Callable[[float, tuple[float, ...]], None] | None
+    ) -> tuple[Ended, PoseLog]:
+        """Runs the command on the file `world` to its end, and takes in its pose log."""
+        file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
+        log = PoseLog(progress if file is None else None)
+        values = {"world": str(world), "seed": str(seed), "log": str(file or "/dev/stdout")}
+        words, environment = filled(self._words, values), self._environment(values)
+
+        def take(piece: bytes) -> None:
+            if file is None:
+                log.add(piece)
+
+        def too_much() -> str:
+            size = log.size if file is None else _size(file)
+            return TOO_LARGE if size > MOST_BYTES else ""
+
+        try:
+            with running(words, self._scenario.folder, environment, world.parent) as command:
+                ended = watch(command, self._scenario.simulation.wall_timeout, take, too_much)
+                if file is not None:
+                    _read(file, log)
+        except OSError as error:
+            ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
+        return ended, log
+
+    def _environment(self, values: dict[str, str]) -> dict[str, str]:
+        """Our own environment, and what the command is told of the scenario."""
+        spawn, goal = self._scenario.robot.spawn, self._scenario.goal
+        told = {f"DDENV_{name.upper()}": value for name, value in values.items()}
+        told["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
+        told["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
+        told["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
+        # What the world names beside itself is not beside the file that the command is given.
+        folders = [self._scenario.world.parent, *self._scenario.reading.model_path]
+        for name in ENVIRONMENT:
+            before = os.environ.get(name)
+            told[name] = os.pathsep.join([*map(str, folders), *([before] if before else [])])
+        return {**os.environ, **told}
+
+    def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, np.ndarray]:
+        """Outcome, failure and trajectory of a run that ended like this."""
+        said = f": {ended.complaint}" if ended.complaint else ""
+        if ended.code not in OUTCOMES:
+            why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
+            return "error", why + said, self._rows(log)
+        try:
+            return *OUTCOMES[ended.code], log.finish()
+        except BadLog as error:
+            return "error", f"{error}{said}", self._rows(log)
+
+    def _rows(self, log: PoseLog) -> np.ndarray:
+        """The rows of a run that broke: at least where the robot starts."""
+        rows = log.rows()
+        if len(rows):
+            return rows
+        start = spawn_pose(self._scenario.robot.spawn)
+        return np.array([[0.0, *start.position, *start.quaternion]])
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(f"{value:.12g}" for value in values)
+
+
+@contextlib.contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="ddenv-"))
+    except OSError as error:
+        raise _no_room(error) from None
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write(file: Path, text: bytes) -> None:
+    try:
+        file.write_bytes(text)
+    except OSError as error:
+        raise _no_room(error) from None
+
+
+def _no_room(error: OSError) -> UserError:
+    why = f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+    return UserError(f"no temporary file can be written ({why}); set TMPDIR to a folder with room")
+
+
+def _read(file: Path, log: PoseLog) -> None:
+    """Takes in the file that a command was to write; what is not there, or is no plain file, has no rows."""
+    with contextlib.suppress(OSError):
+        if not file.is_file():
+            return
+        with file.open("rb") as content:
+            while log.size <= MOST_BYTES and (piece := content.read(1_000_000)):
+                log.add(piece)
+
+
+def _size(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except OSError:
+        return 0

@@ -1,0 +1,114 @@
+"""Runs a command and ends it with all that it started: `python -I -S supervise.py FOLDER PROGRAM [WORD...]`.
+
+Standard input is a socket to a worker. When the command has ended, one line goes there: `exit 3`, `signal 9`, or `error 13` where
+it could not be started. A byte from the worker, or its end in any way, ends the command at once. FOLDER is removed in the end.
+A program of its own, since a worker that is killed can clean up nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+# How long a command that is asked to end has before it is killed, and how long what it leaves behind is hunted, s.
+GRACE = 2.0
+PATIENCE = 5.0
+# From Linux' <sys/prctl.h>.
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
+
+
+def main() -> None:
+    folder, *words = sys.argv[1:]
+    worker = socket.socket(fileno=0)
+    # A worker ignores Ctrl-C, and what is ignored stays so in the programs that are started.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    with contextlib.suppress(OSError):
+        worker.sendall(run(words, worker).encode())
+        while worker.recv(64):
+            pass
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def run(words: list[str], worker: socket.socket) -> str:
+    """Runs the command to its end, or until the worker wants it ended; returns how it ended."""
+    woken, wake = os.pipe()
+    os.set_blocking(wake, False)
+    signal.set_wakeup_fd(wake)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    prctl(PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        process = subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=die_with_us)
+    except OSError as error:
+        return f"error {error.errno}"
+    while process.poll() is None:
+        ready, _, _ = select.select([worker, woken], [], [])
+        if worker in ready:
+            end(process)
+        else:
+            os.read(woken, 64)
+    signal_group(process.pid, signal.SIGKILL)
+    kill_children()
+    code = process.returncode
+    return f"exit {code}" if code >= 0 else f"signal {-code}"
+
+
+def end(process: subprocess.Popen) -> None:
+    """Asks before it kills: some have something to put away, such as a container."""
+    signal_group(process.pid, signal.SIGTERM)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(GRACE)
+    signal_group(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def kill_children() -> None:
+    """Kills what has left the command's process group: what lost its parent is our own child by now."""
+    until = time.monotonic() + PATIENCE
+    while (pids := children()) and time.monotonic() < until:
+        for pid in pids:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, os.WNOHANG)
+        time.sleep(0.002)
+
+
+def signal_group(group: int, number: int) -> None:
+    with contextlib.suppress(OSError):
+        os.killpg(group, number)
+
+
+def children() -> list[int]:
+    """Our child processes, also those that have ended; none where there is no /proc."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            # The second field is a name in parentheses, which may hold anything.
+            fields = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
+            if int(fields[1]) == os.getpid():
+                found.append(int(entry.name))
+    return found
+
+
+def die_with_us() -> None:
+    """Runs in the command's process before the command does."""
+    prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def prctl(option: int, value: int) -> None:
+    """Linux' prctl, where there is one."""
+    with contextlib.suppress(ImportError, OSError, AttributeError):
+        import ctypes
+
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""How the robot finds its way: from what it measures to how it wants to move."""

@@ -1,0 +1,70 @@
+"""The ground that the robot covers, as a rectangle, and what would be in its way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """How far the robot reaches from its origin, m: `ahead`, `behind`, and to each `side`, which are taken as equal."""
+
+    ahead: float
+    behind: float
+    side: float
+
+    @classmethod
+    def around(cls, reach: Sequence[float]) -> Footprint:
+        """From how far the robot reaches ahead, behind, to its left and to its right (m)."""
+        ahead, behind, left, right = reach
+        return cls(ahead, behind, max(left, right))
+
+    @property
+    def inscribed(self) -> float:
+        """Radius (m) about the origin that the robot covers however it is turned."""
+        return min(self.ahead, self.behind, self.side)
+
+    @property
+    def circumscribed(self) -> float:
+        """Radius (m) about the origin beyond which the robot never reaches."""
+        return float(np.hypot(max(self.ahead, self.behind), self.side))
+
+    def depths(self, points: np.ndarray, poses: np.ndarray, margin: float) -> np.ndarray:
+        """How deep (K, N) m `points` (N, 2) are in the footprint grown by `margin` at `poses` (3, K): x, y, heading.
+
+        Negative is outside: at least so far from its edge.
+        """
+        x, y, heading = poses[:, :, None]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        dx, dy = points[:, 0] - x, points[:, 1] - y
+        along = np.abs(cosine * dx + sine * dy - (self.ahead - self.behind) / 2)
+        across = np.abs(cosine * dy - sine * dx)
+        return np.minimum((self.ahead + self.behind) / 2 + margin - along, self.side + margin - across)
+
+
+def legs_beside(
+    points: np.ndarray,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    back: np.ndarray | float,
+    on: np.ndarray | float,
+    side: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which straight legs are free of `points` (N, 2), N > 0, and how near (m) the nearest point is to each; both (K,).
+
+    A leg from `starts` (K, 2) to `ends` (K, 2) is free if no point is within `side` of it, from `back` (K,) before its start to
+    `on` (K,) after its end. All in m.
+    """
+    ways = ends - starts
+    lengths = np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-9)[:, None]
+    cosine, sine = ways[:, :1] / lengths, ways[:, 1:] / lengths
+    dx, dy = points[:, 0] - starts[:, :1], points[:, 1] - starts[:, 1:]
+    along = cosine * dx + sine * dy
+    across = np.abs(cosine * dy - sine * dx)
+    back, on = np.reshape(back, (-1, 1)), np.reshape(on, (-1, 1))
+    hit = (across < side) & (along > -back) & (along < lengths + on)
+    beyond = along - np.clip(along, 0.0, lengths)
+    return ~hit.any(axis=1), np.hypot(across, beyond).min(axis=1)

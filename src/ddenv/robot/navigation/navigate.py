@@ -1,0 +1,162 @@
+"""Navigation around what the lidar sees: map, plan, follow, and recover when that leads nowhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ddenv.robot.navigation.costmap import Costmap
+from ddenv.robot.navigation.follow import Follower
+from ddenv.robot.navigation.path import Path
+from ddenv.robot.navigation.plan import Planner
+from ddenv.robot.navigation.progress import Progress
+from ddenv.robot.navigation.recover import Attempt, Recovery
+from ddenv.robot.navigation.straight import ARRIVED
+from ddenv.robot.protocol import STOP, Reading, Setup, Twist
+from ddenv.robot.sensing.estimate import Estimate
+from ddenv.robot.sensing.readings import Imu
+
+# Scans that come faster than this (s) are left out.
+LOOK_EVERY = 0.2
+# Between two plans, at least, s; and without a plan for so long, the robot tries to recover, s.
+THINK_EVERY = 0.5
+THINK = 1.0
+# A plan that ends at the map's border is made anew when less than this (m) is left of it.
+TOO_SHORT = 2.0
+# Farther beside its plan than this (m), the robot makes another.
+BESIDE = 0.5
+# It stays with its plan if another is hardly shorter or roomier (m), unless it is so far (m) beside it.
+LONGER = 1.1
+CLOSER = 0.03
+SWAY = 0.2
+# So far (m) from where it last recovered, it begins to count its attempts anew.
+BETTER = 0.5
+# Clocks that add up periods are off by less, s.
+TICK = 1e-6
+
+
+class Navigator:
+    """Drives to the goal around obstacles. `arrived` and `gave_up` are for good: the robot stays where it is."""
+
+    def __init__(self, setup: Setup) -> None:
+        planner = setup.settings.planner
+        self._setup = setup
+        self._map = Costmap(setup)
+        self._planner = Planner(setup)
+        self._follower = Follower(setup)
+        self._progress = Progress(planner.patience)
+        self._recovery = Recovery(setup)
+        self._attempt: Attempt | None = None
+        self._path: Path | None = None
+        self._imu: Imu | None = None
+        self._near = self._map.points
+        self._looked = self._planned = -math.inf
+        self._found = 0.0
+        self._planned_on = -1
+        self._blocked = False
+        self._recovered: tuple[float, float] | None = None
+        self._speed = 0.0
+        self.arrived = False
+        self.gave_up = False
+
+    def step(self, reading: Reading) -> Twist:
+        """The command for the next period."""
+        self._look(reading)
+        self.arrived = self.arrived or self._is_there(reading.estimate)
+        if self.arrived or self.gave_up:
+            return STOP
+        twist = self._recover(reading) if self._attempt else self._follow(reading)
+        # Faster starts lift the front wheels; it may always brake.
+        most = self._speed + self._setup.acceleration * self._setup.period
+        if twist.speed > most:
+            twist = Twist(most, twist.turn_rate * most / twist.speed)
+        self._speed = max(twist.speed, 0.0)
+        return twist
+
+    def _look(self, reading: Reading) -> None:
+        self._imu = reading.imu or self._imu
+        if reading.scan is None or reading.time < self._looked + LOOK_EVERY - TICK:
+            return
+        self._looked = reading.time
+        self._map.see(reading.scan, reading.estimate, self._imu)
+        self._see(reading.estimate)
+
+    def _see(self, estimate: Estimate) -> None:
+        """Note what the map has to say about the path."""
+        points = self._map.points
+        apart = np.abs(points - (estimate.x, estimate.y)).max(axis=1, initial=0.0)
+        self._near = points[apart < self._follower.reach]
+        self._blocked = self._path is not None and self._planner.room(self._path, points) is None
+
+    def _is_there(self, estimate: Estimate) -> bool:
+        goal, tolerance = self._setup.goal, self._setup.tolerance
+        left = math.hypot(goal[0] - estimate.x, goal[1] - estimate.y)
+        if left <= ARRIVED * tolerance:
+            return True
+        # Where the goal itself is not free, the end of the plan must do.
+        path = self._path
+        return path is not None and path.final and path.left <= ARRIVED * tolerance and left <= tolerance
+
+    def _follow(self, reading: Reading) -> Twist:
+        time, estimate = reading.time, reading.estimate
+        if self._is_to_plan(time):
+            self._plan(time, estimate)
+        if self._path is None:
+            return self._try_to_recover(reading) if time - self._found >= THINK - TICK else STOP
+        twist = self._follower.step(self._path, estimate, self._near)
+        if self._progress.is_stalled(time, estimate):
+            return self._try_to_recover(reading)
+        self._note_progress(estimate)
+        return twist
+
+    def _is_to_plan(self, time: float) -> bool:
+        since, path = time - self._planned + TICK, self._path
+        if path is None or self._blocked or self._follower.stuck or path.off > BESIDE:
+            return since >= THINK_EVERY
+        if not path.final and path.left < TOO_SHORT:
+            return since >= THINK_EVERY
+        return since >= self._setup.settings.planner.replan and self._map.version != self._planned_on
+
+    def _plan(self, time: float, estimate: Estimate) -> None:
+        path = self._planner.plan(self._map.points, estimate.x, estimate.y)
+        self._planned, self._planned_on, self._blocked = time, self._map.version, False
+        if path is None:
+            self._path = None
+            return
+        self._found = time
+        path.locate(estimate.x, estimate.y)
+        if not self._is_as_good(path):
+            self._path = path
+
+    def _is_as_good(self, other: Path) -> bool:
+        """Whether the path is hardly worse than `other`: a robot that changes its mind all the time sways."""
+        path, points = self._path, self._map.points
+        if path is None or self._follower.stuck or path.off > SWAY or path.final < other.final:
+            return False
+        room, others = self._planner.room(path, points), self._planner.room(other, points)
+        if room is None or path.left > LONGER * other.left:
+            return False
+        return room >= (others or 0.0) - CLOSER and (path.final or path.left >= TOO_SHORT)
+
+    def _note_progress(self, estimate: Estimate) -> None:
+        was = self._recovered
+        if was and math.hypot(estimate.x - was[0], estimate.y - was[1]) >= BETTER:
+            self._recovery.made = 0
+            self._recovered = None
+
+    def _try_to_recover(self, reading: Reading) -> Twist:
+        self._attempt = self._recovery.next(reading.time, reading.estimate)
+        self.gave_up = self._attempt is None
+        return STOP if self.gave_up else self._recover(reading)
+
+    def _recover(self, reading: Reading) -> Twist:
+        twist = self._attempt.step(reading.time, reading.estimate, self._map)
+        if twist is not None:
+            return twist
+        self._attempt = self._path = None
+        self._found = reading.time
+        self._planned = -math.inf
+        self._recovered = (reading.estimate.x, reading.estimate.y)
+        self._progress.begin()
+        return STOP

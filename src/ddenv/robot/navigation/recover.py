@@ -1,0 +1,106 @@
+"""What the robot tries when it gets no further, one after another, as move_base does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ddenv.robot.navigation.costmap import Costmap
+from ddenv.robot.navigation.follow import may_turn, room, to_robot
+from ddenv.robot.navigation.footprint import Footprint
+from ddenv.robot.protocol import STOP, Setup, Twist
+from ddenv.robot.sensing.estimate import Estimate, wrap
+
+# What stays on the map, m around the robot, when the rest is forgotten.
+NEAR = 1.5
+# After forgetting, the lidar has to see again what is there, s.
+LOOK = 0.5
+BACK = 0.4  # m
+BACK_SPEED = 0.25  # m/s
+# An attempt that does not get there ends after this time, s.
+LONGEST_BACK = 4.0
+LONGEST_TURN = 15.0
+
+
+class Attempt(Protocol):
+    """Something the robot tries: commands until it is over, then None."""
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None: ...
+
+
+class Forget:
+    """Forgets what is farther away than `beyond` (m), and looks again."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate, beyond: float) -> None:
+        self._until = time + LOOK
+        self._beyond: float | None = beyond
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        if self._beyond is not None:
+            map_.forget(estimate, self._beyond)
+            self._beyond = None
+        return STOP if time < self._until else None
+
+
+class BackUp:
+    """Goes back a little, as long as nothing is there."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
+        self._body = Footprint.around(setup.footprint)
+        self._speed = min(BACK_SPEED, setup.speed)
+        self._from = estimate
+        self._until = time + LONGEST_BACK
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
+        if gone >= BACK or time >= self._until:
+            return None
+        way = np.array([0.0, -0.1, -0.2])
+        poses = np.stack([way, np.zeros_like(way), np.zeros_like(way)])
+        if len(map_.points) and room(self._body, to_robot(map_.points, estimate), poses) is None:
+            return None
+        return Twist(-self._speed, 0.0)
+
+
+class LookAround:
+    """Turns once around on the spot, as long as nothing is in the way."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
+        self._body = Footprint.around(setup.footprint)
+        self._rate = setup.turn_rate
+        self._heading = estimate.heading
+        self._turned = 0.0
+        self._until = time + LONGEST_TURN
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        self._turned += wrap(estimate.heading - self._heading)
+        self._heading = estimate.heading
+        if self._turned >= math.tau or time >= self._until:
+            return None
+        return Twist(0.0, self._rate) if may_turn(self._body, to_robot(map_.points, estimate), 1.0) else None
+
+
+@dataclass(slots=True)
+class Recovery:
+    """Attempts in turn. `made` counts those since the robot last made progress."""
+
+    setup: Setup
+    made: int = 0
+
+    def next(self, time: float, estimate: Estimate) -> Attempt | None:
+        """What to try now; None when the robot has tried as often as it may."""
+        if self.made >= self.setup.settings.planner.recoveries:
+            return None
+        self.made += 1
+        match (self.made - 1) % 4:
+            case 0:
+                return Forget(self.setup, time, estimate, NEAR)
+            case 1:
+                return BackUp(self.setup, time, estimate)
+            case 2:
+                return LookAround(self.setup, time, estimate)
+            case _:
+                return Forget(self.setup, time, estimate, 0.0)

@@ -1,0 +1,1 @@
+"""What the robot measures, and where it believes it is."""

@@ -1,0 +1,1 @@
+"""URDF files, read as the SDF that they amount to."""

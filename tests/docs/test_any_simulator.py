@@ -1,0 +1,74 @@
+"""The example of docs/any-simulator.md works as the page says, and the page says what is true."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from ddenv.launch.scenarios import load_parts
+from ddenv.robot.external.command import PLACEHOLDERS
+from ddenv.robot.external.pose_log import COLUMNS, EXPECTED, TOO_LARGE, PoseLog
+from ddenv.robot.external.simulator import ExternalSimulator
+from ddenv.robot.external.supervise import GRACE
+from ddenv.world.load import load_scenario
+from tests.conftest import ROOT
+
+PAGE = (ROOT / "docs/any-simulator.md").read_text()
+SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
+
+
+def ddenv(*words, folder):
+    return subprocess.run(
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=120, cwd=folder
+    )
+
+
+@pytest.fixture(scope="module")
+def reduced(tmp_path_factory):
+    """The run file of the example, and what the command printed."""
+    run = tmp_path_factory.mktemp("example") / "run.ddenv"
+    (command,) = re.findall(r"\$ ddenv (run .*)", PAGE)
+    done = ddenv(*command.split(), "--output", run, folder=ROOT)
+    assert done.returncode == 0, done.stderr
+    return run, done.stdout
+
+
+def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
+    (promise,) = re.findall(r"minimal environment: .*", PAGE)
+    assert promise in reduced[1].splitlines()
+
+
+def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(reduced, tmp_path):
+    done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", folder=tmp_path)
+    assert [run["outcome"] for run in json.loads(done.stdout)["runs"]] == ["similar", "pass", "pass"]
+
+
+def test_the_same_seed_gives_the_same_run(tmp_path):
+    done = ddenv("test", SCENARIO, "--seed", 3, "--repeat", 2, "--json", folder=tmp_path)
+    again = ddenv("test", SCENARIO, "--seed", 3, "--json", folder=tmp_path)
+    one, other = json.loads(done.stdout)["runs"]
+    assert json.loads(again.stdout)["runs"][0]["end_pose"] == one["end_pose"] != other["end_pose"]
+
+
+def test_the_page_shows_the_scenario_the_placeholders_and_the_variables():
+    (shown,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    assert yaml.safe_load(shown)["oracle"] == yaml.safe_load(SCENARIO.read_text())["oracle"]
+    assert re.findall(r"^\| `\{(\w+)\}`", PAGE, re.MULTILINE) == list(PLACEHOLDERS)
+    scenario = load_scenario(SCENARIO)
+    simulator = ExternalSimulator(load_parts(scenario)[0], scenario)
+    told = set(simulator._environment(dict.fromkeys(PLACEHOLDERS, "")))
+    shown = set(re.findall(r"`(DDENV_\w+|\w+_PATH)`", PAGE))
+    assert shown == {name for name in told if name.startswith("DDENV_") or name in shown}
+    assert f"SIGTERM) and killed {GRACE:g} s later" in PAGE
+
+
+def test_the_log_and_the_complaints_of_the_page_are_those_of_the_program():
+    (block,) = re.findall(r"    t,x,y.*?\n\n", PAGE, re.DOTALL)
+    log = PoseLog()
+    log.add("".join(line.strip() + "\n" for line in block.splitlines()).encode())
+    assert log.finish()[:, 0].tolist() == [0, 0.1]
+    assert ",".join(COLUMNS) in block
+    assert EXPECTED in PAGE and TOO_LARGE in PAGE

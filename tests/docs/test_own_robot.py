@@ -1,0 +1,40 @@
+"""The guide to robots and controllers of one's own keeps to what is true, and its example works as it says."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import fields
+
+import pytest
+
+from ddenv.robot.protocol import Reading, Setup
+from ddenv.robot.sensing.estimate import Estimate
+from ddenv.robot.sensing.readings import Imu, Scan
+from tests.conftest import ROOT
+
+EXAMPLE = ROOT / "docs" / "examples" / "own_robot"
+GUIDE = (ROOT / "docs" / "own-robot.md").read_text()
+
+
+@pytest.mark.parametrize(("language", "file"), [("python", "timid.py"), ("yaml", "scenario.yaml")])
+def test_the_guide_shows_the_examples_files(language, file):
+    assert GUIDE.split(f"```{language}\n")[1].split("```")[0] == (EXAMPLE / file).read_text()
+
+
+@pytest.mark.parametrize("part", [Setup, Reading, Estimate, Imu, Scan], ids=lambda part: part.__name__)
+def test_the_guide_tells_every_field(part):
+    assert [field.name for field in fields(part) if f"`{field.name}`" not in GUIDE] == []
+
+
+def test_the_example_is_reduced_to_what_the_guide_says(tmp_path):
+    """On Drake, by the command that the guide shows."""
+    command = [sys.executable, "-m", "ddenv", "run", str(EXAMPLE / "scenario.yaml"), "--jobs", "2", "--json"]
+    environment = os.environ | {"DDENV_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout.splitlines()[-1])
+    assert "minimal environment: 2 of 12 models (83% smaller): locker_back, locker_left" in GUIDE
+    assert summary["kept"] == ["locker_back", "locker_left"]

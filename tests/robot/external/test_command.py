@@ -1,0 +1,57 @@
+"""The command: its words and placeholders, and what is told before anything runs."""
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.robot.external.command import command_words, filled, has_placeholder
+from ddenv.world.load import load_scenario
+from ddenv.world.scenario import Oracle
+from tests.conftest import DATA
+
+
+@pytest.fixture
+def words(tmp_path):
+    (tmp_path / "run.sh").write_text("#!/bin/sh\n")
+    (tmp_path / "run.sh").chmod(0o755)
+    (tmp_path / "plain.sh").write_text("#!/bin/sh\n")
+    scenario = load_scenario(DATA / "wall.yaml").model_copy(update={"folder": tmp_path})
+    return lambda command: command_words(scenario.model_copy(update={"oracle": Oracle(command=command)}))
+
+
+def test_words_are_split_as_a_shell_does_and_placeholders_filled(words, tmp_path):
+    found = words("./run.sh --world={world} '{seed} seeds' ; rm $HOME '{\"a\": 1}'")
+    assert found[0] == str(tmp_path / "run.sh")
+    values = {"world": "/a {seed}.sdf", "seed": "7", "log": "/l"}
+    assert filled(found, values)[1:] == ["--world=/a {seed}.sdf", "7 seeds", ";", "rm", "$HOME", '{"a": 1}']
+    assert has_placeholder(found, "seed")
+    assert not has_placeholder(found, "log")
+
+
+def test_a_program_on_the_path_is_found(words):
+    assert words("sh -c true")[0].startswith("/")
+
+
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [
+        (
+            "./run.sh {wrld}",
+            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{seed\} and \{log\}",
+        ),
+        ("./run.sh ${HOME}", r"unknown placeholder \{HOME\}"),
+        ("./run.sh 'a", "no closing quotation"),
+        (" ", "names no program"),
+        ("'' x", "names no program"),
+        ("no-such-program-of-ours", "no program 'no-such-program-of-ours' on PATH$"),
+        ("run.sh", "no program 'run.sh' on PATH; there is one in .*: write ./run.sh"),
+        ("./missing.sh", "missing.sh: cannot be read: No such file"),
+        ("./plain.sh", "plain.sh: is not executable; 'chmod [+]x'"),
+        ("/tmp/", "is a folder"),
+        ("./run.sh a\0b", "NUL"),
+        ("./" + "x" * 5000, "File name too long"),
+        ("{world}", "no program '{world}' on PATH"),
+    ],
+)
+def test_what_cannot_start_is_told_in_one_line(words, command, complaint):
+    with pytest.raises(UserError, match=f"^oracle.command: .*{complaint}"):
+        words(command)

@@ -1,0 +1,177 @@
+"""A simulator of the user's own: whatever it does becomes a result, and nothing of it is left."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.robot.external import pose_log
+from tests.conftest import DATA
+from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
+
+EVERYTHING = frozenset({"deck", "wall", "far_box", "post", "ball", "beam"})
+PASS = "print('0,0,0,0,0,0,0,1'); print('2.5,4,0,0,0,0,0,1')"
+
+
+def test_exit_code_0_is_a_pass_and_1_a_failure(simulator_of):
+    passed = simulator_of(PASS).run(EVERYTHING, 3)
+    assert (passed.outcome, passed.failure, passed.seed, passed.simulated_seconds) == ("pass", "", 3, 2.5)
+    assert passed.end_pose == (4, 0, 0, 1, 0, 0, 0)
+    assert (passed.motions, passed.first_sensed, passed.first_touched) == ({}, {}, {})
+    assert 0 < passed.wall_seconds < 20
+    failed = simulator_of(PASS + "; exit(1)").run(EVERYTHING, 3)
+    assert (failed.outcome, failed.failure) == ("failed", "timeout")
+    assert np.array_equal(failed.trajectory, passed.trajectory)
+
+
+TELL = """
+    import os, sys
+    print("0,0,0,0,0,0,0,1")
+    told = {name: os.environ[name] for name in os.environ if name.startswith(("DDENV_", "GZ_", "GAZEBO_"))}
+    world = open(sys.argv[1]).read()
+    open("told", "w").write(repr((sys.argv[1:], told, world, os.getcwd(), sys.stdin.read())))
+"""
+
+
+def test_the_command_is_told_the_world_the_seed_and_the_scenario(simulator_of, tmp_path, monkeypatch):
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", "/models")
+    monkeypatch.delenv("GAZEBO_MODEL_PATH", raising=False)
+    assert simulator_of(TELL, "{world} --seed={seed}").run(frozenset({"deck", "wall"}), 5).outcome == "pass"
+    (world, seed), told, text, cwd, stdin = eval((tmp_path / "told").read_text())
+    assert (seed, cwd, stdin) == ("--seed=5", str(tmp_path), "")
+    assert "far_box" not in text and "deck" in text and "ground_plane" in text
+    assert (told["DDENV_WORLD"], told["DDENV_SEED"], told["DDENV_TIMEOUT"]) == (world, "5", "5")
+    assert (told["DDENV_SPAWN"], told["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
+    assert told["GZ_SIM_RESOURCE_PATH"] == f"{DATA}{os.pathsep}/models"
+    assert told["GAZEBO_MODEL_PATH"] == str(DATA)
+
+
+def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):
+    write = "import os, sys; open(os.environ['DDENV_LOG'], 'a').write('1,2,3,4,0,0,0,1')"
+    to_file = simulator_of(f"print('starting'); {write}", "{log}").run(EVERYTHING, 0)
+    assert (to_file.outcome, to_file.end_position) == ("pass", (2, 3, 4))
+    assert simulator_of(write).run(EVERYTHING, 0).end_position == (2, 3, 4)
+
+
+def test_progress_is_told_while_it_runs(simulator_of, tmp_path):
+    # The command goes on only when its first row has been told.
+    wait = """
+        import os, time
+        print("0,1,2,3,0,0,0,1", flush=True)
+        while not os.path.exists("seen"):
+            time.sleep(0.01)
+        print("1,4,2,3,0,0,0,1")
+    """
+    told = []
+
+    def progress(time_s, pose):
+        told.append((time_s, pose[0]))
+        (tmp_path / "seen").touch()
+
+    assert simulator_of(wait).run(EVERYTHING, 0, progress).outcome == "pass"
+    assert told == [(0, 1), (1, 4)]
+
+
+@pytest.mark.parametrize(
+    ("code", "ends_at"),
+    [
+        (SLEEP, 0),
+        (STUBBORN, 0),
+        (FAMILY + SLEEP, 7),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSTOP)", 0),
+    ],
+    ids=["hangs", "ignores SIGTERM", "has a family", "is stopped"],
+)
+def test_a_command_that_hangs_is_killed_with_all_that_it_started(simulator_of, code, ends_at):
+    result = simulator_of(code, wall_timeout=0.6).run(EVERYTHING, 0)
+    assert (result.outcome, result.failure) == ("error", "took longer than 0.6 s of wall clock")
+    assert result.end_position[0] == ends_at
+
+
+def test_what_a_command_leaves_behind_is_killed(simulator_of):
+    assert simulator_of(FAMILY).run(EVERYTHING, 0).outcome == "pass"
+
+
+@pytest.mark.parametrize(
+    ("code", "complaint"),
+    [
+        ("exit(3)", "the command's exit code is 3, neither 0 nor 1"),
+        ("1 / 0", "the pose log has no rows; .*: ZeroDivisionError: division by zero"),
+        ("import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)", "exit code is 255, .*: .*2J"),
+        ("import os; os.kill(os.getpid(), 11)", "the command was ended by SIGSEGV"),
+        ("import os; os.abort()", "the command was ended by SIGABRT"),
+        ("import os, time; os.kill(os.getppid(), 9); time.sleep(1000)", "the command's supervisor was killed"),
+        ("print('Gazebo 11')", "the pose log, line 1: expected t,x,y,z,qx,qy,qz,qw .* found 'Gazebo 11'"),
+        ("pass", "the pose log has no rows"),
+    ],
+)
+def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
+    result = simulator_of(code).run(EVERYTHING, 0)
+    assert result.outcome == "error"
+    assert np.isfinite(result.trajectory).all() and result.trajectory.shape == (1, 8)
+    assert result.end_position == (0, 0, 0.45)
+    assert re.search(complaint, result.failure), result.failure
+    assert result.failure.isprintable() and len(result.failure) < 400
+
+
+def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):
+    monkeypatch.setattr(pose_log, "MOST_BYTES", 3_000_000)
+    monkeypatch.setattr("ddenv.robot.external.simulator.MOST_BYTES", 3_000_000)
+    flood = """
+        import os, sys
+        print("0,1,2,3,0,0,0,1", flush=True)
+        for _ in range(STDERR):
+            os.write(2, b"warning " * 8000)
+        log = TO
+        while True:
+            log.write(b"0,1,2,3,0,0,0,1\\n" * 4000)
+    """
+    for to, words in (("sys.stdout.buffer", ""), ("open(sys.argv[1], 'wb')", "{log}")):
+        result = simulator_of(flood.replace("TO", to).replace("STDERR", "2000"), words).run(EVERYTHING, 0)
+        assert result.outcome == "error"
+        assert "larger than" in result.failure
+
+
+def test_the_last_complaint_is_told_and_short(simulator_of):
+    said = simulator_of("import sys; sys.stderr.write('x' * 100000 + '\\nlast ' + 'y' * 1000); exit(9)").run(
+        EVERYTHING, 0
+    )
+    assert "exit code is 9" in said.failure and ": last yyy" in said.failure and len(said.failure) < 300
+
+
+def test_a_program_that_goes_missing_or_cannot_be_executed_is_an_error(simulator_of, tmp_path):
+    simulator = simulator_of(PASS)
+    program = tmp_path / "program"
+    program.write_bytes(b"\x7fELF nonsense")
+    program.chmod(0o755)
+    simulator._words = (str(program),)
+    assert "the command cannot be started: Exec format error" in simulator.run(EVERYTHING, 0).failure
+    program.unlink()
+    assert "the command cannot be started: No such file" in simulator.run(EVERYTHING, 0).failure
+    simulator._scenario = simulator._scenario.model_copy(update={"folder": tmp_path / "gone"})
+    result = simulator.run(EVERYTHING, 0)
+    assert result.outcome == "error" and "gone" in result.failure
+
+
+def test_without_room_for_temporary_files_it_is_told(simulator_of, monkeypatch, tmp_path):
+    simulator = simulator_of(PASS)
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+        with pytest.raises(UserError, match=r"no temporary file can be written .*; set TMPDIR"):
+            simulator.run(EVERYTHING, 0)
+
+
+def test_a_model_that_is_not_there_is_refused(simulator_of):
+    with pytest.raises(ValueError, match="no such model: chair"):
+        simulator_of(PASS).run(frozenset({"chair"}), 0)
+
+
+def test_drake_is_not_needed():
+    code = "import sys, ddenv.engine.worker, ddenv.robot.external.simulator; print('pydrake' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "False", done.stderr

@@ -1,0 +1,76 @@
+"""Ways around what is on the map."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ddenv.robot.navigation.plan import Planner
+from tests.robot.navigation.toy import HUSKY, setup
+
+
+def wall(ax: float, ay: float, bx: float, by: float) -> np.ndarray:
+    count = max(round(math.hypot(bx - ax, by - ay) / 0.1), 1) + 1
+    return np.column_stack([np.linspace(ax, bx, count), np.linspace(ay, by, count)])
+
+
+def gap(width: float) -> np.ndarray:
+    return np.concatenate([wall(3, -9, 3, -width / 2), wall(3, width / 2, 3, 9)])
+
+
+def test_straight_where_nothing_is():
+    planner = Planner(setup((20.0, 3.0)))
+    assert planner.plan(np.empty((0, 2)), 1.0, 0.0).corners == [(1.0, 0.0), (20.0, 3.0)]
+    assert planner.plan(wall(-3, -3, -3, 3), 1.0, 0.0).corners == [(1.0, 0.0), (20.0, 3.0)]
+
+
+def test_around_a_wall():
+    points = wall(3, -1, 3, 1)
+    planner = Planner(setup((5.5, 0.0)))
+    path = planner.plan(points, 0.0, 0.0)
+    assert path.final
+    assert path.end == (5.5, 0.0)
+    assert planner.room(path, points) >= HUSKY[2] + 0.05 - 1e-6
+    shortest = 2 * math.hypot(1.45, 3) + 0.1
+    assert path.left <= 1.2 * shortest
+
+
+def test_through_a_gap_across_it():
+    path = Planner(setup((5.5, 0.0))).plan(gap(1.1), 1.0, -2.0)
+    corners = np.array(path.corners)
+    through = np.flatnonzero((corners[:-1, 0] < 3) & (corners[1:, 0] > 3))
+    (leg,) = through
+    way = corners[leg + 1] - corners[leg]
+    assert abs(math.atan2(way[1], way[0])) < 0.1
+    assert corners[leg, 0] < 3 - HUSKY[0]
+    assert corners[leg + 1, 0] > 3 + HUSKY[1]
+
+
+def test_not_through_a_gap_that_is_too_narrow():
+    assert Planner(setup((5.5, 0.0))).plan(gap(0.7), 1.0, 0.0) is None
+
+
+def test_to_the_border_when_the_goal_is_beyond():
+    points = wall(3, -2, 3, 2)
+    path = Planner(setup((30.0, 0.0))).plan(points, 0.0, 0.0)
+    assert not path.final
+    assert path.end[0] == pytest.approx(5.8, abs=0.3)
+
+
+def test_as_near_as_it_counts_to_a_goal_that_is_not_free():
+    planner = Planner(setup((4.0, 0.0), tolerance=0.8))
+    path = planner.plan(np.array([[4.0, 0.0]]), 0.0, 0.0)
+    assert path.final
+    assert 0.39 <= math.dist(path.end, (4.0, 0.0)) <= 0.8
+    assert Planner(setup((4.0, 0.0), tolerance=0.3)).plan(np.array([[4.0, 0.0]]), 0.0, 0.0) is None
+
+
+def test_a_path_in_which_something_stands_now():
+    planner = Planner(setup((5.0, 0.0)))
+    path = planner.plan(np.empty((0, 2)), 0.0, 0.0)
+    path.locate(1.0, 0.0)
+    assert planner.room(path, np.array([[3.0, 0.45]])) == pytest.approx(0.45)
+    assert planner.room(path, np.array([[3.0, 0.3]])) is None
+    assert planner.room(path, np.array([[0.2, 0.0]])) is not None, "it has passed there"
