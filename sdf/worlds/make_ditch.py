@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pieces
 
-GAP = 0.39  # m
+GAP = 0.4  # m
 TOP = 2.0  # m above the ground
 PLATFORM = (8.0, 9.0)  # m along and across the way
 TILE = (1.27, 0.6)  # m
@@ -22,7 +22,6 @@ PLATE = 0.01  # m
 ROWS, COLUMNS = 4, 8
 BLOCK = 0.076  # m
 BLOCK_HEIGHTS = (0.025, 0.038, 0.05)  # m
-HIGH_BLOCK_HEIGHTS = (0.05, 0.06, 0.07)  # m
 SETBACK = 0.1  # m between the edge tile and the gap
 
 MU = 1.2  # rubber on dry asphalt and wood
@@ -47,13 +46,13 @@ FAR = [
 ]  # fmt: skip
 
 
-def tile(rng: random.Random, heights: tuple[float, ...]) -> str:
+def tile(rng: random.Random) -> str:
     """A plate with rows of blocks, no two neighbours of a row of the same height; its frame lies on its underside."""
     boxes = pieces.box("plate", (0, 0, PLATE / 2), (*TILE, PLATE), MU, pieces.PLYWOOD)
     for row in range(ROWS):
-        shift = rng.randrange(len(heights))
+        shift = rng.randrange(len(BLOCK_HEIGHTS))
         for column in range(COLUMNS):
-            height = heights[(column + shift) % len(heights)]
+            height = BLOCK_HEIGHTS[(column + shift) % len(BLOCK_HEIGHTS)]
             x = (column - (COLUMNS - 1) / 2) * TILE[0] / COLUMNS
             y = (row - (ROWS - 1) / 2) * TILE[1] / ROWS
             place, size = (x, y, PLATE + height / 2), (BLOCK, BLOCK, height)
@@ -87,8 +86,7 @@ def models() -> Iterator[str]:
     places.sort(key=lambda place: (place[0] * place[1], place[2]))
     for number, (side, distance, y, degrees) in enumerate(places, start=1):
         x = side * (GAP / 2 + distance)
-        heights = HIGH_BLOCK_HEIGHTS if side < 0 and distance < 0.45 else BLOCK_HEIGHTS
-        parts = tile(random.Random(number), heights)
+        parts = tile(random.Random(number))
         yield pieces.model(f"rough_tile_{number:02d}", (x, y, TOP, 0, 0, math.radians(degrees)), parts)
     yield pieces.model("cinder_block", (GAP / 2 + 3.4, -0.9, TOP, 0, 0, 0.4), cinder_block())
 

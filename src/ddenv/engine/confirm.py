@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
 from ddenv.engine.bench import Wanted
 from ddenv.engine.journal import Journal, Keep
@@ -13,22 +14,22 @@ AGAIN = "run again with --no-early-stop"
 class Confirmation:
     """What of the end is shown by runs to their end: that f shows in `kept`, and not without any one of the models `tried`.
 
-    As in a round, `1 + iterations` runs tell. A run that was not cut is a full one already. Nothing is kept here: all follows
-    from the journal.
+    As in a round, `1 + iterations` runs tell. A run that was not cut is a full one already. All follows from the journal. No more
+    than `enough` tests are looked for at a time.
     """
 
-    def __init__(self, journal: Journal, kept: Keep, tried: Sequence[str], iterations: int) -> None:
+    def __init__(self, journal: Journal, kept: Keep, tried: Sequence[str], iterations: int, enough: int) -> None:
         self._journal = journal
         self._kept = kept
         self._tried = tried
         self._runs = range(1 + iterations)
+        self._enough = enough
+        # Without so many of `tried` f does not show.
+        self._sure = 0
 
     def wanted(self) -> Wanted:
         """The full runs that are still needed, in the order in which one worker would make them; none once there is a doubt."""
-        if self.doubt():
-            return []
-        whole = [] if self._shows() else self._missing(self._kept)
-        return whole + [test for name in self._tried for test in self._missing(self._kept - {name})]
+        return [] if self.doubt() else list(islice(self._open(), self._enough))
 
     def doubt(self) -> str:
         """What a full run contradicts, in one line that says what to do; "" as far as there is nothing."""
@@ -36,12 +37,20 @@ class Confirmation:
             if self._missing(self._kept):
                 return ""
             return f"runs were ended too early: f does not show in full runs of what is left; {AGAIN}"
-        for name in self._tried:
-            if self._missing(self._kept - {name}):
+        for name in self._tried[self._sure :]:
+            keep = self._kept - {name}
+            if self._missing(keep):
                 return ""
-            if any(self._is_similar(self._kept - {name}, run) for run in self._runs):
+            if any(self._is_similar(keep, run) for run in self._runs):
                 return f"runs were ended too early: f shows in a full run without '{name}', too; {AGAIN}"
+            self._sure += 1
         return ""
+
+    def _open(self) -> Iterator[tuple[Keep, int, int | None]]:
+        if not self._shows():
+            yield from self._missing(self._kept)
+        for name in self._tried[self._sure :]:
+            yield from self._missing(self._kept - {name})
 
     def _shows(self) -> bool:
         # f itself may be a later baseline run.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.world.bundled import SDF
+from ddenv.world.command import command_words
 from ddenv.world.files.whole import read_bytes
 from ddenv.world.load import validate
 from ddenv.world.model import Model, World
@@ -84,6 +85,8 @@ def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) ->
 
     `tell` is called with a line before something that takes longer. Raises UserError.
     """
+    if scenario.oracle is not None:
+        command_words(scenario)
     reading, robot_file = scenario.reading, scenario.robot.model
     world = read_world(scenario.world, reading, tell)
     around_robot = disk_of(robot_file, reading, tell)

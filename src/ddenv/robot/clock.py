@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from ddenv.robot.recording import RECORD_PERIOD
 from ddenv.world.scenario import Scenario
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(NamedTuple):
     """A step of the plant at which something is due, its time (s), and what that is."""
 
     step: int
@@ -73,14 +73,11 @@ class Clock:
         both = self.record, self.command, self.compass, self.imu, self.odometry, self.lidar
         return tuple(steps for steps in both if steps)
 
-    def ticks(self) -> Iterator[Tick]:
+    @cached_property
+    def ticks(self) -> tuple[Tick, ...]:
         """All steps at which something is due, from 0 to the last."""
-        step, every = 0, self._every
-        while True:
-            yield self._tick(step)
-            if step == self.last:
-                return
-            step = min(self.last, *(step - step % steps + steps for steps in every))
+        due = {step for steps in self._every for step in range(0, self.last, steps)}
+        return tuple(self._tick(step) for step in sorted(due | {self.last}))
 
     def _tick(self, step: int) -> Tick:
         def due(steps: int | None) -> bool:

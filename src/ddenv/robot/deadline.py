@@ -37,9 +37,11 @@ def call_within(seconds: float, call: Callable[[Given], Answer], given: Given) -
 
 
 def _interrupted(seconds: float, call: Callable[[Given], Answer], given: Given) -> Answer:
+    # In this order no alarm ever comes to the other's handler.
+    left, interval = signal.setitimer(signal.ITIMER_REAL, 0.0)
     handler = signal.signal(signal.SIGALRM, _interrupt)
-    left, interval = signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
     started = time.perf_counter() if left else 0.0
+    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
     try:
         return call(given)
     finally:

@@ -53,8 +53,8 @@ class Notice:
     def feel(self, now: float, place: Vector) -> None:
         """Notices what the robot, whose first link is at `place` (m), touches at the time `now` (s).
 
-        To be called at all instants at which something is due, when the motors have their command: then the contacts are
-        those which the next step needs in any case, worked out once, with the same bits. Shorter touches may be missed.
+        To be called when the motors have their command: then the contacts are those which the next step needs in any case,
+        worked out once, with the same bits. What is touched only between two calls is missed.
         """
         if not (self._reaches(place) or self._reaches_moving(place)):
             return

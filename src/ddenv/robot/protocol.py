@@ -13,14 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.readings import Imu, Scan
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(NamedTuple):
     """Forward speed in m/s and turn rate in rad/s, positive to the left."""
 
     speed: float
@@ -37,8 +36,7 @@ class WheelSpeeds:
     speeds: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """What the robot knows at `time` (simulated s).
 
     `wheels` (rad/s) are the measured speeds of the wheel joints in the order of `Setup.joints`, `compass` (rad) the heading in the

@@ -160,7 +160,7 @@ class Rehearsals:
         states = [self._hold.state()[entries]]
         motions, paces = [links.observe(plant, self._plant_context, everything)], [np.zeros(len(everything))]
         calm = 0.0
-        for before, tick in pairwise(self._clock.ticks()):
+        for before, tick in pairwise(self._clock.ticks):
             simulator.AdvanceTo(tick.time)
             states.append(self._hold.state()[entries])
             if not np.isfinite(states[-1]).all():

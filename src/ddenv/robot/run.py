@@ -66,7 +66,10 @@ class Run:
         self._kept = kept
         self._seed = seed
         self._context = built.plant.GetMyMutableContextFromRoot(context)
-        self._motors = built.plant.get_desired_state_input_port(built.robot.instance)
+        motors = built.plant.get_desired_state_input_port(built.robot.instance)
+        # The wheels' positions, which no motor minds, and their speeds.
+        self._told = np.zeros(motors.size())
+        self._motors = motors.FixValue(self._context, self._told)
         self._observer = Observer(built, drive, self._context)
         self._simulator = Simulator(built.diagram, context)
         self._recording = Recording()
@@ -93,7 +96,7 @@ class Run:
 
     def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
         """Outcome, failure, whether the run was cut short, and when (s) it ended."""
-        for tick in self._clock.ticks():
+        for tick in self._clock.ticks:
             problem = self._simulate(tick.time) if tick.step else ""
             if problem:
                 return "error", problem, False, tick.time
@@ -111,7 +114,8 @@ class Run:
                 scan = self._lidar.scan(tick.time, pose, *self._sleep.poses()) if tick.lidar else None
                 self._autonomy.sense(tick, truth, scan)
                 end = self._command(tick) if tick.command else None
-            self._notice.feel(tick.time, pose[:3])
+            if end is not None or tick.record:
+                self._notice.feel(tick.time, pose[:3])
             if end is not None:
                 return *end, tick.time
         raise AssertionError("a clock's last tick ends the run")
@@ -146,7 +150,8 @@ class Run:
             speeds = self._drive.wheel_speeds(self._autonomy.command(tick), self._skid)
         except ControllerFailed as failed:
             return "error", str(failed), False
-        self._motors.FixValue(self._context, np.concatenate([np.zeros_like(speeds), speeds]))
+        self._told[len(speeds) :] = speeds
+        self._motors.GetMutableData().get_mutable_value().SetFromVector(self._told)
         return None
 
     def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:

@@ -160,6 +160,11 @@ def test_a_tilted_robot_looks_at_the_ground_or_over_what_is_low(pitch, expected)
     assert ranges[270] == pytest.approx(expected)
 
 
+def test_all_beams_towards_a_wall_end_on_it_and_no_other():
+    taken = scan(lidar_of(still("wall", Box((0.02, 2.0, 1.0)), Pose((3.01, 0.0, 0.0)))))
+    assert (np.isfinite(taken.ranges) == (np.abs(taken.angles) <= math.atan2(1.0, 3.0))).all()
+
+
 def test_beams_go_round_behind_the_robot():
     behind = still("behind", Cylinder(0.5, 1.0), Pose((-3.0, 0.0, 0.0)))
     ranges = scan(lidar_of(behind, settings=plain(beams=361, angle=math.tau))).ranges

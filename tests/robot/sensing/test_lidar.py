@@ -49,6 +49,15 @@ def test_only_what_is_neither_too_far_nor_too_near_is_measured(x, seen):
     assert set(lidar.first_seen) == ({"ball"} if seen else set())
 
 
+def test_noise_takes_out_of_range_and_brings_nothing_into_it():
+    taken = scan(lidar_of(still("wall", Box((0.2, 40.0, 2.0)), Pose((19.1, 0.0, 0.0))), settings=plain(noise=1.0)))
+    within = np.abs(taken.angles) <= math.acos(19.0 / 20.0)
+    measured = taken.ranges[within][np.isfinite(taken.ranges[within])]
+    assert 0 < len(measured) < within.sum()
+    assert measured.max() <= 20.0
+    assert np.isinf(taken.ranges[~within]).all()
+
+
 def test_what_is_too_near_to_be_measured_still_hides_what_is_behind():
     lidar = lidar_of(ball("ball", 0.54), WALL, settings=plain(angle=0.01))
     assert np.isinf(scan(lidar).ranges).all()

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.robot.external.command import command_words, filled, has_placeholder
 from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
 from ddenv.robot.external.process import Ended, running, watch
+from ddenv.robot.kinds import kind_of
 from ddenv.robot.result import RunResult
+from ddenv.world.command import command_words, filled, has_placeholder
 from ddenv.world.files.resolve import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
@@ -24,7 +25,7 @@ from ddenv.world.scenario import Scenario
 from ddenv.world.write import without
 
 # What the command's exit codes mean; all others are errors.
-OUTCOMES = {0: ("pass", ""), 1: ("failed", "timeout")}
+OUTCOMES = {0: "pass", 1: "failed"}
 
 
 class ExternalSimulator:
@@ -117,7 +118,8 @@ class ExternalSimulator:
             why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
             return "error", why + said, self._rows(log)
         try:
-            return *OUTCOMES[ended.code], log.finish()
+            outcome, rows = OUTCOMES[ended.code], log.finish()
+            return outcome, kind_of(rows, fell=False, arrived=False) if outcome == "failed" else "", rows
         except BadLog as error:
             return "error", f"{error}{said}", self._rows(log)
 

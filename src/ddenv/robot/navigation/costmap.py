@@ -31,7 +31,7 @@ class Costmap:
         self.count = max(round(planner.size / planner.resolution), 4)
         self.points = np.empty((0, 2))
         self.version = 0
-        self._footprint = Footprint.around(setup.footprint)
+        self._footprint = Footprint.of(setup)
         # The wheels stand this far below the frame that the points are in.
         self._lowest = planner.lowest - setup.radius
         self._slots = np.empty(0, dtype=int)

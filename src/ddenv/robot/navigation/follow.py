@@ -13,6 +13,8 @@ from ddenv.robot.sensing.estimate import Estimate, wrap
 
 # Parts of the look-ahead at which the robot aims, the first whose arc is free.
 PARTS = (1.0, 0.6)
+# It can stop like this, m/s^2.
+BRAKE = 1.0
 # Standing, it aims at this part of the look-ahead: the slower, the closer it keeps to its path.
 NEAREST = 0.4
 # It turns on the spot when the path leads farther aside than this, until it is within the second, rad.
@@ -22,9 +24,7 @@ ALONG = 0.25
 ALIGNED = 0.04
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
-# Points this near (m) to its sides count as touched.
-MARGIN = 0.03
-# How much nearer (m) something within that margin may come in a step.
+# How much nearer (m) something within its margin may come in a step.
 GIVE = 0.001
 # With this much room (m) at its sides it goes at full speed, with none at this part of it.
 ROOM = 0.35
@@ -41,11 +41,13 @@ class Follower:
         self._setup = setup
         self._gain = setup.settings.heading_gain
         self._look_ahead = setup.settings.planner.look_ahead
-        self._body = Footprint.around(setup.footprint)
+        self._body = Footprint.of(setup)
+        # Faster, it could not stop within what it knows to be free.
+        self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
         self._turning = False
         self._path: Path | None = None
         self._room: float | None = None
-        self.reach = self._body.circumscribed + self._look_ahead + ROOM + MARGIN
+        self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
         self.stuck = False
 
     def step(self, path: Path, estimate: Estimate, points: np.ndarray) -> Twist:
@@ -74,7 +76,7 @@ class Follower:
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
         """How far away (m) and in which direction (rad, from straight ahead) the place is that the robot aims at."""
-        share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._setup.speed, 0.0), 1.0)
+        share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
         x, y = path.ahead(part * share * self._look_ahead)
         dx, dy = x - estimate.x, y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
@@ -95,15 +97,16 @@ class Follower:
         return room(self._body, points, poses)
 
     def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
-        setup = self._setup
         bend = 2 * math.sin(bearing) / max(distance, 1e-6)
         arc = distance * bearing / math.sin(bearing) if abs(bearing) > 1e-3 else distance
-        fastest = setup.speed * (SLOWEST + (1 - SLOWEST) * min(room / ROOM, 1.0))
+        fastest = self._fastest * (SLOWEST + (1 - SLOWEST) * min(room / ROOM, 1.0))
         if abs(bend) > 1e-6:
-            fastest = min(fastest, setup.turn_rate / abs(bend))
-        # Half of the acceleration, so that it really stops within what it knows to be free.
-        fastest = min(fastest, math.sqrt(setup.acceleration * (path.left if path.final else arc)), setup.speed)
-        fastest = min(fastest, math.sqrt(setup.acceleration * arc)) * max(math.cos(bearing), 0.0)
+            fastest = min(fastest, self._setup.turn_rate / abs(bend))
+        # Nothing is known of what is beyond the arc; before the goal it brakes half as hard.
+        fastest = min(fastest, math.sqrt(2 * BRAKE * arc))
+        if path.final:
+            fastest = min(fastest, math.sqrt(BRAKE * path.left))
+        fastest *= max(math.cos(bearing), 0.0)
         return Twist(fastest, fastest * bend)
 
     def _turn(self, bearing: float, points: np.ndarray) -> Twist:
@@ -134,9 +137,9 @@ def room(body: Footprint, points: np.ndarray, poses: np.ndarray) -> float | None
 
     What is within the margin already may come a little nearer, so that it can turn away, but not be touched, or touched harder.
     """
-    depths = body.depths(points, poses, MARGIN)
+    depths = body.depths(points, poses)
     now = depths[0]
-    if (depths[1:] > np.maximum(now, np.minimum(np.maximum(now, 0.0) + GIVE, MARGIN))).any():
+    if (depths[1:] > np.maximum(now, np.minimum(np.maximum(now, 0.0) + GIVE, body.margin))).any():
         return None
     return max(-float(depths.max()), 0.0)
 

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.robot.protocol import Setup
+
+# Points nearer to the robot than this part of its padding count as touched.
+TOUCHED = 0.6
+
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """How far the robot reaches from its origin, m: `ahead`, `behind`, and to each `side`, which are taken as equal."""
+    """How far the robot reaches from its origin, m: `ahead`, `behind`, and to each `side`, which are taken as equal.
+
+    What is nearer than `margin` (m) counts as touched.
+    """
 
     ahead: float
     behind: float
     side: float
+    margin: float = 0.0
 
     @classmethod
-    def around(cls, reach: Sequence[float]) -> Footprint:
-        """From how far the robot reaches ahead, behind, to its left and to its right (m)."""
-        ahead, behind, left, right = reach
-        return cls(ahead, behind, max(left, right))
+    def of(cls, setup: Setup) -> Footprint:
+        """That of the robot of `setup`."""
+        ahead, behind, left, right = setup.footprint
+        return cls(ahead, behind, max(left, right), TOUCHED * setup.settings.planner.padding)
 
     @property
     def inscribed(self) -> float:
@@ -32,8 +40,8 @@ class Footprint:
         """Radius (m) about the origin beyond which the robot never reaches."""
         return float(np.hypot(max(self.ahead, self.behind), self.side))
 
-    def depths(self, points: np.ndarray, poses: np.ndarray, margin: float) -> np.ndarray:
-        """How deep (K, N) m `points` (N, 2) are in the footprint grown by `margin` at `poses` (3, K): x, y, heading.
+    def depths(self, points: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        """How deep (K, N) m `points` (N, 2) are in the footprint with its margin at `poses` (3, K): x, y, heading.
 
         Negative is outside: at least so far from its edge.
         """
@@ -42,7 +50,7 @@ class Footprint:
         dx, dy = points[:, 0] - x, points[:, 1] - y
         along = np.abs(cosine * dx + sine * dy - (self.ahead - self.behind) / 2)
         across = np.abs(cosine * dy - sine * dx)
-        return np.minimum((self.ahead + self.behind) / 2 + margin - along, self.side + margin - across)
+        return np.minimum((self.ahead + self.behind) / 2 - along, self.side - across) + self.margin
 
 
 def legs_beside(

@@ -100,8 +100,7 @@ class Navigator:
 
     def _follow(self, reading: Reading) -> Twist:
         time, estimate = reading.time, reading.estimate
-        if self._is_to_plan(time):
-            self._plan(time, estimate)
+        self._think(time, estimate)
         if self._path is None:
             return self._try_to_recover(reading) if time - self._found >= THINK - TICK else STOP
         twist = self._follower.step(self._path, estimate, self._near)
@@ -110,34 +109,41 @@ class Navigator:
         self._note_progress(estimate)
         return twist
 
-    def _is_to_plan(self, time: float) -> bool:
-        since, path = time - self._planned + TICK, self._path
-        if path is None or self._blocked or self._follower.stuck or path.off > BESIDE:
-            return since >= THINK_EVERY
-        if not path.final and path.left < TOO_SHORT:
-            return since >= THINK_EVERY
-        return since >= self._setup.settings.planner.replan and self._map.version != self._planned_on
+    def _think(self, time: float, estimate: Estimate) -> None:
+        """Plan if there is a reason to, and from time to time if the map has changed."""
+        since = time - self._planned + TICK
+        if self._path is None or self._is_spoilt(self._path):
+            if since >= THINK_EVERY:
+                self._plan(time, estimate)
+            return
+        if since < self._setup.settings.planner.replan or self._map.version == self._planned_on:
+            return
+        self._planned, self._planned_on = time, self._map.version
+        if not self._planner.is_best(self._path, self._map.points):
+            self._plan(time, estimate)
+
+    def _is_spoilt(self, path: Path) -> bool:
+        """Whether something is in the way, the robot has left it, or it ends soon at the map's border."""
+        if self._blocked or self._follower.stuck or path.off > BESIDE:
+            return True
+        return not path.final and path.left < TOO_SHORT
 
     def _plan(self, time: float, estimate: Estimate) -> None:
+        self._planned, self._planned_on = time, self._map.version
         path = self._planner.plan(self._map.points, estimate.x, estimate.y)
-        self._planned, self._planned_on, self._blocked = time, self._map.version, False
-        if path is None:
-            self._path = None
-            return
-        self._found = time
-        path.locate(estimate.x, estimate.y)
-        if not self._is_as_good(path):
-            self._path = path
+        if path is not None:
+            self._found = time
+            path.locate(estimate.x, estimate.y)
+        if path is None or not self._is_as_good(path):
+            self._path, self._blocked = path, False
 
     def _is_as_good(self, other: Path) -> bool:
         """Whether the path is hardly worse than `other`: a robot that changes its mind all the time sways."""
         path, points = self._path, self._map.points
-        if path is None or self._follower.stuck or path.off > SWAY or path.final < other.final:
+        if path is None or self._is_spoilt(path) or path.off > SWAY or path.final < other.final:
             return False
         room, others = self._planner.room(path, points), self._planner.room(other, points)
-        if room is None or path.left > LONGER * other.left:
-            return False
-        return room >= (others or 0.0) - CLOSER and (path.final or path.left >= TOO_SHORT)
+        return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
 
     def _note_progress(self, estimate: Estimate) -> None:
         was = self._recovered

@@ -23,7 +23,9 @@ HEAVY = 50.0
 # Corners at which a way may be cut short are at most this many cells apart.
 APART = 3
 # A way cut short may come nearer to an obstacle by this, m.
-NEARER = 0.03
+NEARER = 0.015
+# A way so little longer than the straight line is not searched again.
+STRAIGHT = 1.03
 # Before and after a narrow place the robot goes straight on for the first of these (m) for which there is room.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
 # A turn there is no sharper than this, as the cosine of its angle.
@@ -38,7 +40,7 @@ class Planner:
         planner = setup.settings.planner
         self._goal = setup.goal
         self._tolerance = setup.tolerance
-        self._body = Footprint.around(setup.footprint)
+        self._body = Footprint.of(setup)
         self._side = self._body.side + planner.padding
         self._reach = max(self._body.ahead, self._body.behind)
         self._inflation = max(planner.inflation, self._side)
@@ -76,6 +78,13 @@ class Planner:
         free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
         return min(float(near.min()), self._inflation) if free.all() else None
 
+    def is_best(self, path: Path, points: np.ndarray) -> bool:
+        """Whether no way can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+        room = self.room(path, points)
+        if room is None or room < self._inflation:
+            return False
+        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
+
     def _search(self, points: np.ndarray, start: Place) -> Path | None:
         corner = (np.rint(np.array(start) / self._step) - self._grid.count // 2) * self._step
         factors, near = self._costs(points - corner)
@@ -86,12 +95,15 @@ class Planner:
         if to is None:
             return None
         way = way_to(to, sources)
-        places = self._cells[way] + corner
-        places[0] = start
+        # Also where the robot is in the goal's cell already, a way has two ends.
+        places = self._cells[way if len(way) > 1 else way * 2] + corner
         left = math.dist(places[-1], self._goal)
-        if goal_is_free and left <= self._step and len(places) > 1:
+        if goal_is_free and left <= self._step:
             places[-1] = self._goal
-        corners = self._cut_short(places, near[way], points)
+        elif len(way) == 1:
+            places[-1] = start
+        places[0] = start
+        corners = self._cut_short(places, near[way if len(way) > 1 else way * 2], points)
         return Path(corners, final=left <= self._tolerance, back=self._body.inscribed, on=self._body.inscribed)
 
     def _target(self, lengths: np.ndarray, corner: np.ndarray, goal_is_free: bool) -> int | None:
@@ -116,17 +128,19 @@ class Planner:
         apart = cells * step - points[:, :, None]
         inside = (cells >= 0) & (cells < count)
         near = (apart[:, 0, :, None] ** 2 + apart[:, 1, None, :] ** 2) <= widest**2
-        which = np.nonzero(near & inside[:, 0, :, None] & inside[:, 1, None, :])
-        dx, dy = apart[which[0], 0, which[1]], apart[which[0], 1, which[2]]
-        numbers = cells[which[0], 0, which[1]] * count + cells[which[0], 1, which[2]]
+        near &= inside[:, 0, :, None] & inside[:, 1, None, :]
+        dx = np.broadcast_to(apart[:, 0, :, None], near.shape)[near]
+        dy = np.broadcast_to(apart[:, 1, None, :], near.shape)[near]
+        numbers = (cells[:, 0, :, None] * count + cells[:, 1, None, :])[near]
         nearest = np.full(count * count, self._inflation)
         np.minimum.at(nearest, numbers, np.hypot(dx, dy))
         costs = np.where(nearest < self._inflation, np.exp(FALL * (self._body.inscribed - nearest)), 0.0)
         factors = np.tile(1.0 + WEIGHT * np.minimum(costs, 1.0), (4, 1))
         for factor, (cosine, sine) in zip(factors, DIRECTIONS, strict=True):
             tight = (np.abs(cosine * dx + sine * dy) < self._reach) & (np.abs(cosine * dy - sine * dx) < self._side)
-            tight = np.unique(numbers[tight])
-            factor[tight] *= TIGHT
+            is_tight = np.zeros(count * count, dtype=bool)
+            is_tight[numbers[tight]] = True
+            factor[is_tight] *= TIGHT
         factors[:, nearest < self._side] = np.inf
         return factors, nearest
 

@@ -49,7 +49,7 @@ class BackUp:
     """Goes back a little, as long as nothing is there."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
-        self._body = Footprint.around(setup.footprint)
+        self._body = Footprint.of(setup)
         self._speed = min(BACK_SPEED, setup.speed)
         self._from = estimate
         self._until = time + LONGEST_BACK
@@ -69,7 +69,7 @@ class LookAround:
     """Turns once around on the spot, as long as nothing is in the way."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
-        self._body = Footprint.around(setup.footprint)
+        self._body = Footprint.of(setup)
         self._rate = setup.turn_rate
         self._heading = estimate.heading
         self._turned = 0.0

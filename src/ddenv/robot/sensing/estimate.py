@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ddenv.world.scenario import Sensors
 
@@ -16,8 +16,7 @@ UNSEEN = 0.005
 SMALLEST = 1e-6  # rad
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """Position (m), heading (rad in [-pi, pi]) in the world frame, forward speed (m/s) and turn rate (rad/s).
 
     `spread` is the standard deviation of x, y (m) and of the heading (rad), as the filter has them.

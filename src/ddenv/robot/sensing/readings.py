@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ddenv.world.pose import Vector
 
 
-@dataclass(frozen=True, slots=True)
-class Imu:
+class Imu(NamedTuple):
     """Turn rate about the robot's own vertical (rad/s), roll and pitch (rad)."""
 
     yaw_rate: float

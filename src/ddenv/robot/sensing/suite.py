@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from ddenv.world.scenario import Sensors
 DRAWN = 256
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
+class Truth(NamedTuple):
     """The robot as it is: heading, roll and pitch (rad, world frame), turn rate about its own vertical (rad/s).
 
     `wheels` (rad/s) are the speeds of its wheels, positive forward.

@@ -3,7 +3,8 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.external.command import command_words, filled, has_placeholder
+from ddenv.launch.runs import create_run
+from ddenv.world.command import command_words, filled, has_placeholder
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle
 from tests.conftest import DATA
@@ -55,3 +56,10 @@ def test_a_program_on_the_path_is_found(words):
 def test_what_cannot_start_is_told_in_one_line(words, command, complaint):
     with pytest.raises(UserError, match=f"^oracle.command: .*{complaint}"):
         words(command)
+
+
+def test_it_is_told_before_a_run_is_written(tmp_path):
+    scenario = load_scenario(DATA / "wall.yaml").model_copy(update={"oracle": Oracle(command="./gone.sh")})
+    with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):
+        create_run(scenario, tmp_path / "run.ddenv")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,103 @@
+"""How fast the robot is simulated: the three scenarios with everything on, beside bare `AdvanceTo` on the same plant.
+
+    python benchmarks/simulation.py [--seeds N] [--scenarios ditch,friction,rubble]
+
+Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter, controller,
+recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is `Simulator.AdvanceTo` in the same
+context with the same wheel speeds at the same times, and nothing else. Loose models then are never at rest: it has no
+such thing as sleep, which is why it is slower where there are many. Seconds are CPU seconds of one core; the first run in a world,
+which works out how loose piles settle, is left out.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+
+from ddenv.launch.scenarios import load_parts
+from ddenv.robot.template import Template
+from ddenv.world.bundled import SCENARIOS
+from ddenv.world.load import load_scenario
+
+TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}
+
+
+@dataclass
+class Told:
+    """A drive that remembers what it told the wheels."""
+
+    drive: Any
+    speeds: list[np.ndarray] = field(default_factory=list)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.drive, name)
+
+    def wheel_speeds(self, *asked: Any) -> np.ndarray:
+        self.speeds.append(self.drive.wheel_speeds(*asked))
+        return self.speeds[-1]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--scenarios", default="ditch,friction,rubble")
+    arguments = parser.parse_args()
+    print("| scenario | models | simulated s a second | bare AdvanceTo | ratio | target |")
+    print("|---|---|---|---|---|---|")
+    for name in arguments.scenarios.split(","):
+        scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+        world, robot = load_parts(scenario)
+        template = Template(world, robot, scenario)
+        elements = world.elements()
+        for kept in (elements, elements[::2]):
+            print(row(template, name, frozenset(kept), arguments.seeds), flush=True)
+
+
+def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
+    template.run(keep, 0)
+    simulated = spent = bare_spent = 0.0
+    drive = template._drive
+    for seed in range(seeds):
+        template._drive = told = Told(drive)
+        seconds, result = cpu(lambda: template.run(keep, seed))  # noqa: B023
+        template._drive = drive
+        simulated, spent = simulated + result.simulated_seconds, spent + seconds
+        bare_spent += bare(template, keep, told.speeds, result.simulated_seconds)
+    speed, bare_speed = simulated / spent, simulated / bare_spent
+    return f"| {name} | {len(keep)} | {speed:.0f} | {bare_speed:.0f} | {speed / bare_speed:.2f} | {TARGETS[name]} |"
+
+
+def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
+    """CPU time (s) of simulating a run whose wheels were told `speeds`."""
+    built, context, period = template._built, template._plant_context, template._clock.command_period
+    present = keep | template._always
+    kept = [body for name, body in built.moving.items() if name in present]
+    template._sleeping = False
+    try:
+        with template._presence.without(template._names - present), template._asleep(kept, present):
+            motors = built.plant.get_desired_state_input_port(built.robot.instance)
+            simulator = Simulator(built.diagram, template._context)
+
+            def advance() -> None:
+                for number, told in enumerate(speeds, start=1):
+                    motors.FixValue(context, np.concatenate([np.zeros_like(told), told]))
+                    simulator.AdvanceTo(min(number * period, simulated))
+
+            return cpu(advance)[0]
+    finally:
+        template._sleeping = True
+
+
+def cpu(work: Callable[[], Any]) -> tuple[float, Any]:
+    """How long `work` takes on the processor, s, and what it gives."""
+    started = time.process_time()
+    result = work()
+    return time.process_time() - started, result
+
+
+if __name__ == "__main__":
+    main()
