@@ -19,6 +19,7 @@ MU = 0.6  # wood on wood, on stone and on asphalt
 BLOCK = (0.19, 0.39, 0.19)  # m along and across the path, and up
 BLOCK_MU = 0.8
 CRIB = 1.2  # m, length of a crib's boards
+REACH = 0.585  # m, from its middle to where boards cross: right at their ends, where they rest on four corners
 LAYERS = 5
 RAMP = 1.5  # m, length of a ramp's boards
 # Places of the blocks in the path.
@@ -43,7 +44,7 @@ def crib(side: int) -> Iterator[str]:
     name = "left" if side > 0 else "right"
     y = side * 1.55
     for layer in range(LAYERS):
-        for number, offset in enumerate((-0.45, 0.45)):
+        for number, offset in enumerate((-REACH, REACH)):
             across = layer % 2 == 1
             place = (offset, y) if across else (0.0, y + offset)
             yaw = math.pi / 2 if across else 0.0

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, CoulombFriction
 
+from ddenv.robot.drive import find_drive
 from ddenv.robot.friction import wheel_friction, world_friction
 from ddenv.robot.template import Template
 
@@ -54,8 +55,8 @@ def test_the_grippiest_wheel_counts_and_the_hull_does_not(husky):
         else with_mu(link, 7.0)
         for link in husky.links
     )
-    assert wheel_friction(replace(husky, links=links)) == 0.9
-    assert wheel_friction(husky) == 1.5
+    assert wheel_friction(replace(husky, links=links), find_drive(husky)) == 0.9
+    assert wheel_friction(husky, find_drive(husky)) == 1.5
 
 
 def drive(world_of, husky, scenario_of, box, mu: float):

@@ -40,7 +40,8 @@ def _interrupted(seconds: float, call: Callable[[Given], Answer], given: Given) 
     # In this order no alarm ever comes to the other's handler.
     left, interval = signal.setitimer(signal.ITIMER_REAL, 0.0)
     handler = signal.signal(signal.SIGALRM, _interrupt)
-    started = time.perf_counter() if left else 0.0
+    # One that repeats and rings right now has nothing left.
+    left, started = left or interval, time.perf_counter()
     signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
     try:
         return call(given)

@@ -122,8 +122,8 @@ class Sensors(Section):
 class Planner(Section):
     """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees rolls along with the robot."""
 
-    size: Positive = Field(12.0, le=100, description="length and width of the map, m")
-    resolution: Positive = Field(0.1, description="of the map, m")
+    size: float = Field(12.0, ge=4, le=100, description="length and width of the map, m")
+    resolution: float = Field(0.1, ge=0.02, le=0.5, description="of the map, m")
     padding: NotNegative = Field(0.05, description="kept free around the robot, m")
     inflation: NotNegative = Field(0.6, description="how far from obstacles they still cost, m")
     look_ahead: Positive = Field(0.8, description="how far ahead on its plan the robot aims, m")

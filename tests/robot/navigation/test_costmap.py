@@ -77,10 +77,14 @@ def test_ground_that_a_tilted_robot_sees_is_no_obstacle():
     assert len(level.points)
 
 
-def test_forgets_what_is_far():
+def test_forgets_what_is_far_and_less_of_what_is_out_of_sight():
     costmap = Costmap(setup((9, 0)))
     ground = Ground(circles=((1.5, 0.0, 0.2), (4.0, 2.0, 0.2)))
     costmap.see(look(ground, AT_START), AT_START)
-    costmap.forget(AT_START, 2.0)
+    costmap.forget(AT_START, 2.0, 2.0)
     assert len(costmap.points)
     assert (np.hypot(*costmap.points.T) <= 2.0).all()
+    costmap.forget(Estimate(0.0, 0.0, math.pi), 0.0, 2.0)
+    assert len(costmap.points), "it is behind the robot"
+    costmap.forget(AT_START, 0.0, 2.0)
+    assert not len(costmap.points)

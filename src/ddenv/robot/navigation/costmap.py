@@ -48,9 +48,14 @@ class Costmap:
         self._mark(scan, estimate, roll, pitch)
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)
 
-    def forget(self, estimate: Estimate, beyond: float) -> None:
-        """Clear the map where it is farther than `beyond` (m) from the robot."""
-        near = np.hypot(self.points[:, 0] - estimate.x, self.points[:, 1] - estimate.y) <= beyond
+    def forget(self, estimate: Estimate, beyond: float, beyond_unseen: float) -> None:
+        """Clear the map where it is farther than `beyond` (m) from the robot, `beyond_unseen` (m) where no beam goes now."""
+        dx, dy = (self.points - (estimate.x, estimate.y)).T
+        bearings = np.arctan2(dy, dx) - estimate.heading
+        bearings -= math.tau * np.round(bearings / math.tau)
+        first, last = (self._angles[0], self._angles[-1]) if self._angles is not None else (0.0, 0.0)
+        seen = (bearings >= first) & (bearings <= last)
+        near = np.hypot(dx, dy) <= np.where(seen, beyond, beyond_unseen)
         self._hit[self._slots[~near]] = False
         self._keep(self._slots[near])
 

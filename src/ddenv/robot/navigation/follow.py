@@ -24,14 +24,18 @@ ALONG = 0.25
 ALIGNED = 0.04
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
+BACK_SPEED = 0.25  # m/s
 # How much nearer (m) something within its margin may come in a step.
 GIVE = 0.001
 # With this much room (m) at its sides it goes at full speed, with none at this part of it.
 ROOM = 0.35
-SLOWEST = 0.3
+SLOWEST = 0.25
+# With this much (m) it need not look at every step.
+CALM = 0.1
 # Places along an arc that are tested, as parts of it, and angles of a turn (rad).
 PLACES = np.linspace(0.0, 1.0, 7)
 TURNS = np.array([0.0, 0.1, 0.2, 0.35])
+BACK = np.array([0.0, -0.1, -0.2])  # m
 
 
 class Follower:
@@ -62,7 +66,7 @@ class Follower:
             self._room = None
             return self._turn(bearing, to_robot(points, estimate))
         if self._room is not None:
-            # What was free a period ago over the whole look-ahead is tested again in the next.
+            # What was free, with room, a period ago over the whole look-ahead is tested again in the next.
             room, self._room = self._room, None
             return self._drive(path, distance, bearing, room)
         points = to_robot(points, estimate)
@@ -70,7 +74,7 @@ class Follower:
             distance, bearing = self._aim(path, estimate, part)
             room = self._room_on_arc(distance, bearing, points)
             if room is not None:
-                self._room = room if part == PARTS[0] else None
+                self._room = room if part == PARTS[0] and room >= CALM else None
                 return self._drive(path, distance, bearing, room)
         return self._turn(bearing, points)
 
@@ -110,7 +114,7 @@ class Follower:
         return Twist(fastest, fastest * bend)
 
     def _turn(self, bearing: float, points: np.ndarray) -> Twist:
-        """On the spot towards `bearing` (rad), by the other side if only that is free."""
+        """On the spot towards `bearing` (rad), by the other side if only that is free, or back to where there is room to turn."""
         if abs(bearing) < ALIGNED:
             self.stuck = True
             return STOP
@@ -120,6 +124,8 @@ class Follower:
         for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
             if may_turn(self._body, points, side):
                 return Twist(0.0, side * rate)
+        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points):
+            return Twist(-min(BACK_SPEED, self._setup.speed), 0.0)
         self.stuck = True
         return STOP
 
@@ -149,3 +155,8 @@ def may_turn(body: Footprint, points: np.ndarray, side: float) -> bool:
     if not len(points):
         return True
     return room(body, points, np.stack([np.zeros_like(TURNS), np.zeros_like(TURNS), side * TURNS])) is not None
+
+
+def may_back_up(body: Footprint, points: np.ndarray) -> bool:
+    """Whether the robot may go straight back a little past `points` (N, 2) it sees."""
+    return not len(points) or room(body, points, np.stack([BACK, np.zeros_like(BACK), np.zeros_like(BACK)])) is not None

@@ -94,16 +94,16 @@ class Planner:
         to = self._target(lengths, corner, goal_is_free)
         if to is None:
             return None
-        way = way_to(to, sources)
         # Also where the robot is in the goal's cell already, a way has two ends.
-        places = self._cells[way if len(way) > 1 else way * 2] + corner
+        way = way_to(to, sources) if to != self._start else [to, to]
+        places = self._cells[way] + corner
         left = math.dist(places[-1], self._goal)
         if goal_is_free and left <= self._step:
             places[-1] = self._goal
-        elif len(way) == 1:
+        elif to == self._start:
             places[-1] = start
         places[0] = start
-        corners = self._cut_short(places, near[way if len(way) > 1 else way * 2], points)
+        corners = self._cut_short(places, near[way], points)
         return Path(corners, final=left <= self._tolerance, back=self._body.inscribed, on=self._body.inscribed)
 
     def _target(self, lengths: np.ndarray, corner: np.ndarray, goal_is_free: bool) -> int | None:

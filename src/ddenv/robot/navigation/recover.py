@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.navigation.follow import may_turn, room, to_robot
+from ddenv.robot.navigation.follow import BACK_SPEED, may_back_up, may_turn, to_robot
 from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.protocol import STOP, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
@@ -19,7 +17,6 @@ NEAR = 1.5
 # After forgetting, the lidar has to see again what is there, s.
 LOOK = 0.5
 BACK = 0.4  # m
-BACK_SPEED = 0.25  # m/s
 # An attempt that does not get there ends after this time, s.
 LONGEST_BACK = 4.0
 LONGEST_TURN = 15.0
@@ -32,7 +29,7 @@ class Attempt(Protocol):
 
 
 class Forget:
-    """Forgets what is farther away than `beyond` (m), and looks again."""
+    """Forgets what is farther away than `beyond` (m), and looks again. What is near and out of sight it had better not forget."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate, beyond: float) -> None:
         self._until = time + LOOK
@@ -40,7 +37,7 @@ class Forget:
 
     def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
         if self._beyond is not None:
-            map_.forget(estimate, self._beyond)
+            map_.forget(estimate, self._beyond, NEAR)
             self._beyond = None
         return STOP if time < self._until else None
 
@@ -58,11 +55,7 @@ class BackUp:
         gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
         if gone >= BACK or time >= self._until:
             return None
-        way = np.array([0.0, -0.1, -0.2])
-        poses = np.stack([way, np.zeros_like(way), np.zeros_like(way)])
-        if len(map_.points) and room(self._body, to_robot(map_.points, estimate), poses) is None:
-            return None
-        return Twist(-self._speed, 0.0)
+        return Twist(-self._speed, 0.0) if may_back_up(self._body, to_robot(map_.points, estimate)) else None
 
 
 class LookAround:
