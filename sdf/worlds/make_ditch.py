@@ -77,10 +77,13 @@ def platform(side: int) -> str:
     return pieces.model(name, (x, 0, TOP / 2, 0, 0, 0), parts)
 
 
-def models() -> Iterator[str]:
+def models(repaired: bool) -> Iterator[str]:
     yield pieces.ground(SOIL)
     yield platform(-1)
     yield platform(1)
+    if repaired:
+        parts = pieces.box("asphalt", (0, 0, 0), (GAP, PLATFORM[1], TOP), MU, pieces.ASPHALT)
+        yield pieces.model("filling", (0, 0, TOP / 2, 0, 0, 0), parts)
     places = [(-1, *place) for place in NEAR] + [(1, *place) for place in FAR]
     # The numbers follow the places from one end of the world to the other, as a person who lays tiles would count.
     places.sort(key=lambda place: (place[0] * place[1], place[2]))
@@ -91,8 +94,9 @@ def models() -> Iterator[str]:
     yield pieces.model("cinder_block", (GAP / 2 + 3.4, -0.9, TOP, 0, 0, 0.4), cinder_block())
 
 
-def ditch() -> str:
-    return pieces.world("ditch", models())
+def ditch(repaired: bool = False) -> str:
+    """The world, or the one with its ditch filled."""
+    return pieces.world("ditch", models(repaired))
 
 
 if __name__ == "__main__":

@@ -48,8 +48,8 @@ def on_road(x: float, y: float, degrees: float = 0.0) -> tuple[float, ...]:
     return x, y, CROSSFALL * y, roll, pitch, heading
 
 
-def patch(name: str, x: float, y: float, degrees: float, length: float, width: float) -> str:
-    mu, color = (RED_MU, RED) if name.startswith("red") else (GREEN_MU, GREEN)
+def patch(name: str, mu: float, color: str, place: tuple[float, ...]) -> str:
+    x, y, degrees, length, width = place
     parts = pieces.box("patch", (0, 0, 0), (length, width, 2 * PROUD), mu, color)
     return pieces.model(name, on_road(x, y, degrees), parts)
 
@@ -59,17 +59,18 @@ def barrel(number: int, x: float, y: float) -> str:
     return pieces.model(f"barrel_{number:02d}", on_road(x, y), parts)
 
 
-def models() -> Iterator[str]:
+def models(repaired: bool) -> Iterator[str]:
     yield pieces.ground(pieces.ASPHALT, ASPHALT_MU, on_road(0, 0))
     for number, place in enumerate(BARRELS, start=1):
         yield barrel(number, *place)
-    for color, places in (("red", REDS), ("green", GREENS)):
+    for name, mu, color, places in (("red", RED_MU, RED, REDS), ("green", GREEN_MU, GREEN, GREENS)):
         for number, place in enumerate(places, start=1):
-            yield patch(f"{color}_patch_{number:02d}", *place)
+            yield patch(f"{name}_patch_{number:02d}", ASPHALT_MU if repaired else mu, color, place)
 
 
-def friction() -> str:
-    return pieces.world("friction", models())
+def friction(repaired: bool = False) -> str:
+    """The world, or the one whose patches are as rough as the asphalt."""
+    return pieces.world("friction", models(repaired))
 
 
 if __name__ == "__main__":

@@ -71,10 +71,11 @@ def ramp(number: int, x: float, y: float) -> Iterator[str]:
         yield board(f"ramp_{number}{half}", mx, y + offset, mz + 0.002, -pitch, 0.0, RAMP, on_edge=False)
 
 
-def models() -> Iterator[str]:
+def models(repaired: bool) -> Iterator[str]:
     yield pieces.ground(pieces.ASPHALT, 0.9)
     for number, place in enumerate(BLOCKS, start=1):
-        yield block(number, *place)
+        if not repaired:
+            yield block(number, *place)
         yield from ramp(number, *place)
     yield from crib(1)
     yield from crib(-1)
@@ -82,8 +83,9 @@ def models() -> Iterator[str]:
         yield board(f"board_{number:02d}", x, y, THICK / 2, 0.0, math.radians(degrees), length, on_edge=False)
 
 
-def rubble() -> str:
-    return pieces.world("rubble", models())
+def rubble(repaired: bool = False) -> str:
+    """The world, or the one without its cinder blocks."""
+    return pieces.world("rubble", models(repaired))
 
 
 if __name__ == "__main__":

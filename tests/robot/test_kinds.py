@@ -24,7 +24,7 @@ def rolled(degrees: float) -> tuple[float, ...]:
     return math.cos(half), math.sin(half), 0.0, 0.0
 
 
-def kind(trajectory: np.ndarray, *, fell: bool = False, arrived: bool = False) -> str:
+def kind(trajectory: np.ndarray, *, fell: bool = False, arrived: float | None = None) -> str:
     return kind_of(trajectory, fell, arrived)
 
 
@@ -83,10 +83,17 @@ def test_who_came_up_again_did_not_fall():
 def test_the_first_word_that_is_true_is_told():
     lying = way(20, lambda t: (0, 0, 0), lambda t: rolled(120 if t > 3 else 0))
     standing = way(20, lambda t: (0, 0, 0))
-    assert kind(lying, fell=True, arrived=True) == "fell"
-    assert kind(lying, arrived=True) == "tipped over"
-    assert kind(standing, arrived=True) == "lost"
-    assert kind(standing) == "stuck"
+    driving = way(20, lambda t: (min(t, 10), 0, 0))
+    assert kind(lying, fell=True, arrived=9.0) == "fell"
+    assert kind(lying, arrived=9.0) == "tipped over"
+    assert kind(driving, arrived=10.0) == "lost"
+    assert kind(driving) == "stuck"
+
+
+def test_who_was_stuck_before_it_believed_to_be_there_is_not_lost():
+    standing = way(20, lambda t: (min(t, 3), 0, 0))
+    assert kind(standing, arrived=15.0) == "stuck"
+    assert kind(standing, arrived=4.0) == "lost"
     assert kind(standing[:1]) == "stuck"
 
 

@@ -54,6 +54,7 @@ def with_options(
     *,
     timeout: float | None = None,
     epsilon: float | None = None,
+    early_stop: bool | None = None,
     spawn: Sequence[float] | None = None,
     goal: Sequence[float] | None = None,
     world: Path | None = None,
@@ -62,11 +63,11 @@ def with_options(
 ) -> Scenario:
     """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
-    `timeout` is in simulated s, `epsilon` in m, `spawn` x, y, z m and yaw rad (0 if left out), `goal` x, y m. All others
-    are keys of the scenario's section `reduction`.
+    `timeout` is in simulated s, `epsilon` in m, `early_stop` as in the section `failure`, `spawn` x, y, z m and yaw rad (0 if
+    left out), `goal` x, y m. All others are keys of the scenario's section `reduction`.
     """
     data = scenario.model_dump(mode="json")
-    failure = {"timeout": timeout, "epsilon": epsilon}
+    failure = {"timeout": timeout, "epsilon": epsilon, "early_stop": early_stop}
     data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
     data["failure"].update({key: value for key, value in failure.items() if value is not None})
     if spawn is not None:

@@ -14,7 +14,10 @@ from ddenv.world.scenario import Sensors
 
 
 class Autonomy:
-    """The sensors, the filter and the controller of one run. The controller sees what is measured, never the truth."""
+    """The sensors, the filter and the controller of one run. The controller sees what is measured, never the truth.
+
+    `arrived` is when (s) the controller came to believe that the robot is at its goal, None before.
+    """
 
     def __init__(
         self,
@@ -27,6 +30,7 @@ class Autonomy:
         controller: Any,
     ) -> None:
         """`start` (x, y in m, heading in rad) is what the robot knows of its place when it starts."""
+        self.arrived: float | None = None
         self._suite = suite
         self._left = [number for number, left in enumerate(drive.left) if left]
         self._right = [number for number, left in enumerate(drive.left) if not left]
@@ -44,11 +48,6 @@ class Autonomy:
         self._new_imu: Imu | None = None
         self._new_compass: float | None = None
         self._new_scan: Scan | None = None
-
-    @property
-    def arrived(self) -> bool:
-        """Whether the controller believes that the robot is at its goal, or has given up to get there."""
-        return bool(getattr(self._controller, "arrived", False) or getattr(self._controller, "gave_up", False))
 
     def sense(self, tick: Tick, truth: Truth, scan: Scan | None) -> None:
         """What is due at `tick` is measured, and the filter takes it in."""
@@ -76,7 +75,10 @@ class Autonomy:
             scan=self._new_scan,
         )
         self._new_wheels = self._new_imu = self._new_compass = self._new_scan = None
-        return self._controller.step(reading)
+        command = self._controller.step(reading)
+        if self.arrived is None and getattr(self._controller, "arrived", False):
+            self.arrived = tick.time
+        return command
 
     def _advance(self, step: int) -> None:
         if step == self._advanced:

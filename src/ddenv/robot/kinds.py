@@ -23,15 +23,15 @@ SETTLING = 1.0
 STILL, STILL_SECONDS = 0.5, 6.0
 
 
-def kind_of(trajectory: np.ndarray, fell: bool, arrived: bool) -> str:
+def kind_of(trajectory: np.ndarray, fell: bool, arrived: float | None) -> str:
     """How a run that did not reach its goal failed. `trajectory` (N, 8) is as in `RunResult`.
 
-    `fell` says that the robot is below everything that it could stand on, `arrived` that it drives no more because it believes that
-    it is at the goal or has given up. The first of these that is true:
+    `fell` says that the robot is below everything that it could stand on, `arrived` is when (s) it began to believe that it is at
+    the goal, if ever. The first of these that is true:
 
     fell         below everything, or more than 1 m down at once and not up again
     tipped over  what was up at the start leans more than 60 degrees at the end
-    lost         it believes that it has arrived, or has given up
+    lost         it came to believe that it has arrived, and was not stuck by then: wheels that spin in a rut take nobody anywhere
     stuck        in the last 6 s (or the last half of a shorter run) never more than 0.5 m from its end
     out of time  still on its way
     """
@@ -39,7 +39,7 @@ def kind_of(trajectory: np.ndarray, fell: bool, arrived: bool) -> str:
         return "fell"
     if _lean(trajectory) > LEAN:
         return "tipped over"
-    if arrived:
+    if arrived is not None and not _is_still(trajectory[trajectory[:, 0] <= max(arrived, trajectory[0, 0])]):
         return "lost"
     return "stuck" if _is_still(trajectory) else "out of time"
 

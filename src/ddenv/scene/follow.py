@@ -73,6 +73,9 @@ def _of_test(state: RunState, kind: str, test: Test) -> Shot:
         name, models = f"round {test.round} · {candidate.label}", frozenset(candidate.models)
     elif test.phase == "round":
         name, models = f"round {test.round}", frozenset(state.environment)
+    elif test.phase == "confirm":
+        name = f"what is left without {test.without}" if test.without else "what is left, in full"
+        models = frozenset(state.environment) - {test.without}
     words = [name, f"test {test.id}"]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")

@@ -119,7 +119,7 @@ class ExternalSimulator:
             return "error", why + said, self._rows(log)
         try:
             outcome, rows = OUTCOMES[ended.code], log.finish()
-            return outcome, kind_of(rows, fell=False, arrived=False) if outcome == "failed" else "", rows
+            return outcome, kind_of(rows, fell=False, arrived=None) if outcome == "failed" else "", rows
         except BadLog as error:
             return "error", f"{error}{said}", self._rows(log)
 

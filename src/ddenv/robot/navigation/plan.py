@@ -104,7 +104,13 @@ class Planner:
             places[-1] = start
         places[0] = start
         corners = self._cut_short(places, near[way], points)
-        return Path(corners, final=left <= self._tolerance, back=self._body.inscribed, on=self._body.inscribed)
+        # A place at the map's border is on the way to a goal beyond it, however near to that it is.
+        final = left <= self._tolerance and self._is_on_map(corner)
+        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
+
+    def _is_on_map(self, corner: np.ndarray) -> bool:
+        ahead = np.array(self._goal) - corner
+        return bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
 
     def _target(self, lengths: np.ndarray, corner: np.ndarray, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""

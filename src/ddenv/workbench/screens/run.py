@@ -178,6 +178,10 @@ class RunScreen(Controls):
     def _tell_round(self) -> None:
         state = self.snapshot.state
         panel = self.query_one("#round")
+        if state.confirming and not state.ended:
+            panel.border_title = "Full runs of what is left"
+            panel.border_subtitle = f"{sum(test.is_finished for test in state.confirm_tests)} made"
+            return
         panel.border_title = "Baseline: the whole world" if state.round is None else f"Round {state.round.number}"
         judged = (
             ""

@@ -1,0 +1,87 @@
+"""How often the robot fails in the scenarios that come with ddenv, and in the same worlds with the cause taken away.
+
+    python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
+
+Repaired are: the ditch filled, the cinder blocks of the rubble gone, all patches as rough as the asphalt. Failed is every run that does
+not reach the goal, f those that end within epsilon of the medoid of all that failed. Intervals are Wilson's, 95 %.
+"""
+
+import argparse
+import runpy
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.launch.scenarios import load_parts
+from ddenv.reduction.statistics import wilson_interval
+from ddenv.robot.oracle import medoid
+from ddenv.robot.result import RunResult
+from ddenv.robot.template import Template
+from ddenv.world.bundled import SCENARIOS, SDF
+from ddenv.world.load import load_scenario
+from ddenv.world.model import World
+from ddenv.world.read import parse_world
+
+SCRIPTS = SDF / "worlds"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seeds", type=int, default=30)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--scenarios", default="ditch,rubble,friction")
+    arguments = parser.parse_args()
+    print("| scenario | world | failed | f | how | longest way to the goal, s |")
+    print("|---|---|---|---|---|---|")
+    with ProcessPoolExecutor(arguments.jobs, mp_context=get_context("spawn")) as pool:
+        for name in arguments.scenarios.split(","):
+            for repaired in (False, True):
+                shares = [range(arguments.seeds)[job :: arguments.jobs] for job in range(arguments.jobs)]
+                asked = [(name, repaired, seeds) for seeds in shares]
+                results = [result for share in pool.map(runs, *zip(*asked, strict=True)) for result in share]
+                print(row(name, repaired, results), flush=True)
+
+
+def repaired_world(name: str) -> World:
+    """The world of a scenario with the cause of its failure taken away."""
+    sys.path.insert(0, str(SCRIPTS))
+    try:
+        text = runpy.run_path(str(SCRIPTS / f"make_{name}.py"))[name](repaired=True)
+    finally:
+        sys.path.remove(str(SCRIPTS))
+    return parse_world(text.encode(), Path(f"{name} repaired"))
+
+
+def runs(name: str, repaired: bool, seeds: range) -> list[RunResult]:
+    scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+    world, robot = load_parts(scenario)
+    if repaired:
+        world = repaired_world(name)
+    template = Template(world, robot, scenario)
+    return [template.run(frozenset(world.elements()), seed) for seed in seeds]
+
+
+def row(name: str, repaired: bool, results: list[RunResult]) -> str:
+    failed = [result for result in results if result.outcome != "pass"]
+    similar = 0
+    if failed:
+        ends = np.array([result.end_position for result in failed])
+        epsilon = load_scenario(SCENARIOS / f"{name}.yaml").failure.epsilon
+        similar = int((np.linalg.norm(ends - ends[medoid(ends)], axis=1) <= epsilon).sum())
+    kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(one.failure for one in failed).most_common())
+    longest = max((one.simulated_seconds for one in results if one.outcome == "pass"), default=None)
+    cells = [name, "repaired" if repaired else "whole", share(len(failed), len(results)), share(similar, len(results))]
+    return f"| {' | '.join(cells)} | {kinds or '-'} | {'-' if longest is None else f'{longest:.1f}'} |"
+
+
+def share(count: int, of: int) -> str:
+    low, high = wilson_interval(count, of)
+    return f"{count} of {of} ({low:.2f} to {high:.2f})"
+
+
+if __name__ == "__main__":
+    main()
