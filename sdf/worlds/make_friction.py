@@ -21,7 +21,9 @@ RED, GREEN = "0.70 0.16 0.12 1", "0.20 0.58 0.28 1"
 PROUD = 0.004  # m, how far a patch stands out of the asphalt: a wheel on it touches nothing else
 BARREL_RADIUS, BARREL_HEIGHT = 0.29, 1.0  # m
 BARREL_MU = 0.5
-ORANGE = "0.95 0.42 0.05 1"
+ORANGE, WHITE = "0.95 0.42 0.05 1", "0.93 0.93 0.90 1"
+BANDS = (0.45, 0.75)  # m, how high the middle of each white band is
+BAND = 0.12  # m
 
 BARRELS = [
     (3.0, -0.55), (1.9, -1.15), (-1.5, 1.6), (-1.2, -1.7), (0.6, 2.4), (0.4, -2.5), (3.4, 2.6), (3.6, -2.4),
@@ -56,6 +58,9 @@ def patch(name: str, mu: float, color: str, place: tuple[float, ...]) -> str:
 
 def barrel(number: int, x: float, y: float) -> str:
     parts = pieces.cylinder("barrel", (0, 0, BARREL_HEIGHT / 2), BARREL_RADIUS, BARREL_HEIGHT, BARREL_MU, ORANGE)
+    band = pieces.round_shape(BARREL_RADIUS + 0.004, BAND)
+    for which, height in enumerate(BANDS, start=1):
+        parts += pieces.visual(f"band_{which}", (0, 0, height), band, WHITE)
     return pieces.model(f"barrel_{number:02d}", on_road(x, y), parts)
 
 

@@ -35,9 +35,14 @@ def part(name: str, position: Sequence[float], geometry: str, mu: float, color: 
     """A collision and a visual of the same shape."""
     shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry>{geometry}</geometry>"
     return (
-        f'        <collision name="{name}">{shape}{friction(mu)}</collision>\n'
-        f'        <visual name="{name}">{shape}{material(color)}</visual>\n'
+        f'        <collision name="{name}">{shape}{friction(mu)}</collision>\n{visual(name, position, geometry, color)}'
     )
+
+
+def visual(name: str, position: Sequence[float], geometry: str, color: str) -> str:
+    """What is only seen."""
+    shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry>{geometry}</geometry>"
+    return f'        <visual name="{name}">{shape}{material(color)}</visual>\n'
 
 
 def box(name: str, position: Sequence[float], size: Sequence[float], mu: float, color: str) -> str:
@@ -45,7 +50,11 @@ def box(name: str, position: Sequence[float], size: Sequence[float], mu: float, 
 
 
 def cylinder(name: str, position: Sequence[float], radius: float, length: float, mu: float, color: str) -> str:
-    return part(name, position, f"<cylinder><radius>{radius:g}</radius><length>{length:g}</length></cylinder>", mu, color)
+    return part(name, position, round_shape(radius, length), mu, color)
+
+
+def round_shape(radius: float, length: float) -> str:
+    return f"<cylinder><radius>{radius:g}</radius><length>{length:g}</length></cylinder>"
 
 
 def model(name: str, pose: Sequence[float], parts: str, inertial: str = "") -> str:

@@ -32,7 +32,7 @@ def test_the_robot_is_stopped(world_of, add, husky, scenario_of, shape, turn, fr
     wall = model_of("wall", link_of("link", shape, Pose((2.0, 0.0, 0.35)) @ turn, mass=None))
     template = Template(add(world_of(), wall), husky, scenario_of(failure={"timeout": 5.0}))
     blocked = template.run(frozenset({"wall"}), seed=1)
-    assert (blocked.outcome, blocked.failure) == ("failed", "timeout")
+    assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
     # The robot reaches 0.5 m ahead of its frame; it comes up to the wall, and not through it.
     assert 2.0 - front - 0.7 < blocked.trajectory[:, 1].max() < 2.0 - front - 0.3
     assert template.run(frozenset(), seed=1).outcome == "pass"

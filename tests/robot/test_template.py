@@ -57,7 +57,7 @@ def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
 def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_of, husky, scenario_of, box):
     template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
     blocked = template.run(frozenset({"wall"}), seed=1)
-    assert (blocked.outcome, blocked.failure) == ("failed", "timeout")
+    assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
     assert blocked.simulated_seconds == pytest.approx(10.0)
     assert blocked.end_pose[0] < 1.1
     assert template.run(NOTHING, seed=1).outcome == "pass"
@@ -66,7 +66,7 @@ def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_o
 def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
     template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",)))
     assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))
-    assert template.run(NOTHING, seed=1).failure == "timeout"
+    assert template.run(NOTHING, seed=1).failure == "stuck"
 
 
 def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):

@@ -53,9 +53,9 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and is not there for those who have no use for it.
-    from ddenv.robot.template import Template
+    from ddenv.robot.variants import Variants
 
-    return Template(world, robot, scenario)
+    return Variants(world, robot, scenario)
 
 
 def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResult:

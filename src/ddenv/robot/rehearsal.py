@@ -8,7 +8,6 @@ alone, and is played back until the robot, or something that it set in motion, c
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,11 +16,10 @@ from pydrake.systems.framework import Context
 
 from ddenv.robot.clock import Clock
 from ddenv.robot.hold import Hold
-from ddenv.robot.links import Links, Motion, gaps, spread
+from ddenv.robot.links import Links, gaps, spread
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.presence import Presence
-from ddenv.world.extent import model_bounds
-from ddenv.world.model import World
+from ddenv.robot.repertoire import Known, Repertoire, Script
 
 NEAR = 0.1  # m; models this near to something that moves are simulated with it
 SLOW = 0.03  # m/s
@@ -31,38 +29,21 @@ BUDGET = 200.0
 LEAST = 1.0
 
 
-@dataclass(frozen=True)
-class Script:
-    """How a pile moves alone: `bodies` in the file's order, and a row for each instant at which something is due.
-
-    `states` are the `entries` of the plant's state, `motions` and `paces` (`Links.pace`, m/s) those of the pile's links. With
-    `rests` all of it is at rest after the last row, or has fallen out of the world; otherwise it still moves.
-    """
-
-    bodies: tuple[Body, ...]
-    entries: np.ndarray
-    states: np.ndarray
-    motions: tuple[Motion, ...]
-    paces: tuple[np.ndarray, ...]
-    rests: bool
-
-
-@dataclass(frozen=True)
-class _Known:
-    """`script` holds where of the static models `near` just `present` are kept. None: the simulation broke."""
-
-    near: frozenset[str]
-    present: frozenset[str]
-    script: Script | None
-
-
 class Rehearsals:
-    """The scripts of one world's piles. What is asked for twice is worked out once: it is the same to the last bit."""
+    """Works out the scripts of piles in one plant, each that is not in the `repertoire` of its world."""
 
     def __init__(
-        self, world: World, built: Built, context: Context, presence: Presence, hold: Hold, clock: Clock, floor: float
+        self,
+        repertoire: Repertoire,
+        built: Built,
+        context: Context,
+        presence: Presence,
+        hold: Hold,
+        clock: Clock,
+        floor: float,
     ) -> None:
         """`floor` (m) is the height below which a model has fallen out of the world."""
+        self._repertoire = repertoire
         self._built = built
         self._context = context
         self._plant_context = built.plant.GetMyMutableContextFromRoot(context)
@@ -70,11 +51,9 @@ class Rehearsals:
         self._hold = hold
         self._clock = clock
         self._floor = floor
-        self._known: dict[tuple[str, ...], list[_Known]] = {}
-        self._static = {model.name: model_bounds(model) for model in world.models if built.static[model.name]}
         self._bodies = tuple(built.moving.values())
         # The same for every run in this world, whatever is kept: removing a model must not end the script of another.
-        self._longest = max(LEAST, BUDGET / max(len(self._bodies), 1))
+        self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
         hold.begin()
         self._apart, self._to_robot = self._start_gaps()
 
@@ -117,22 +96,13 @@ class Rehearsals:
             left &= ~pile
         return piles
 
-    def _find(self, pile: tuple[Body, ...], present: frozenset[str]) -> _Known | None:
-        candidates = self._known.get(_names(pile), ())
-        return next((known for known in candidates if known.near & present == known.present), None)
+    def _find(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known | None:
+        return self._repertoire.find(_names(pile), present)
 
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> None:
         script = self._simulate(pile)
-        near = frozenset(self._static) if script is None else self._near(script)
-        self._known.setdefault(_names(pile), []).append(_Known(near, near & present, script))
-
-    def _near(self, script: Script) -> frozenset[str]:
-        """The static models that the pile could have met on its way."""
-        margin = NEAR + max(motion.speed.max() for motion in script.motions) * self._clock.period
-        low = np.min([motion.low.min(axis=0) for motion in script.motions], axis=0) - margin
-        high = np.max([motion.high.max(axis=0) for motion in script.motions], axis=0) + margin
-        met = {name for name, box in self._static.items() if box and (box[0] < high).all() and (low < box[1]).all()}
-        return frozenset(met)
+        fastest = max(motion.speed.max() for motion in script.motions) if script else 0.0
+        self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._clock.period)
 
     def _simulate(self, pile: tuple[Body, ...]) -> Script | None:
         """The pile alone in the world, until all of it rests or it has had its time; None if the simulation breaks."""
@@ -173,7 +143,7 @@ class Rehearsals:
             self._hold.apply()
             if calm >= CALM or tick.time >= self._longest:
                 break
-        return Script(pile, entries, np.array(states), tuple(motions), tuple(paces), rests=calm >= CALM)
+        return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), rests=calm >= CALM)
 
 
 def _names(pile: Iterable[Body]) -> tuple[str, ...]:

@@ -17,7 +17,8 @@ from ddenv.robot.hold import Hold
 from ddenv.robot.links import Links, Motion, gaps, spread
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.presence import Presence
-from ddenv.robot.rehearsal import CALM, NEAR, SLOW, Script
+from ddenv.robot.rehearsal import CALM, NEAR, SLOW
+from ddenv.robot.repertoire import Script
 from ddenv.world.extent import Bounds
 
 TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
@@ -67,7 +68,8 @@ class Sleep:
         self._robot = Links.of([built.robot])
         self._entries = [hold.entries([body]) for body in kept]
         number_of = {body.name: number for number, body in enumerate(kept)}
-        self._scripts = [(script, [number_of[body.name] for body in script.bodies]) for script in scripts]
+        self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
+        self._entries_of = [hold.entries([kept[number] for number in members]) for _, members in self._scripts]
         count = len(kept)
         self._awake = np.zeros(count, dtype=bool)
         self._gone = np.zeros(count, dtype=bool)
@@ -122,7 +124,7 @@ class Sleep:
             if self._played[members[0]] != number:
                 continue
             row = min(self._tick, len(script.motions) - 1)
-            self._hold.put(script.entries, script.states[row])
+            self._hold.put(self._entries_of[number], script.states[row])
             links = self._links.of_models(members)
             self._motion.put(links, script.motions[row])
             self._pace[links] = script.paces[row]
@@ -185,7 +187,7 @@ class Sleep:
         state = self._hold.state()
         for number, (script, members) in enumerate(self._scripts):
             if models[members].any() and self._played[members[0]] == number:
-                state[script.entries] = script.states[self._tick]
+                state[self._entries_of[number]] = script.states[self._tick]
                 # What the script would still do with those that it leaves, which have fallen out of the world, is no matter.
                 self._played[members] = -1
         for number in np.flatnonzero(models):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 
 from ddenv.errors import UserError
@@ -12,12 +13,13 @@ from ddenv.robot.clock import Clock
 from ddenv.robot.drive import Drive, find_drive, footprint
 from ddenv.robot.hold import Hold
 from ddenv.robot.notice import Notice
-from ddenv.robot.place import transform
 from ddenv.robot.own import controllers
+from ddenv.robot.place import transform
 from ddenv.robot.plant import Body, Built, build
 from ddenv.robot.presence import Presence
 from ddenv.robot.protocol import Setup
 from ddenv.robot.rehearsal import Rehearsals
+from ddenv.robot.repertoire import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.run import Run
 from ddenv.robot.sensing.lidar import Lidar
@@ -45,19 +47,59 @@ class Template:
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
+        self._world = world
+        self._solid = _with_ground(world, scenario)
+        self._robot = robot
         self._scenario = scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
         self._controllers = controllers(scenario.controller, scenario.folder)
-        self._built = _build(world, robot, self._drive, scenario)
-        self._surroundings = Surroundings.of(world, robot, self._built)
-        self._names = frozenset(model.name for model in world.models)
+        names = frozenset(model.name for model in world.models)
         grounds = frozenset(model.name for model in world.models if is_ground(model))
-        self._always = self._names & frozenset(scenario.protected) | grounds
+        self._always = names & frozenset(scenario.protected) | grounds
         self._floor = lowest(world) - FALL
         self._clock = Clock.of(scenario)
         self._setup = _setup(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
+        self._repertoire = Repertoire(world)
+        # False only to measure what sleeping gains: then all models are simulated all the time.
+        self._sleeping = True
+        self._build(names)
+
+    def without(self, names: frozenset[str]) -> Template:
+        """A template of the same world without the moving models `names`, which costs less and gives the same bits.
+
+        The two share what they know of the world. Raises ValueError for a model that never moves or is always there.
+        """
+        wrong = names - self.removable
+        if wrong:
+            raise ValueError(f"cannot be left out: {min(wrong)}")
+        smaller = copy(self)
+        smaller._build(self._names - names)
+        return smaller
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The models that it has."""
+        return self._names
+
+    @property
+    def removable(self) -> frozenset[str]:
+        """The moving models that it can be without."""
+        return self._built.moving.keys() - self._always
+
+    def shapes_without(self, names: frozenset[str]) -> int:
+        """How many shapes there are in the plant but for those of the models `names`."""
+        static, moving = self._built.static, self._built.moving
+        kept = [shapes for name, shapes in static.items() if name not in names]
+        kept += [body.geometry for name, body in moving.items() if name not in names]
+        return len(self._built.robot.geometry) + sum(map(len, kept))
+
+    def _build(self, names: frozenset[str]) -> None:
+        """Builds the plant of the models `names`; everything else is that of the whole world."""
+        self._names = names
+        self._built = _build(_part(self._solid, names), self._robot, self._drive, self._scenario)
+        self._surroundings = Surroundings.of(_part(self._world, names), self._robot, self._built)
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
         self._place()
@@ -65,10 +107,8 @@ class Template:
         self._presence = Presence(self._built, self._context)
         self._hold = Hold(self._built, self._plant_context, start)
         self._rehearsals = Rehearsals(
-            world, self._built, self._context, self._presence, self._hold, self._clock, self._floor
+            self._repertoire, self._built, self._context, self._presence, self._hold, self._clock, self._floor
         )
-        # False only to measure what sleeping gains: then all models are simulated all the time.
-        self._sleeping = True
 
     def run(
         self,
@@ -173,13 +213,20 @@ def _setup(robot: Model, drive: Drive, clock: Clock, scenario: Scenario) -> Setu
     )
 
 
+def _with_ground(world: World, scenario: Scenario) -> World:
+    """`world` with boxes for its planes, large enough for all of it and the robot's way."""
+    spawn, goal = scenario.robot.spawn, scenario.goal
+    return with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
+
+
+def _part(world: World, names: frozenset[str]) -> World:
+    """`world` with the models `names` alone."""
+    return replace(world, models=tuple(model for model in world.models if model.name in names))
+
+
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
     try:
-        spawn, goal = scenario.robot.spawn, scenario.goal
-        places = [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)]
-        built = build(
-            with_ground_boxes(world, places), robot, drive, scenario.simulation, scenario.controller.motor_gain
-        )
+        built = build(world, robot, drive, scenario.simulation, scenario.controller.motor_gain)
     except (ValueError, RuntimeError, SystemExit) as error:
         raise UserError(f"{world.path}: cannot be simulated: {error}") from error
     if not built.robot.base.is_floating_base_body():

@@ -130,7 +130,9 @@ class Planner(Section):
     replan: Positive = Field(2.0, description="longest time between two plans, s")
     patience: Positive = Field(4.0, description="time without progress before the robot tries to recover, s")
     recoveries: int = Field(6, ge=0, description="attempts to recover in a row before the robot gives up")
-    lowest: Finite = Field(0.1, description="what is seen lower than this above where the robot stands is no obstacle, m")
+    lowest: Finite = Field(
+        0.1, description="what is seen lower than this above where the robot stands is no obstacle, m"
+    )
 
 
 class Controller(Section):

@@ -25,7 +25,7 @@ def test_exit_code_0_is_a_pass_and_1_a_failure(simulator_of):
     assert (passed.motions, passed.first_sensed, passed.first_touched) == ({}, {}, {})
     assert 0 < passed.wall_seconds < 20
     failed = simulator_of(PASS + "; exit(1)").run(EVERYTHING, 3)
-    assert (failed.outcome, failed.failure) == ("failed", "timeout")
+    assert (failed.outcome, failed.failure) == ("failed", "stuck")
     assert np.array_equal(failed.trajectory, passed.trajectory)
 
 

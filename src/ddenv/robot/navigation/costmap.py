@@ -21,29 +21,48 @@ class Costmap:
     """Cells in which a beam has ended, aligned with the frame of the estimates. Each cell keeps the last place that was hit in it.
 
     A cell's slot is its number modulo the map's width: as the map rolls, what drops out at one side makes place for what comes
-    in at the other. What was not seen counts as free. `points` (N, 2) m are all places that were hit, `version` counts the
-    changes of the set of their cells.
+    in at the other. What was not seen counts as free. `spots` (3, N) are all places that were hit, x and y in m and 1,
+    `version` counts how often something appeared that is not beside what was there, or went away altogether.
     """
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
         self.resolution = planner.resolution
         self.count = max(round(planner.size / planner.resolution), 4)
-        self.points = np.empty((0, 2))
+        self.spots = np.empty((3, 0))
         self.version = 0
-        self._footprint = Footprint.of(setup)
+        body = Footprint.of(setup)
+        # One cell of the rim stays: a robot that turns may still hit what is there.
+        self._middle = (body.ahead - body.behind) / 2
+        self._half = (body.ahead + body.behind) / 2 - self.resolution
+        self._side = body.side - self.resolution
         # The wheels stand this far below the frame that the points are in.
         self._lowest = planner.lowest - setup.radius
         self._slots = np.empty(0, dtype=int)
+        # The slots that were hit when the version last changed, and those that are among or beside them, (count^2,).
+        self._known = self._slots
+        self._around = np.zeros(self.count**2, dtype=bool)
+        beside = (-1, 0, 1)
+        self._beside = np.array([[dx * self.count + dy] for dx in beside for dy in beside])
         self._hit = np.zeros(self.count**2, dtype=bool)
-        self._places = np.zeros((2, self.count**2))
+        self._places = np.ones((3, self.count**2))
         self._angles: np.ndarray | None = None
         self._beams = np.empty((2, 0))
+        # The cell in the middle, and how far the nearest of three neighbouring beams went.
+        self._cell: tuple[int, int] | None = None
+        self._far = np.empty(0)
+
+    @property
+    def points(self) -> np.ndarray:
+        """The places that were hit, (N, 2) m."""
+        return self.spots[:2].T
 
     def see(self, scan: Scan, estimate: Estimate, imu: Imu | None = None) -> None:
         """Take in what `scan` shows to a robot at `estimate`, tilted as `imu` says."""
         if scan.angles is not self._angles:
             self._angles, self._beams = scan.angles, np.stack([np.cos(scan.angles), np.sin(scan.angles)])
+            # The outermost beams clear nothing, nor is there anything beyond them.
+            self._far = np.zeros(len(scan.angles))
         roll, pitch = (imu.roll, imu.pitch) if imu else (0.0, 0.0)
         self._mark(scan, estimate, roll, pitch)
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)
@@ -57,56 +76,72 @@ class Costmap:
         seen = (bearings >= first) & (bearings <= last)
         near = np.hypot(dx, dy) <= np.where(seen, beyond, beyond_unseen)
         self._hit[self._slots[~near]] = False
-        self._keep(self._slots[near])
+        self._keep(self._slots[near], self.spots[:, near])
 
     def _mark(self, scan: Scan, estimate: Estimate, roll: float, pitch: float) -> None:
         turn = _rotation(roll, pitch, estimate.heading)
         start = turn @ scan.origin
         reach = (self.count / 2 - 1) * self.resolution - math.hypot(start[0], start[1])
-        near = np.flatnonzero(scan.ranges < reach)
-        x, y, height = (turn[:, :2] @ self._beams[:, near]) * scan.ranges[near] + start[:, None]
-        solid = height >= self._lowest
-        places = np.stack([x[solid] + estimate.x, y[solid] + estimate.y])
-        cells = np.floor(places / self.resolution).astype(int) % self.count
+        (near,) = (scan.ranges < reach).nonzero()
+        ends = self._beams.take(near, axis=1)
+        ends *= scan.ranges.take(near)
+        places = turn[:, :2] @ ends
+        solid = places[2] >= self._lowest - start[2]
+        if not solid.all():
+            places = places[:, solid]
+        places = places[:2]
+        places += ((start[0] + estimate.x,), (start[1] + estimate.y,))
+        cells = np.floor(places / self.resolution).astype(int)
+        cells %= self.count
         slots = cells[0] * self.count + cells[1]
         self._hit[slots] = True
-        self._places[:, slots] = places
+        self._places[:2, slots] = places
 
     def _clear(self, scan: Scan, estimate: Estimate, level: bool) -> None:
         """Drop what is out of the map, under the robot or, if the beams are level, where they have passed through."""
-        slots = np.flatnonzero(self._hit)
-        places = self._places[:, slots]
+        (slots,) = self._hit.nonzero()
+        spots = self._places.take(slots, axis=1)
         cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-        middle = [[(math.floor(part / self.resolution) + 0.5) * self.resolution] for part in (estimate.x, estimate.y)]
-        gone = (np.abs(places - middle) > self.count * self.resolution / 2).any(axis=0)
-        x, y = np.array([[cosine, sine], [-sine, cosine]]) @ (places - [[estimate.x], [estimate.y]])
-        body = self._footprint
-        # One cell of the rim stays: a robot that turns may still hit what is there.
-        gone |= (
-            (x < body.ahead - self.resolution)
-            & (x > self.resolution - body.behind)
-            & (np.abs(y) < body.side - self.resolution)
-        )
+        x, y = estimate.x, estimate.y
+        seen = np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y]]) @ spots
+        seen[0] -= self._middle
+        beyond = np.abs(seen)
+        gone = (beyond[0] < self._half) & (beyond[1] < self._side)
+        cell = math.floor(x / self.resolution), math.floor(y / self.resolution)
+        if cell != self._cell:
+            self._cell = cell
+            middle = [[(part + 0.5) * self.resolution] for part in cell]
+            gone |= (np.abs(spots[:2] - middle) > self.count * self.resolution / 2).any(axis=0)
         if level and len(scan.ranges) > 2:
-            gone |= self._seen_through(scan, x - scan.origin[0], y - scan.origin[1])
-        self._hit[slots[gone]] = False
-        self._keep(slots[~gone])
+            gone |= self._seen_through(scan, seen[0] + (self._middle - scan.origin[0]), seen[1] - scan.origin[1])
+        if gone.any():
+            self._hit[slots[gone]] = False
+            slots, spots = slots[~gone], spots[:, ~gone]
+        self._keep(slots, spots)
 
     def _seen_through(self, scan: Scan, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Past which places (N,), seen from the lidar, the nearest beam and those beside it went on."""
-        ranges, first = scan.ranges, scan.angles[0]
-        # The outermost beams clear nothing, nor is there anything beyond them.
-        far = np.zeros(len(ranges))
+        ranges, first, far = scan.ranges, scan.angles[0], self._far
         np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
         np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
         step = (scan.angles[-1] - first) / (len(ranges) - 1)
-        beams = np.rint((np.arctan2(y, x) - first) / step).astype(int)
-        return np.hypot(x, y) + PASSED * self.resolution < far[np.clip(beams, 0, len(ranges) - 1)]
+        beams = np.arctan2(y, x)
+        beams -= first
+        beams /= step
+        nearest = np.rint(beams, out=beams).astype(int)
+        return np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
 
-    def _keep(self, slots: np.ndarray) -> None:
-        self.version += not np.array_equal(slots, self._slots)
-        self._slots = slots
-        self.points = self._places[:, slots].T
+    def _keep(self, slots: np.ndarray, spots: np.ndarray) -> None:
+        same = len(slots) == len(self._slots) and bool((slots == self._slots).all())
+        self._slots, self.spots = slots, spots
+        if same:
+            return
+        around = np.zeros(self.count**2, dtype=bool)
+        around[(slots + self._beside) % len(around)] = True
+        if self._around[slots].all() and around[self._known].all():
+            return
+        self._known, self._around = slots, around
+        self.version += 1
 
 
 def _rotation(roll: float, pitch: float, heading: float) -> np.ndarray:

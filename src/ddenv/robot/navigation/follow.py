@@ -30,12 +30,13 @@ GIVE = 0.001
 # With this much room (m) at its sides it goes at full speed, with none at this part of it.
 ROOM = 0.35
 SLOWEST = 0.25
-# With this much (m) it need not look at every step.
+# With this much (m) it need not look again for this time, s.
 CALM = 0.1
-# Places along an arc that are tested, as parts of it, and angles of a turn (rad).
+CALM_FOR = 0.1
+# Parts of an arc at which it is tested.
 PLACES = np.linspace(0.0, 1.0, 7)
-TURNS = np.array([0.0, 0.1, 0.2, 0.35])
-BACK = np.array([0.0, -0.1, -0.2])  # m
+# An arc is bent at least so much, rad: too little to matter.
+BENT = 1e-6
 
 
 class Follower:
@@ -50,33 +51,39 @@ class Follower:
         self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
         self._turning = False
         self._path: Path | None = None
-        self._room: float | None = None
+        self._points: np.ndarray | None = None
+        # What was free, with room, is not tested again for so many steps.
+        self._calm = round(CALM_FOR / setup.period)
+        self._left = 0
+        self._room = 0.0
         self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
         self.stuck = False
 
     def step(self, path: Path, estimate: Estimate, points: np.ndarray) -> Twist:
-        """Where to go next on `path`, with `points` (N, 2) m near the robot, in the frame of the estimates."""
-        if path is not self._path:
-            self._path, self._room = path, None
+        """Where to go next on `path`, with `points` (3, N) near the robot: x and y (m) in the frame of the estimates, and 1."""
         path.locate(estimate.x, estimate.y)
-        self.stuck = False
         distance, bearing = self._aim(path, estimate, PARTS[0])
-        self._turning = abs(bearing) > (ALONG if self._turning else ASIDE)
-        if self._turning:
-            self._room = None
-            return self._turn(bearing, to_robot(points, estimate))
-        if self._room is not None:
-            # What was free, with room, a period ago over the whole look-ahead is tested again in the next.
-            room, self._room = self._room, None
-            return self._drive(path, distance, bearing, room)
-        points = to_robot(points, estimate)
+        turning = abs(bearing) > (ALONG if self._turning else ASIDE)
+        same = path is self._path and turning == self._turning
+        # Standing, it waits for what it sees next.
+        if same and self.stuck and points is self._points:
+            return STOP
+        self._path, self._points, self._turning = path, points, turning
+        self._left = self._left - 1 if same else -1
+        self.stuck = False
+        if turning:
+            return self._turn(bearing, estimate, points)
+        if self._left >= 0:
+            return self._drive(path, distance, bearing, self._room)
         for part in PARTS:
-            distance, bearing = self._aim(path, estimate, part)
-            room = self._room_on_arc(distance, bearing, points)
+            if part != PARTS[0]:
+                distance, bearing = self._aim(path, estimate, part)
+            room = self._room_on_arc(distance, bearing, estimate, points)
             if room is not None:
-                self._room = room if part == PARTS[0] and room >= CALM else None
+                self._room = room
+                self._left = self._calm if part == PARTS[0] and room >= CALM else 0
                 return self._drive(path, distance, bearing, room)
-        return self._turn(bearing, points)
+        return self._turn(bearing, estimate, points)
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
         """How far away (m) and in which direction (rad, from straight ahead) the place is that the robot aims at."""
@@ -85,20 +92,13 @@ class Follower:
         dx, dy = x - estimate.x, y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
 
-    def _room_on_arc(self, distance: float, bearing: float, points: np.ndarray) -> float | None:
+    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: np.ndarray) -> float | None:
         """How far (m) from all `points` the robot stays on its arc to the place that it aims at; None if it touches one."""
         if abs(bearing) > ASIDE:
             return None
-        if not len(points):
+        if not points.shape[1]:
             return ROOM
-        way = PLACES * distance
-        if abs(bearing) < 1e-3:
-            poses = np.stack([way, np.zeros_like(way), np.zeros_like(way)])
-        else:
-            headings = PLACES * (2 * bearing)
-            radius = distance / (2 * math.sin(bearing))
-            poses = np.stack([radius * np.sin(headings), radius * (1 - np.cos(headings)), headings])
-        return room(self._body, points, poses)
+        return room(self._body, points, estimate, _arc(distance, bearing))
 
     def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
         bend = 2 * math.sin(bearing) / max(distance, 1e-6)
@@ -113,7 +113,7 @@ class Follower:
         fastest *= max(math.cos(bearing), 0.0)
         return Twist(fastest, fastest * bend)
 
-    def _turn(self, bearing: float, points: np.ndarray) -> Twist:
+    def _turn(self, bearing: float, estimate: Estimate, points: np.ndarray) -> Twist:
         """On the spot towards `bearing` (rad), by the other side if only that is free, or back to where there is room to turn."""
         if abs(bearing) < ALIGNED:
             self.stuck = True
@@ -122,41 +122,68 @@ class Follower:
         sides = (1.0, -1.0) if bearing > 0 else (-1.0, 1.0)
         # What is nearly ahead is not looked for all the way round.
         for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
-            if may_turn(self._body, points, side):
+            if may_turn(self._body, points, estimate, side):
                 return Twist(0.0, side * rate)
-        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points):
+        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points, estimate):
             return Twist(-min(BACK_SPEED, self._setup.speed), 0.0)
         self.stuck = True
         return STOP
 
 
-def to_robot(points: np.ndarray, estimate: Estimate) -> np.ndarray:
-    """`points` (N, 2) m, in the frame of the estimates, as the robot sees them."""
-    if not len(points):
-        return points
-    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-    return (points - (estimate.x, estimate.y)) @ np.array([[cosine, -sine], [sine, cosine]])
+def room(body: Footprint, points: np.ndarray, estimate: Estimate, places: np.ndarray) -> float | None:
+    """How far (m) `body` stays from `points` (3, N) at `places` (2, K, 3) as seen by the robot at `estimate`, the first its own.
 
-
-def room(body: Footprint, points: np.ndarray, poses: np.ndarray) -> float | None:
-    """How far (m) `body` stays from `points` (N, 2) at `poses` (3, K), the first of which it has now; None if it touches one.
-
-    What is within the margin already may come a little nearer, so that it can turn away, but not be touched, or touched harder.
+    None if it touches one: what is within the margin already may come a little nearer, so that it can turn away, but not be
+    touched, or touched harder.
     """
-    depths = body.depths(points, poses)
-    now = depths[0]
-    if (depths[1:] > np.maximum(now, np.minimum(np.maximum(now, 0.0) + GIVE, body.margin))).any():
-        return None
-    return max(-float(depths.max()), 0.0)
+    apart = body.apart(points, places @ _seen_from(estimate))
+    least = float(apart.min())
+    if least >= 0:
+        return least
+    now, nearest = apart[0], apart[1:].min(axis=0)
+    may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
+    return None if (nearest < may).any() else 0.0
 
 
-def may_turn(body: Footprint, points: np.ndarray, side: float) -> bool:
-    """Whether the robot may turn on the spot a little, to its left if `side` is 1, else -1, past `points` (N, 2) it sees."""
-    if not len(points):
-        return True
-    return room(body, points, np.stack([np.zeros_like(TURNS), np.zeros_like(TURNS), side * TURNS])) is not None
+def may_turn(body: Footprint, points: np.ndarray, estimate: Estimate, side: float) -> bool:
+    """Whether the robot may turn on the spot a little, to its left if `side` is 1, else -1, past `points` (3, N)."""
+    return not points.shape[1] or room(body, points, estimate, LEFT if side > 0 else RIGHT) is not None
 
 
-def may_back_up(body: Footprint, points: np.ndarray) -> bool:
-    """Whether the robot may go straight back a little past `points` (N, 2) it sees."""
-    return not len(points) or room(body, points, np.stack([BACK, np.zeros_like(BACK), np.zeros_like(BACK)])) is not None
+def may_back_up(body: Footprint, points: np.ndarray, estimate: Estimate) -> bool:
+    """Whether the robot may go straight back a little past `points` (3, N)."""
+    return not points.shape[1] or room(body, points, estimate, BACK) is not None
+
+
+def _seen_from(estimate: Estimate) -> np.ndarray:
+    """What turns places (3,), the third number 1, in the frame of the estimates into those that the robot sees, (3, 3)."""
+    x, y = estimate.x, estimate.y
+    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
+    return np.array(
+        [[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]]
+    )
+
+
+def _turned(angle: float) -> np.ndarray:
+    return _seen_from(Estimate(0.0, 0.0, angle))[:2]
+
+
+def _arc(distance: float, bearing: float) -> np.ndarray:
+    """Places on the arc from the robot to where it aims, for `Footprint.apart`."""
+    bearing = math.copysign(max(abs(bearing), BENT), bearing)
+    radius = distance / (2 * math.sin(bearing))
+    headings = PLACES * (2 * bearing)
+    places = np.empty((2, len(PLACES), 3))
+    along, across = places
+    along[:, 0] = across[:, 1] = cosines = np.cos(headings)
+    along[:, 1] = sines = np.sin(headings)
+    across[:, 0] = -sines
+    along[:, 2] = -radius * sines
+    across[:, 2] = radius - radius * cosines
+    return places
+
+
+# Turned on the spot, and a little back.
+LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+BACK = np.stack([_seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

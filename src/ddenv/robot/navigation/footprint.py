@@ -40,17 +40,18 @@ class Footprint:
         """Radius (m) about the origin beyond which the robot never reaches."""
         return float(np.hypot(max(self.ahead, self.behind), self.side))
 
-    def depths(self, points: np.ndarray, poses: np.ndarray) -> np.ndarray:
-        """How deep (K, N) m `points` (N, 2) are in the footprint with its margin at `poses` (3, K): x, y, heading.
+    def apart(self, points: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """How far (K, N) m `points` (3, N), the third row 1, are from the footprint with its margin at least; inside below 0.
 
-        Negative is outside: at least so far from its edge.
+        `places` (2, K, 3) turn such a point into how far ahead and how far aside of the robot it is, for each of K places.
         """
-        x, y, heading = poses[:, :, None]
-        cosine, sine = np.cos(heading), np.sin(heading)
-        dx, dy = points[:, 0] - x, points[:, 1] - y
-        along = np.abs(cosine * dx + sine * dy - (self.ahead - self.behind) / 2)
-        across = np.abs(cosine * dy - sine * dx)
-        return np.minimum((self.ahead + self.behind) / 2 - along, self.side - across) + self.margin
+        beyond = places.reshape(-1, 3) @ points
+        count = places.shape[1]
+        beyond[:count] -= (self.ahead - self.behind) / 2
+        np.abs(beyond, out=beyond)
+        beyond[:count] -= (self.ahead + self.behind) / 2 + self.margin
+        beyond[count:] -= self.side + self.margin
+        return np.maximum(beyond[:count], beyond[count:])
 
 
 def legs_beside(

@@ -17,11 +17,14 @@ from ddenv.robot.protocol import STOP, Reading, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.readings import Imu
 
-# Scans that come faster than this (s) are left out.
+# Scans that come faster than this (s) are left out, and of a robot that waits where it is, these.
 LOOK_EVERY = 0.2
+LOOK_WAITING = 0.6
 # Between two plans, at least, s; and without a plan for so long, the robot tries to recover, s.
 THINK_EVERY = 0.5
 THINK = 1.0
+# Where it could not follow its plan, it makes no other one so soon until it is this far (m) away.
+ELSEWHERE = 0.1
 # A plan that ends at the map's border is made anew when less than this (m) is left of it.
 TOO_SHORT = 2.0
 # Farther beside its plan than this (m), the robot makes another.
@@ -44,27 +47,32 @@ class Navigator:
         self._setup = setup
         self._map = Costmap(setup)
         self._planner = Planner(setup)
+        self._replan = max(planner.replan, THINK_EVERY)
         self._follower = Follower(setup)
         self._progress = Progress(planner.patience)
         self._recovery = Recovery(setup)
         self._attempt: Attempt | None = None
         self._path: Path | None = None
         self._imu: Imu | None = None
-        self._near = self._map.points
+        self._near = self._map.spots
         self._looked = self._planned = -math.inf
+        self._planned_at = setup.start[:2]
         self._found = 0.0
         self._planned_on = -1
         self._blocked = False
         self._recovered: tuple[float, float] | None = None
         self._speed = 0.0
+        self._waits = False
         self.arrived = False
         self.gave_up = False
 
     def step(self, reading: Reading) -> Twist:
         """The command for the next period."""
-        self._look(reading)
-        self.arrived = self.arrived or self._is_there(reading.estimate)
         if self.arrived or self.gave_up:
+            return STOP
+        self._look(reading)
+        self.arrived = self._is_there(reading.estimate)
+        if self.arrived:
             return STOP
         twist = self._recover(reading) if self._attempt else self._follow(reading)
         # Faster starts lift the front wheels; it may always brake.
@@ -72,11 +80,13 @@ class Navigator:
         if twist.speed > most:
             twist = Twist(most, twist.turn_rate * most / twist.speed)
         self._speed = max(twist.speed, 0.0)
+        self._waits = twist == STOP and self._attempt is None and self._path is not None
         return twist
 
     def _look(self, reading: Reading) -> None:
         self._imu = reading.imu or self._imu
-        if reading.scan is None or reading.time < self._looked + LOOK_EVERY - TICK:
+        every = LOOK_WAITING if self._waits else LOOK_EVERY
+        if reading.scan is None or reading.time < self._looked + every - TICK:
             return
         self._looked = reading.time
         self._map.see(reading.scan, reading.estimate, self._imu)
@@ -84,10 +94,10 @@ class Navigator:
 
     def _see(self, estimate: Estimate) -> None:
         """Note what the map has to say about the path."""
-        points = self._map.points
-        apart = np.abs(points - (estimate.x, estimate.y)).max(axis=1, initial=0.0)
-        self._near = points[apart < self._follower.reach]
-        self._blocked = self._path is not None and self._planner.room(self._path, points) is None
+        spots, reach = self._map.spots, self._follower.reach
+        near = (np.abs(spots[0] - estimate.x) < reach) & (np.abs(spots[1] - estimate.y) < reach)
+        self._near = spots[:, near]
+        self._blocked = self._path is not None and self._planner.room(self._path, self._map.points) is None
 
     def _is_there(self, estimate: Estimate) -> bool:
         goal, tolerance = self._setup.goal, self._setup.tolerance
@@ -112,15 +122,22 @@ class Navigator:
     def _think(self, time: float, estimate: Estimate) -> None:
         """Plan if there is a reason to, and from time to time if the map has changed."""
         since = time - self._planned + TICK
+        is_due = since >= self._replan and self._map.version != self._planned_on
         if self._path is None or self._is_spoilt(self._path):
-            if since >= THINK_EVERY:
+            if since >= THINK_EVERY and (is_due or not self._is_no_use(estimate)):
                 self._plan(time, estimate)
             return
-        if since < self._setup.settings.planner.replan or self._map.version == self._planned_on:
+        if not is_due:
             return
         self._planned, self._planned_on = time, self._map.version
         if not self._planner.is_best(self._path, self._map.points):
             self._plan(time, estimate)
+
+    def _is_no_use(self, estimate: Estimate) -> bool:
+        """Whether another plan would leave the robot where it is, too: this one was made from here, and it cannot follow it."""
+        if not self._follower.stuck or self._blocked:
+            return False
+        return math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
 
     def _is_spoilt(self, path: Path) -> bool:
         """Whether something is in the way, the robot has left it, or it ends soon at the map's border."""
@@ -130,6 +147,7 @@ class Navigator:
 
     def _plan(self, time: float, estimate: Estimate) -> None:
         self._planned, self._planned_on = time, self._map.version
+        self._planned_at = estimate.x, estimate.y
         path = self._planner.plan(self._map.points, estimate.x, estimate.y)
         if path is not None:
             self._found = time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -35,6 +35,8 @@ class Path:
         self.back, self.on = back, on
         self.off = 0.0
         self._legs = [_leg(*pair) for pair in pairwise(corners)]
+        # How long the rest is from the start of each leg.
+        self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
         self._number = 0
         self._along = 0.0
 
@@ -45,7 +47,7 @@ class Path:
     @property
     def left(self) -> float:
         """How long (m) the rest of it is."""
-        return sum(leg.length for leg in self._legs[self._number :]) - self._along
+        return self._rests[self._number] - self._along
 
     def locate(self, x: float, y: float) -> None:
         """Note that the robot is at (x, y): it never goes back, and reaches the legs in turn."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.navigation.follow import BACK_SPEED, may_back_up, may_turn, to_robot
+from ddenv.robot.navigation.follow import BACK_SPEED, may_back_up, may_turn
 from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.protocol import STOP, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
@@ -55,7 +55,7 @@ class BackUp:
         gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
         if gone >= BACK or time >= self._until:
             return None
-        return Twist(-self._speed, 0.0) if may_back_up(self._body, to_robot(map_.points, estimate)) else None
+        return Twist(-self._speed, 0.0) if may_back_up(self._body, map_.spots, estimate) else None
 
 
 class LookAround:
@@ -73,7 +73,7 @@ class LookAround:
         self._heading = estimate.heading
         if self._turned >= math.tau or time >= self._until:
             return None
-        return Twist(0.0, self._rate) if may_turn(self._body, to_robot(map_.points, estimate), 1.0) else None
+        return Twist(0.0, self._rate) if may_turn(self._body, map_.spots, estimate, 1.0) else None
 
 
 @dataclass(slots=True)

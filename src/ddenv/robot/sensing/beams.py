@@ -1,7 +1,7 @@
 """Casting beams: how far each of the beams of a lidar goes until it meets a shape.
 
-All beams start in one point and lie in one plane, the x-y plane of the lidar. Shapes that this plane does not cut are left out,
-and of the others each is met only with the beams that point towards the box around it.
+All beams start in one point and lie in one plane, the x-y plane of the lidar. Shapes that this plane does not cut may be left
+out, and of the others each is met only with the beams that point towards the box around it.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -74,6 +75,11 @@ class Shapes:
     lengths: np.ndarray
     facets: Mapping[int, Facets]
 
+    @cached_property
+    def firsts(self) -> list[int]:
+        """Where each kind begins, and where the last one ends."""
+        return self.kinds.searchsorted(BOUNDS).tolist()
+
     @classmethod
     def of(cls, obstacles: Obstacles, rows: np.ndarray) -> Shapes:
         """The shapes `rows` (N,) of `obstacles`; those on links that move are where they are in their link's frame."""
@@ -90,62 +96,103 @@ class Shapes:
         )
 
 
+    def take(self, rows: np.ndarray) -> Shapes:
+        """The shapes `rows` (K,) alone, in this order."""
+        return Shapes(
+            kinds=self.kinds[rows],
+            centers=self.centers.take(rows, axis=1),
+            frames=self.frames.take(rows, axis=2),
+            squares=self.squares.take(rows, axis=1),
+            reaches=self.reaches[rows],
+            lengths=self.lengths[rows],
+            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
+        )
+
+
 @dataclass(frozen=True)
 class Ends:
-    """Where beams end: `distances` (B,) m, infinite for those that meet nothing, and `beams` (M,) that met `shapes` (M,)."""
+    """Where the beams of S scans end: `distances` (S, B) m, infinite for those that meet nothing.
+
+    `beams` (M,) that met `shapes` (M,) are counted from the first beam of the first scan.
+    """
 
     distances: np.ndarray
     beams: np.ndarray
     shapes: np.ndarray
 
 
-def cast(fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray) -> Ends:
-    """The beams from `origin` (3,) m, whose angles count from the first of `axes` (3, 3) towards the second; all in the world.
+def in_the_way(
+    fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray, around: float, lift: float, tilt: float
+) -> np.ndarray:
+    """The numbers (K,) of the shapes that beams from `origin` (3,) along `axes` may meet, see `cast`, and from near there.
 
-    A shape around the origin is not met.
+    Near is at most `around` (m) away, `lift` (m) of it along the third axis, which may turn by `tilt` (rad).
     """
-    distances = np.full(len(fan.angles), np.inf)
-    numbers, local, spans = _in_the_way(fan, shapes, origin, axes)
-    counts, beams = fan.between(*spans)
-    enter, leave = _cross(fan, shapes, numbers, local, counts, beams)
-    (met,) = ((enter >= 0) & (enter <= np.minimum(leave, fan.range))).nonzero()
-    beams, enter = beams[met], enter[met]
-    np.minimum.at(distances, beams, enter)
-    (nearest,) = (enter == distances[beams]).nonzero()
-    return Ends(distances, beams[nearest], numbers.repeat(counts)[met[nearest]])
-
-
-def _in_the_way(
-    fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """The numbers (K,) of the shapes that beams may meet, the lidar in their frames, and the angles at which they are.
-
-    The lidar is its place and its three axes, (4, 3, K), the angles are the middle and half the width, (K,) rad each.
-    """
-    numbers = _within_reach(fan, shapes, origin, axes)
-    view = np.empty((4, 3, len(numbers)))
-    view[0] = origin[:, None] - shapes.centers.take(numbers, axis=1)
-    view[1:] = axes[:, :, None]
-    frames = shapes.frames.take(numbers, axis=2)
-    local = view[:, :1] * frames[0] + view[:, 1:2] * frames[1] + view[:, 2:] * frames[2]
-    # Half the edges of the boxes around the shapes, and their centers, along the lidar's axes.
-    edges = local[1:] * shapes.squares.take(numbers, axis=1)
-    centers = -(edges * local[0]).sum(axis=1)
-    cut = np.abs(centers[2]) <= np.abs(edges[2]).sum(axis=0) + SPARE
+    numbers = _within_reach(fan, shapes, origin, axes, around, lift, tilt)
+    frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
+    local = (away[:, None] * frames).sum(axis=0)
+    up = (axes[2][:, None, None] * frames).sum(axis=0)
+    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical.
+    edges = up * shapes.squares.take(numbers, axis=1)
+    spare = lift + tilt * (np.sqrt((away * away).sum(axis=0)) + around + 2 * shapes.reaches[numbers]) + SPARE
+    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + spare
     # How far the beams get along each of a shape's axes: a ground may be high enough, but farther than that.
-    ways = np.sqrt(local[1] * local[1] + local[2] * local[2])
-    cut &= (np.abs(local[0]) - 1.0 <= ways * (fan.range * (1.0 + SPARE)) + SPARE).all(axis=0)
-    (kept,) = cut.nonzero()
-    span = _span(centers.take(kept, axis=1), edges.take(kept, axis=2))
-    return numbers[kept], local.take(kept, axis=2), span
+    sizes = np.sqrt((frames * frames).sum(axis=0))
+    ways = np.sqrt(np.maximum(sizes * sizes - up * up, 0.0)) + sizes * tilt
+    near = np.abs(local) - 1.0 <= ways * (fan.range * (1.0 + SPARE) + around) + np.abs(up) * lift + SPARE
+    return numbers[cut & near.all(axis=0)]
 
 
-def _within_reach(fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray) -> np.ndarray:
+def cast(fan: Fan, shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> Ends:
+    """The beams of S scans from `origins` (S, 3) m, in the world as `axes` (S, 3, 3) are.
+
+    Their angles count from the first of the axes towards the second. A shape around an origin is not met.
+    """
+    scans, count = len(origins), len(fan.angles)
+    distances = np.full((scans, count), np.inf)
+    local = _seen(shapes, origins, axes)
+    # Half the edges of the boxes around the shapes, and their centers, along the lidar's first two axes.
+    edges = local[1:3] * shapes.squares[:, :, None]
+    centers = (edges * local[0]).sum(axis=1)
+    seen = len(shapes.kinds) * scans
+    local = local.reshape(4, 3, seen)
+    counts, beams = fan.between(*_span(np.negative(centers, out=centers).reshape(2, seen), edges.reshape(2, 3, seen)))
+    enter, leave = _cross(fan, shapes, local, counts, beams)
+    np.minimum(leave, fan.range, out=leave)
+    (met,) = ((enter >= 0) & (enter <= leave)).nonzero()
+    numbers = np.arange(seen).repeat(counts)[met]
+    beams, enter = beams[met], enter[met]
+    if scans > 1:
+        beams += numbers % scans * count
+    flat = distances.ravel()
+    np.minimum.at(flat, beams, enter)
+    (nearest,) = (enter == flat[beams]).nonzero()
+    return Ends(distances, beams[nearest], numbers[nearest] // scans)
+
+
+def _seen(shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """The lidar's place and its three axes as each shape sees them in each scan, (4, 3, K, S)."""
+    view = np.empty((4, 3, len(shapes.kinds), len(origins)))
+    np.subtract(origins.T[:, None], shapes.centers[:, :, None], out=view[0])
+    view[1:] = axes.transpose(1, 2, 0)[:, :, None]
+    frames = shapes.frames[..., None]
+    local = view[:, :1] * frames[0]
+    local += view[:, 1:2] * frames[1]
+    local += view[:, 2:] * frames[2]
+    return local
+
+
+def _within_reach(
+    fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray, around: float, lift: float, tilt: float
+) -> np.ndarray:
     """The numbers of the shapes of which the balls around them are cut by the plane of the beams, within their range."""
     # A matrix product may be rounded otherwise among more shapes: nothing else is made of this one.
     ahead, left, above = axes @ (shapes.centers - origin[:, None])
-    far = shapes.reaches + fan.range
-    (numbers,) = ((np.abs(above) <= shapes.reaches) & (ahead * ahead + left * left <= far * far)).nonzero()
+    flat, high = ahead * ahead + left * left, np.abs(above)
+    tallest = shapes.reaches + lift + tilt * (np.sqrt(flat + high * high) + around)
+    # A tilt brings what is above and below by so much nearer in the plane.
+    far = (shapes.reaches + (fan.range + around) + tilt * (high + around)) * (1.0 + tilt * tilt)
+    (numbers,) = ((high <= tallest) & (flat <= far * far)).nonzero()
     return numbers
 
 
@@ -162,15 +209,16 @@ def _span(centers: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.arctan2(y, x), np.where(gap > 0, np.arctan2(wide, gap), math.pi) + SPARE
 
 
-def _cross(
-    fan: Fan, shapes: Shapes, numbers: np.ndarray, local: np.ndarray, counts: np.ndarray, beams: np.ndarray
-) -> Interval:
-    """Where `beams` (P,) enter and leave the shapes `numbers` (K,), of which each has `counts` (K,) of them."""
+def _cross(fan: Fan, shapes: Shapes, local: np.ndarray, counts: np.ndarray, beams: np.ndarray) -> Interval:
+    """Where `beams` (P,) enter and leave the shapes, of which each has `counts` (K * S,) of them, those of each scan in turn."""
     start, ahead, left = local[:3].repeat(counts, axis=2)
-    way = ahead * fan.cosines[beams] + left * fan.sines[beams]
+    ahead *= fan.cosines.take(beams)
+    left *= fan.sines.take(beams)
+    way = np.add(ahead, left, out=ahead)
     enter, leave = np.empty((2, len(beams)))
     ends = [0, *counts.cumsum().tolist()]
-    firsts = shapes.kinds[numbers].searchsorted(BOUNDS).tolist()
+    scans = len(counts) // max(len(shapes.kinds), 1)
+    firsts = [first * scans for first in shapes.firsts]
     bounds = [ends[first] for first in firsts]
     for kind, crossing in enumerate(CROSSINGS):
         part = slice(bounds[kind], bounds[kind + 1])
@@ -178,10 +226,10 @@ def _cross(
             enter[part], leave[part] = crossing(start[:, part], way[:, part])
     if bounds[PILL] < bounds[PILL + 1]:
         part = slice(bounds[PILL], bounds[PILL + 1])
-        lengths = shapes.lengths[numbers].repeat(counts)[part]
-        enter[part], leave[part] = pill(start[:, part], way[:, part], lengths)
-    for one in range(firsts[HULL], len(numbers)):
-        part = slice(ends[one], ends[one + 1])
-        normal = local[3, :, one] * shapes.squares[:, numbers[one]]
-        enter[part], leave[part] = shapes.facets[numbers[one]].cast(local[0, :, one], way[:, part], normal)
+        lengths = shapes.lengths.repeat(scans).repeat(counts)
+        enter[part], leave[part] = pill(start[:, part], way[:, part], lengths[part])
+    for one in range(firsts[HULL], len(counts)):
+        part, shape = slice(ends[one], ends[one + 1]), one // scans
+        normal = local[3, :, one] * shapes.squares[:, shape]
+        enter[part], leave[part] = shapes.facets[shape].cast(local[0, :, one], way[:, part], normal)
     return enter, leave

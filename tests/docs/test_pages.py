@@ -1,0 +1,78 @@
+"""The pages name every key and option there is, with its default, and their links lead somewhere."""
+
+import re
+
+import pytest
+
+from ddenv.cli.app import app
+from ddenv.world.scenario import (
+    Controller,
+    FailureSpec,
+    Lidar,
+    Planner,
+    Reduction,
+    Scenario,
+    Section,
+    Sensors,
+    Simulation,
+)
+from tests.conftest import ROOT
+
+GUIDE = (ROOT / "docs/user-guide.md").read_text()
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def anchors(page):
+    titles = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(page.read_text()):
+        if "://" in link:
+            continue
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize(
+    "section",
+    [Scenario, Sensors, Lidar, Controller, Planner, FailureSpec, Reduction, Simulation],
+    ids=lambda section: section.__name__,
+)
+def test_the_guide_names_every_key(section):
+    named = {key for words in re.findall(r"`([\w.]+)`", GUIDE) for key in words.split(".")}
+    assert section.model_fields.keys() - named == set()
+
+
+@pytest.mark.parametrize(
+    ("key", "section"),
+    [
+        *((f"failure.{key}", FailureSpec) for key in ("epsilon", "timeout")),
+        *((f"reduction.{key}", Reduction) for key in ("n_partitions", "iterations", "delta", "seed", "baseline_runs")),
+        *((f"simulation.{key}", Simulation) for key in ("time_step", "wall_timeout")),
+        *(
+            (key, Planner)
+            for key in ("padding", "inflation", "look_ahead", "replan", "patience", "recoveries", "lowest")
+        ),
+        *((key, Sensors) for key in ("compass", "gyro", "tilt", "odometry", "compass_rate")),
+        *((key, Controller) for key in ("period", "speed", "heading_gain", "skid", "motor_gain")),
+        *((f"lidar.{key}", Lidar) for key in ("rate", "range", "noise", "x")),
+    ],
+)
+def test_the_guide_has_the_defaults(key: str, section: type[Section]):
+    row = next(line for line in GUIDE.splitlines() if line.startswith(f"| `{key}`"))
+    default = section.model_fields[key.rpartition(".")[2]].default
+    assert float(re.match(r"[\d.]+", row.split(" | ")[-1]).group()) == default
+
+
+@pytest.mark.parametrize("name", ["run", "test"])
+def test_the_guide_names_every_option(name):
+    options = {
+        option for parameter in app.commands[name].params for option in parameter.opts if option.startswith("--")
+    }
+    assert {option for option in options if f"`{option}" not in GUIDE} == set()
