@@ -22,8 +22,7 @@ PROUD = 0.004  # m, how far a patch stands out of the asphalt: a wheel on it tou
 BARREL_RADIUS, BARREL_HEIGHT = 0.29, 1.0  # m
 BARREL_MU = 0.5
 ORANGE, WHITE = "0.95 0.42 0.05 1", "0.93 0.93 0.90 1"
-BANDS = (0.45, 0.75)  # m, how high the middle of each white band is
-BAND = 0.12  # m
+STRIPES = (ORANGE, WHITE, ORANGE, WHITE, ORANGE)  # of a barrel, from below
 
 BARRELS = [
     (3.0, -0.55), (1.9, -1.15), (-1.5, 1.6), (-1.2, -1.7), (0.6, 2.4), (0.4, -2.5), (3.4, 2.6), (3.6, -2.4),
@@ -57,10 +56,12 @@ def patch(name: str, mu: float, color: str, place: tuple[float, ...]) -> str:
 
 
 def barrel(number: int, x: float, y: float) -> str:
-    parts = pieces.cylinder("barrel", (0, 0, BARREL_HEIGHT / 2), BARREL_RADIUS, BARREL_HEIGHT, BARREL_MU, ORANGE)
-    band = pieces.round_shape(BARREL_RADIUS + 0.004, BAND)
-    for which, height in enumerate(BANDS, start=1):
-        parts += pieces.visual(f"band_{which}", (0, 0, height), band, WHITE)
+    whole = pieces.round_shape(BARREL_RADIUS, BARREL_HEIGHT)
+    parts = pieces.collision("barrel", (0, 0, BARREL_HEIGHT / 2), whole, BARREL_MU)
+    high = BARREL_HEIGHT / len(STRIPES)
+    for stripe, color in enumerate(STRIPES):
+        middle = (0, 0, high * (stripe + 0.5))
+        parts += pieces.visual(f"stripe_{stripe + 1}", middle, pieces.round_shape(BARREL_RADIUS, high), color)
     return pieces.model(f"barrel_{number:02d}", on_road(x, y), parts)
 
 

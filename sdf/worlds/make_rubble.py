@@ -40,7 +40,7 @@ def board(name: str, x: float, y: float, z: float, pitch: float, yaw: float, len
 
 
 def crib(side: int) -> Iterator[str]:
-    """Boards on edge, two a layer, crosswise: as tall as the lidar's plane."""
+    """Boards on edge, two a layer, crosswise: taller than the lidar's plane."""
     name = "left" if side > 0 else "right"
     y = side * 1.55
     for layer in range(LAYERS):

@@ -33,10 +33,13 @@ def material(color: str) -> str:
 
 def part(name: str, position: Sequence[float], geometry: str, mu: float, color: str) -> str:
     """A collision and a visual of the same shape."""
+    return collision(name, position, geometry, mu) + visual(name, position, geometry, color)
+
+
+def collision(name: str, position: Sequence[float], geometry: str, mu: float) -> str:
+    """What is only touched."""
     shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry>{geometry}</geometry>"
-    return (
-        f'        <collision name="{name}">{shape}{friction(mu)}</collision>\n{visual(name, position, geometry, color)}'
-    )
+    return f'        <collision name="{name}">{shape}{friction(mu)}</collision>\n'
 
 
 def visual(name: str, position: Sequence[float], geometry: str, color: str) -> str:
@@ -47,10 +50,6 @@ def visual(name: str, position: Sequence[float], geometry: str, color: str) -> s
 
 def box(name: str, position: Sequence[float], size: Sequence[float], mu: float, color: str) -> str:
     return part(name, position, f"<box><size>{numbers(size)}</size></box>", mu, color)
-
-
-def cylinder(name: str, position: Sequence[float], radius: float, length: float, mu: float, color: str) -> str:
-    return part(name, position, round_shape(radius, length), mu, color)
 
 
 def round_shape(radius: float, length: float) -> str:

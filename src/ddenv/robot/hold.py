@@ -79,9 +79,10 @@ class Hold:
         """
         if not (self._bodies or self._changed):
             return
-        state = self.state()
-        state[self._held] = self._state[self._held]
-        self._plant.SetPositionsAndVelocities(self._context, state)
+        state, held = self.state(), self._held
+        if not np.array_equal(state[held], self._state[held]):
+            state[held] = self._state[held]
+            self._plant.SetPositionsAndVelocities(self._context, state)
         if self._changed:
             force = -self._plant.CalcGravityGeneralizedForces(self._context)
             force[~self._held[self._count :]] = 0.0

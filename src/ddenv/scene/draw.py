@@ -29,6 +29,7 @@ ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD
 # A growing trail is sent in pieces of so many points, so that only the last piece is sent again.
 PIECE = 24
 GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
+STEEP = 1e-6  # a plane whose normal rises by less is upright
 LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
@@ -126,13 +127,14 @@ class Scenery:
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
         self.surface = mesh.merge(surfaces)
-        self.ground = _ground_height(world)
+        self.ground = _ground(world)
         self._draw_ground()
         self._lowest = self._draw_robot(robot)
 
     def height(self, x: float, y: float) -> float:
         """Height of the highest surface at (x, y), m."""
-        heights = [height for height in (mesh.height_at(self.surface, x, y), self.ground) if height is not None]
+        ground = None if self.ground is None else _height_of(self.ground, x, y)
+        heights = [height for height in (mesh.height_at(self.surface, x, y), ground) if height is not None]
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
@@ -195,8 +197,8 @@ class Scenery:
     def _draw_ground(self) -> None:
         if self.ground is None:
             return
-        pose = Pose((0.0, 0.0, self.ground))
-        sheet = mesh.box((GROUND_SIZE, GROUND_SIZE, 0.02)).at(Pose((0.0, 0.0, self.ground - 0.01)))
+        pose = self.ground
+        sheet = mesh.box((GROUND_SIZE, GROUND_SIZE, 0.02)).at(pose @ Pose((0.0, 0.0, -0.01)))
         self._stage.draw((*WORLD, "ground"), plain(sheet, colors.GROUND, offset=2), shadow=False)
         half = GRID_SIZE / 2
         at = np.arange(-half, half + 0.5)
@@ -214,15 +216,28 @@ class Scenery:
         return lowest
 
 
-def _ground_height(world: World) -> float | None:
-    heights = [
-        collision.pose.position[2]
+def _ground(world: World) -> Pose | None:
+    """The plane that is the highest at the origin, as its pose there; it may slope."""
+    planes = (
+        collision.pose
         for model in world.models
         if is_ground(model)
         for collision in model.collisions
         if isinstance(collision.shape, Plane)
+    )
+    grounds = [
+        Pose((0.0, 0.0, height), plane.quaternion)
+        for plane in planes
+        if (height := _height_of(plane, 0.0, 0.0)) is not None
     ]
-    return max(heights) if heights else None
+    return max(grounds, key=lambda ground: ground.position[2], default=None)
+
+
+def _height_of(plane: Pose, x: float, y: float) -> float | None:
+    """How high `plane` is at (x, y), m; None where it is upright."""
+    a, b, c = plane.rotate((0.0, 0.0, 1.0))
+    px, py, pz = plane.position
+    return pz - (a * (x - px) + b * (y - py)) / c if abs(c) > STEEP else None
 
 
 def mark(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:

@@ -18,7 +18,7 @@ from tests.robot.sensing.conftest import lidar_of, loose, plain, scan, still
 from tests.robot.sensing.slow import first_met
 
 # How deep a beam has to get into a shape, or how far to pass it, for both ways to agree on whether it meets it.
-CLEAR = 1e-6
+CLEAR = 1e-3
 
 
 def of(low: float, high: float) -> st.SearchStrategy[float]:

@@ -10,6 +10,8 @@ from ddenv.robot.protocol import Setup
 
 # Points nearer to the robot than this part of its padding count as touched.
 TOUCHED = 0.6
+# Turns a direction, with its parts the other way round, to the left.
+LEFT = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +70,22 @@ def legs_beside(
     `on` (K,) after its end. All in m.
     """
     ways = ends - starts
-    lengths = np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-9)[:, None]
-    cosine, sine = ways[:, :1] / lengths, ways[:, 1:] / lengths
-    dx, dy = points[:, 0] - starts[:, :1], points[:, 1] - starts[:, 1:]
-    along = cosine * dx + sine * dy
-    across = np.abs(cosine * dy - sine * dx)
-    back, on = np.reshape(back, (-1, 1)), np.reshape(on, (-1, 1))
-    hit = (across < side) & (along > -back) & (along < lengths + on)
-    beyond = along - np.clip(along, 0.0, lengths)
-    return ~hit.any(axis=1), np.hypot(across, beyond).min(axis=1)
+    lengths = np.sqrt((ways * ways).sum(axis=1, keepdims=True))
+    np.maximum(lengths, 1e-9, out=lengths)
+    ways = ways / lengths
+    across_them = ways[:, ::-1] * LEFT
+    along = ways @ points.T
+    along -= (ways * starts).sum(axis=1, keepdims=True)
+    across = across_them @ points.T
+    across -= (across_them * starts).sum(axis=1, keepdims=True)
+    np.abs(across, out=across)
+    after = along - lengths
+    hit = along > -np.asarray(back)[..., None]
+    hit &= across < side
+    hit &= after < np.asarray(on)[..., None]
+    beyond = np.maximum(np.negative(along, out=along), after, out=along)
+    np.maximum(beyond, 0.0, out=beyond)
+    beyond *= beyond
+    across *= across
+    across += beyond
+    return ~hit.any(axis=1), np.sqrt(across.min(axis=1))

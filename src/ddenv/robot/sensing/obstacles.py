@@ -18,7 +18,7 @@ from ddenv.world.pose import Pose, Vector
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
 # A plane is the top of a cube of this size, m: what is below it is inside.
-PLANE = 2e5
+PLANE = 2e4
 # Half the thickness of what has none, m.
 THINNEST = 1e-9
 
