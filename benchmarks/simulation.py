@@ -20,6 +20,7 @@ from pydrake.systems.analysis import Simulator
 
 from ddenv.launch.scenarios import load_parts
 from ddenv.robot.template import Template
+from ddenv.robot.variants import Variants
 from ddenv.world.bundled import SCENARIOS
 from ddenv.world.load import load_scenario
 
@@ -51,10 +52,10 @@ def main() -> None:
     for name in arguments.scenarios.split(","):
         scenario = load_scenario(SCENARIOS / f"{name}.yaml")
         world, robot = load_parts(scenario)
-        template = Template(world, robot, scenario)
+        variants = Variants(world, robot, scenario)
         elements = world.elements()
         for kept in (elements, elements[::2]):
-            print(row(template, name, frozenset(kept), arguments.seeds), flush=True)
+            print(row(variants._template(frozenset(kept)), name, frozenset(kept), arguments.seeds), flush=True)
 
 
 def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:

@@ -14,6 +14,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
+from ddenv.engine.pool import Broken
 from ddenv.launch.runs import create_run
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
@@ -41,7 +42,7 @@ def result(outcome: str, seed: int, x: float, cut: bool = False) -> RunResult:
 
 
 class FakePool:
-    """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other" or "pass".
+    """Stands for `ddenv.engine.pool.Pool`; `oracle(models, seed)` says "similar", "other", "pass" or "error".
 
     `cut(models, seed)` says "similar" or "other" of a run that is ended early unless it has to be full. Tests finish in an order
     that `seed` shuffles, as they do on a busy machine.
@@ -64,13 +65,16 @@ class FakePool:
         assert self.idle
         self.running.append((test, keep, seed, full))
 
-    def finished(self, seconds: float) -> list[tuple[int, RunResult]]:
+    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         if not self.running:
             return []
         test, keep, seed, full = self.running.pop(self.random.randrange(len(self.running)))
         self.made.append((keep, seed))
         cut = "" if full else self.cut(keep, seed)
-        outcome, x = ENDS[cut or self.oracle(keep, seed)]
+        shown = cut or self.oracle(keep, seed)
+        if shown == "error":
+            return [(test, Broken("error", "it broke"))]
+        outcome, x = ENDS[shown]
         return [(test, result(outcome, seed, x, bool(cut)))]
 
     def live(self) -> list[Live]:

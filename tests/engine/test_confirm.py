@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ddenv.engine.journal import Journal
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.test_driver import Killed, _kill, flaky, needs, story
 
 METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
@@ -113,6 +113,33 @@ def test_f_that_only_cut_runs_show_is_a_contradiction(tmp_path):
     assert state.environment == ("wall",)
     assert not state.minimal
     assert "f does not show in full runs of what is left; run again with --no-early-stop" in state.reason
+
+
+def test_full_runs_that_all_break_prove_nothing(tmp_path):
+    # Cut, a run without the wall shows something else; in full it breaks.
+    def oracle(keep, seed):
+        return "similar" if "wall" in keep else "error"
+
+    def cut(keep, seed):
+        return "" if "wall" in keep else "other"
+
+    state = drive(new_run(tmp_path, early_stop=True), FakePool(oracle, 2, cut=cut))
+    assert state.environment == ("wall",)
+    assert not state.minimal
+    assert "may not be needed: all tests without them broke" in state.reason
+
+
+def test_what_is_left_and_breaks_in_full_is_told(tmp_path):
+    def oracle(keep, seed):
+        return "similar" if keep == frozenset(ELEMENTS) else "error" if "wall" in keep else "pass"
+
+    def cut(keep, seed):
+        return "similar" if "wall" in keep else ""
+
+    state = drive(new_run(tmp_path, early_stop=True), FakePool(oracle, 2, cut=cut))
+    assert state.environment == ("wall",)
+    assert not state.minimal
+    assert state.reason == "all full runs of what is left broke; run again with --no-early-stop"
 
 
 @given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))

@@ -13,6 +13,7 @@ from ddenv.launch.scenarios import load_parts, reading_of, scenario_for_world, w
 from ddenv.runfile.store import RunFile
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
+from tests.conftest import ROOT
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
@@ -144,6 +145,31 @@ def test_the_robots_folder_is_searched_for_what_it_names_there(tmp_path, folder)
     export_world(run, folder / "m.sdf", folder / "m.yaml")
     assert written(folder)["reading"]["model_path"] == [str(robot.parent)]
     load_parts(load_scenario(folder / "m.yaml"))
+
+
+def test_a_urdf_stays_one_and_its_package_is_found(tmp_path, folder):
+    robot = tmp_path / "ws" / "cart" / "urdf" / "cart.urdf"
+    (robot.parents[1] / "meshes").mkdir(parents=True)
+    (robot.parents[1] / "meshes" / "body.obj").write_text(TETRAHEDRON)
+    robot.parent.mkdir()
+    text = (ROOT / "docs" / "examples" / "own_robot" / "cart.urdf").read_text()
+    uri = "package://cart/meshes/body.obj"
+    robot.write_text(text.replace('<box size="0.36 0.26 0.10"/>', f'<mesh filename="{uri}" scale="0.1 0.1 0.1"/>'))
+    run = run_of(tmp_path, [box("a", 5)], robot=robot)
+    export_world(run, folder / "m.sdf", folder / "m.yaml")
+    assert written(folder)["robot"]["model"] == "m.robot.urdf"
+    assert written(folder)["reading"]["model_path"] == [str(robot.parents[1])]
+    load_parts(load_scenario(folder / "m.yaml"))
+
+
+def test_the_scenarios_folder_is_named_where_a_program_of_its_own_lies_there(tmp_path, folder):
+    own = ROOT / "docs" / "examples" / "own_robot"
+    create_run(load_scenario(own / "scenario.yaml"), tmp_path / "own.ddenv")
+    export_world(tmp_path / "own.ddenv", folder / "m.sdf", folder / "m.yaml")
+    assert written(folder)["folder"] == str(own)
+    assert load_scenario(folder / "m.yaml").folder == own
+    export_world(run_of(tmp_path, [box("a", 5)]), folder / "m.sdf", folder / "m.yaml")
+    assert "folder" not in written(folder)
 
 
 def test_what_the_kept_models_name_is_still_needed(tmp_path, folder):

@@ -128,7 +128,7 @@ def test_a_pile_wakes_as_one(template):
     assert set(result.motions) == {model.name for model in tower}
     # It pushes the lowest away, and none of the others stays up in the air.
     assert result.motions["storey_2"][-1, 3] < 0.6
-    assert result.motions["storey_3"][-1, 3] < 0.2
+    assert result.motions["storey_3"][-1, 3] < 0.3
 
 
 def test_what_the_robot_sets_in_motion_wakes_what_it_comes_near(template):

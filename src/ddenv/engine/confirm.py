@@ -36,6 +36,8 @@ class Confirmation:
         if not self._shows():
             if self._missing(self._kept):
                 return ""
+            if self._journal.only_broke(self._kept, self._runs):
+                return f"all full runs of what is left broke; {AGAIN}"
             return f"runs were ended too early: f does not show in full runs of what is left; {AGAIN}"
         for name in self._tried[self._sure :]:
             keep = self._kept - {name}

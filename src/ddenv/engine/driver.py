@@ -86,11 +86,12 @@ class Driver:
         if untried:
             why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
             reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"
-        broken = [name for name in kept if self._only_broke(kept - {name})]
-        if broken and not untried:
-            reason = f"{len(broken)} of the {len(kept)} models left may not be needed: all tests without them broke"
         tried = [name for name in self._journal.state.elements if name in kept and name not in untried]
         doubt = self._confirm(kept, tried) if self._failure_spec.early_stop else ""
+        runs = range(1 + self._reduction.iterations)
+        broken = [name for name in kept if self._journal.only_broke(kept - {name}, runs)]
+        if broken and not untried:
+            reason = f"{len(broken)} of the {len(kept)} models left may not be needed: all tests without them broke"
         self._end(not untried and not broken and not doubt, doubt or reason)
 
     def _confirm(self, kept: Keep, tried: list[str]) -> str:
@@ -107,12 +108,6 @@ class Driver:
 
     def _is_dissimilar(self, keep: Keep) -> bool:
         return standing([keep], self._journal.is_similar, self._reduction.iterations).verdicts[0] == "dissimilar"
-
-    def _only_broke(self, keep: Keep) -> bool:
-        """Whether the tests of `keep` say nothing, since none of them came to its end."""
-        tests = [self._journal.ledger.get((keep, run, False)) for run in range(1 + self._reduction.iterations)]
-        outcomes = {self._journal.state.tests[test - 1].outcome for test in tests if test is not None}
-        return bool(outcomes) and outcomes <= {"error", "timeout"}
 
     def _baseline(self) -> str:
         """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""

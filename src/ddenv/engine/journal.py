@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from ddenv.errors import UserError
@@ -58,6 +59,12 @@ class Journal:
         """Whether a finished test showed f; None where it is not made yet. With `full` only a run to the end counts."""
         test = self.ledger.get((keep, run, full))
         return None if test is None else self.state.tests[test - 1].outcome == "similar"
+
+    def only_broke(self, keep: Keep, runs: Iterable[int]) -> bool:
+        """Whether the full runs of `keep` say nothing, since none of them came to its end."""
+        tests = [self.ledger.get((keep, run, True)) for run in runs]
+        outcomes = {self.state.tests[test - 1].outcome for test in tests if test is not None}
+        return bool(outcomes) and outcomes <= {"error", "timeout"}
 
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even where the robot is stuck for good."""

@@ -63,13 +63,19 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
     needs = list(dict.fromkeys(uri for uri, base in asked.names if base == scenario.world.parent))
     if scenario_file is None:
         return Exported([sdf], needs)
-    model = scenario_file.with_suffix(".robot.sdf")
+    model = scenario_file.with_suffix(f".robot{_suffix(scenario.robot.model)}")
     write_file(model, robot)
     data = scenario.model_dump(mode="json")
     folder = scenario_file.parent.resolve()
+    # Only programs of the user's own are searched there.
+    if scenario.oracle is None and ":" not in scenario.controller.use:
+        del data["folder"]
+    else:
+        data["folder"] = _name(scenario.folder, folder)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["protected"] = _renamed(scenario.protected, world, removed, minimal)
-    model_path = (*scenario.reading.model_path, *_folders(scenario, asked, robot, stored))
+    needed = (*_folders(scenario, asked, robot, stored), *_packages(scenario.robot.model, robot))
+    model_path = (*scenario.reading.model_path, *needed)
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
     write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
     return Exported([sdf, model, scenario_file], needs)
@@ -79,6 +85,16 @@ def _name(path: Path, folder: Path) -> str:
     """What `path` is called in a scenario of `folder`: relative if it goes along when that folder is moved."""
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
+
+
+def _suffix(robot: Path) -> str:
+    return ".urdf" if robot.suffix.lower() == ".urdf" else ".sdf"
+
+
+def _packages(file: Path, robot: bytes) -> list[Path]:
+    """The folders around the robot's file that it names as packages."""
+    around = (folder for folder in file.absolute().parents if folder.name and folder.is_dir())
+    return [folder for folder in around if f"package://{folder.name}/".encode() in robot]
 
 
 def _renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> list[str]:

@@ -95,4 +95,5 @@ class Autonomy:
 
     def _rim_speed(self, wheels: list[int]) -> float:
         """How fast the rims of `wheels` go, on average, m/s."""
-        return self._radius * sum([self._wheels[number] for number in wheels]) / len(wheels)
+        measured = self._wheels
+        return self._radius * sum([measured[number] for number in wheels]) / len(wheels)

@@ -44,8 +44,8 @@ class Drive:
             return self._by_name(command)
         difference = command.turn_rate / skid * self.track / 2
         left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
-        forward = np.array([left if is_left else right for is_left in self.left])
-        return forward * self.signs
+        sides = zip(self.left, self.signs, strict=True)
+        return np.array([sign * (left if is_left else right) for is_left, sign in sides])
 
     def _by_name(self, command: WheelSpeeds) -> np.ndarray:
         unknown = set(command.speeds) - set(self.joints)

@@ -150,6 +150,9 @@ class Run:
             speeds = self._drive.wheel_speeds(self._autonomy.command(tick), self._skid)
         except ControllerFailed as failed:
             return "error", str(failed), False
+        # What is told again would only have Drake work everything out anew.
+        if (self._told[len(speeds) :] == speeds).all():
+            return None
         self._told[len(speeds) :] = speeds
         self._motors.GetMutableData().get_mutable_value().SetFromVector(self._told)
         return None

@@ -6,6 +6,7 @@ switched off costs nothing.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 
 from ddenv.robot.clock import Clock
@@ -16,7 +17,8 @@ from ddenv.world.scenario import Scenario
 
 # What a moving model that is switched off costs in each step of a run, s.
 HELD = 5e-6
-# What building costs for each pair of shapes, whether they can meet or not, s; it also takes 0.15 kB of memory.
+# What building costs at least, s, and for each pair of shapes, whether they can meet or not; a pair also takes 0.15 kB.
+BUILD = 0.05
 PAIR = 1e-6
 # A plant of more shapes than this has no smaller ones beside it: each would take more than 150 MB.
 LARGEST = 1000
@@ -54,16 +56,21 @@ class Variants:
         template = min(able, key=lambda one: len(one.removable), default=self._whole)
         needless = template.removable & removed
         if self._pays(needless, template):
+            self._forget()
             template = template.without(needless)
-        self._remember(template)
+        if template is not self._whole:
+            self._smaller = [*(one for one in self._smaller if one is not template), template]
         return template
 
     def _pays(self, needless: frozenset[str], template: Template) -> bool:
         """Whether building a plant without the models `needless` costs less than one run with them."""
         shapes = template.shapes_without(needless)
-        return shapes <= LARGEST and PAIR * shapes**2 < HELD * len(needless) * self._steps
+        return shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps
 
-    def _remember(self, template: Template) -> None:
-        others = [one for one in self._smaller if one is not template]
-        if template is not self._whole:
-            self._smaller = [*others, template][-MOST:]
+    def _forget(self) -> None:
+        """Makes room for one more."""
+        if len(self._smaller) < MOST:
+            return
+        del self._smaller[0]
+        # Drake's diagrams refer to themselves: without this they would stay, some 20 MB each.
+        gc.collect()

@@ -42,6 +42,18 @@ def test_what_went_away_is_cleared_where_beams_pass():
     assert costmap.version > version
 
 
+def test_noise_makes_no_other_map():
+    costmap, random = Costmap(setup((9, 0))), np.random.default_rng(0)
+    for number in range(30):
+        taken = look(BARREL, AT_START)
+        noise = 0.02 * random.standard_normal(len(ANGLES))
+        costmap.see(Scan(0.0, ANGLES, taken.ranges + noise, LIDAR), AT_START)
+        assert costmap.version == 1, number
+    two = Ground(circles=(*BARREL.circles, (3.0, -1.0, 0.3)))
+    costmap.see(look(two, AT_START), AT_START)
+    assert costmap.version == 2
+
+
 def test_what_is_out_of_sight_is_kept():
     costmap = Costmap(setup((9, 0)))
     costmap.see(look(BARREL, AT_START), AT_START)

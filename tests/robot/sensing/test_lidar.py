@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +95,44 @@ def test_the_noise_of_a_beam_does_not_depend_on_what_others_meet():
         past = np.abs(first.angles) > 0.2
         assert first.ranges[past].tobytes() == second.ranges[past].tobytes()
         assert first.ranges[AHEAD] > second.ranges[AHEAD] + 1.0
+
+
+def test_a_scan_is_the_same_whatever_else_is_asked_for():
+    settings, hidden = plain(noise=0.01, angle=1.0), ball("hidden", 6.0)
+    first, second = (lidar_of(ball("ball", 1.5), hidden, WALL, settings=settings) for _ in range(2))
+    poses = [Pose((0.3 * number, 0.02 * number, 0.0)) for number in range(40)]
+    all_ = [scan(first, pose, now=float(number)).ranges for number, pose in enumerate(poses)]
+    some = [scan(second, pose, now=float(number)) for number, pose in enumerate(poses)]
+    for number in (39, 7, 23):
+        np.testing.assert_array_equal(some[number].ranges, all_[number])
+    assert first.first_seen == second.first_seen
+    assert set(first.first_seen) == {"ball", "hidden", "wall"}
+
+
+def test_scans_on_the_way_are_those_that_a_lidar_takes_first_there():
+    random = np.random.default_rng(3)
+    floor = still("floor", Plane((1.0, 1.0)), Pose((0.0, 0.0, -0.1)))
+    boxes = [
+        still(f"box{number}", Box((0.4, 0.6, 0.1)), Pose.from_rpy(*random.uniform((-9, -9, -0.3), (9, 9, 0.3)), *turn))
+        for number, turn in enumerate(random.uniform(-0.5, 0.5, (60, 3)))
+    ]
+    settings = plain(range=4.0, x=0.3)
+    lidar, others = lidar_of(floor, *boxes, settings=settings), 0
+    for number in range(60):
+        tilt = 0.012 * math.sin(number / 3), 0.012 * math.cos(number / 5)
+        pose = Pose.from_rpy(0.1 * number - 3.0, 0.0, 0.02 * math.sin(number), *tilt, number / 30)
+        ranges = scan(lidar, pose).ranges
+        others += np.isfinite(ranges).sum()
+        np.testing.assert_array_equal(ranges, scan(lidar_of(floor, *boxes, settings=settings), pose).ranges)
+    assert others > 1000
+
+
+def test_a_scan_can_be_copied_and_stored():
+    taken = scan(lidar_of(WALL, settings=plain(noise=0.01)))
+    nearer = replace(taken, ranges=taken.ranges / 2)
+    stored = pickle.loads(pickle.dumps(taken))
+    np.testing.assert_array_equal(stored.ranges, taken.ranges)
+    np.testing.assert_array_equal(nearer.ranges * 2, taken.ranges)
 
 
 def test_a_removed_model_is_looked_through():

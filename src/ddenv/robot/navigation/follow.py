@@ -159,9 +159,7 @@ def _seen_from(estimate: Estimate) -> np.ndarray:
     """What turns places (3,), the third number 1, in the frame of the estimates into those that the robot sees, (3, 3)."""
     x, y = estimate.x, estimate.y
     cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-    return np.array(
-        [[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]]
-    )
+    return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
 
 
 def _turned(angle: float) -> np.ndarray:

@@ -18,7 +18,7 @@ from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.readings import Imu
 
 # Scans that come faster than this (s) are left out, and of a robot that waits where it is, these.
-LOOK_EVERY = 0.3
+LOOK_EVERY = 0.2
 LOOK_WAITING = 0.6
 # Between two plans, at least, s; and without a plan for so long, the robot tries to recover, s.
 THINK_EVERY = 0.5

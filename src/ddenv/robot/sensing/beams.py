@@ -1,7 +1,7 @@
 """Casting beams: how far each of the beams of a lidar goes until it meets a shape.
 
-All beams start in one point and lie in one plane, the x-y plane of the lidar. Shapes that this plane does not cut may be left
-out, and of the others each is met only with the beams that point towards the box around it.
+All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is met only with the beams
+that point towards the box around it.
 """
 
 from __future__ import annotations
@@ -95,7 +95,6 @@ class Shapes:
             facets={new: obstacles.facets[old] for new, old in enumerate(rows.tolist()) if old in obstacles.facets},
         )
 
-
     def take(self, rows: np.ndarray) -> Shapes:
         """The shapes `rows` (K,) alone, in this order."""
         return Shapes(
@@ -113,34 +112,19 @@ class Shapes:
 class Ends:
     """Where the beams of S scans end: `distances` (S, B) m, infinite for those that meet nothing.
 
-    `beams` (M,) that met `shapes` (M,) are counted from the first beam of the first scan.
+    Of each meeting (M,) `beams` is the beam, counted from the first of the first scan, `ways` how far away it is (m), and
+    `shapes` the number of the shape.
     """
 
     distances: np.ndarray
     beams: np.ndarray
+    ways: np.ndarray
     shapes: np.ndarray
 
-
-def in_the_way(
-    fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray, around: float, lift: float, tilt: float
-) -> np.ndarray:
-    """The numbers (K,) of the shapes that beams from `origin` (3,) along `axes` may meet, see `cast`, and from near there.
-
-    Near is at most `around` (m) away, `lift` (m) of it along the third axis, which may turn by `tilt` (rad).
-    """
-    numbers = _within_reach(fan, shapes, origin, axes, around, lift, tilt)
-    frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
-    local = (away[:, None] * frames).sum(axis=0)
-    up = (axes[2][:, None, None] * frames).sum(axis=0)
-    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical.
-    edges = up * shapes.squares.take(numbers, axis=1)
-    spare = lift + tilt * (np.sqrt((away * away).sum(axis=0)) + around + 2 * shapes.reaches[numbers]) + SPARE
-    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + spare
-    # How far the beams get along each of a shape's axes: a ground may be high enough, but farther than that.
-    sizes = np.sqrt((frames * frames).sum(axis=0))
-    ways = np.sqrt(np.maximum(sizes * sizes - up * up, 0.0)) + sizes * tilt
-    near = np.abs(local) - 1.0 <= ways * (fan.range * (1.0 + SPARE) + around) + np.abs(up) * lift + SPARE
-    return numbers[cut & near.all(axis=0)]
+    def first(self) -> tuple[np.ndarray, np.ndarray]:
+        """The beams (N,) that end on something, and the shapes (N,) on which they end."""
+        first = self.ways == self.distances.ravel()[self.beams]
+        return self.beams[first], self.shapes[first]
 
 
 def cast(fan: Fan, shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> Ends:
@@ -164,10 +148,8 @@ def cast(fan: Fan, shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> End
     beams, enter = beams[met], enter[met]
     if scans > 1:
         beams += numbers % scans * count
-    flat = distances.ravel()
-    np.minimum.at(flat, beams, enter)
-    (nearest,) = (enter == flat[beams]).nonzero()
-    return Ends(distances, beams[nearest], numbers[nearest] // scans)
+    np.minimum.at(distances.ravel(), beams, enter)
+    return Ends(distances, beams, enter, numbers // scans)
 
 
 def _seen(shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> np.ndarray:
@@ -180,20 +162,6 @@ def _seen(shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> np.ndarray:
     local += view[:, 1:2] * frames[1]
     local += view[:, 2:] * frames[2]
     return local
-
-
-def _within_reach(
-    fan: Fan, shapes: Shapes, origin: np.ndarray, axes: np.ndarray, around: float, lift: float, tilt: float
-) -> np.ndarray:
-    """The numbers of the shapes of which the balls around them are cut by the plane of the beams, within their range."""
-    # A matrix product may be rounded otherwise among more shapes: nothing else is made of this one.
-    ahead, left, above = axes @ (shapes.centers - origin[:, None])
-    flat, high = ahead * ahead + left * left, np.abs(above)
-    tallest = shapes.reaches + lift + tilt * (np.sqrt(flat + high * high) + around)
-    # A tilt brings what is above and below by so much nearer in the plane.
-    far = (shapes.reaches + (fan.range + around) + tilt * (high + around)) * (1.0 + tilt * tilt)
-    (numbers,) = ((high <= tallest) & (flat <= far * far)).nonzero()
-    return numbers
 
 
 def _span(centers: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

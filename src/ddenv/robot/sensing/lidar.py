@@ -3,65 +3,57 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from ddenv.robot.sensing.beams import Ends, Fan, Shapes, cast, in_the_way
+from ddenv.robot.sensing.beams import Ends, Fan, Shapes, cast
+from ddenv.robot.sensing.near import Near, are_near
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.readings import Scan
 from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
-# How far from where they were looked for (m), how much of it upwards (m), and how much tilted (rad) the same shapes are in the way.
-AROUND = 0.7
-LIFT = 0.02
-TILT = 0.01
-# Scans are worked out so many at once at most.
+# Turns are worked out so many at once at most.
 TOGETHER = 16
+# Where it goes no farther from one turn to the next than this part of near, it looks for what is near there.
+CALM = 0.5
+# How many random numbers are set aside for the noise of each turn.
+DRAWS = 2**40
 
 
-@dataclass(frozen=True, slots=True)
-class Near:
-    """Shapes that beams may meet near `origin` (m), with the lidar's vertical near `up`. `owners` (K,) are their models."""
+@dataclass(slots=True, eq=False)
+class Turn:
+    """The turn `number` of a lidar, at `time` (s): where it is, what its beams may meet, and the ranges once they are known."""
 
-    origin: Vector
-    up: Vector
-    shapes: Shapes
-    owners: np.ndarray
-
-    def has(self, place: Pose) -> bool:
-        """Whether these are all shapes that a lidar at `place` may meet."""
-        if math.dist(self.origin, place.position) > AROUND or math.dist(self.up, _up(place)) > TILT:
-            return False
-        lift = sum([(to - at) * part for to, at, part in zip(place.position, self.origin, self.up, strict=True)])
-        return abs(lift) <= LIFT
+    time: float
+    number: int
+    place: Pose
+    near: Near
+    ranges: np.ndarray | None = None
 
 
 class Taken(Scan):
-    """A scan by `lidar` whose ranges are worked out only when somebody asks for them.
+    """A scan whose `ranges` are worked out only when somebody asks for them, by what is given for them."""
 
-    It was taken from `place`, with the shapes `near`; `noise` (B,) m is that of its ranges.
-    """
-
-    __slots__ = ("lidar", "measured", "near", "noise", "place")
+    __slots__ = ("_ranges",)
 
     def __init__(
-        self, time: float, angles: np.ndarray, origin: Vector, lidar: Lidar, place: Pose, near: Near, noise: np.ndarray
+        self, time: float, angles: np.ndarray, ranges: Callable[[], np.ndarray] | np.ndarray, origin: Vector
     ) -> None:
-        own = {"lidar": lidar, "place": place, "near": near, "noise": noise, "measured": None}
-        for name, value in ({"time": time, "angles": angles, "origin": origin} | own).items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "_ranges", ranges)
+        object.__setattr__(self, "origin", origin)
 
     @property
     def ranges(self) -> np.ndarray:
-        if self.measured is None:
-            self.lidar.work_out(self)
-        return self.measured
+        return self._ranges() if callable(self._ranges) else self._ranges
 
     def __reduce__(self) -> tuple[type[Scan], tuple[Any, ...]]:
         return Scan, (self.time, self.angles, self.ranges, self.origin)
@@ -82,7 +74,10 @@ class Lidar:
         random: np.random.Generator,
     ) -> None:
         self._settings = settings
+        self._mount = Pose((settings.x, settings.y, settings.z))
         self._random = random
+        self._state = random.bit_generator.state
+        self._turns = 0
         self._fan = Fan.of(settings)
         self._names = obstacles.names
         self._first_seen: dict[str, float] = {}
@@ -98,8 +93,10 @@ class Lidar:
         self._links = obstacles.links[rows][self._movers] + np.array([first[name] for name in owners], dtype=int)
         # Those that beams may meet while the lidar is hardly elsewhere than where they were looked for.
         self._near: Near | None = None
-        # Scans that may show a model for the first time.
-        self._waiting: list[Taken] = []
+        self._place: Pose | None = None
+        # Whether one of them was not seen yet, and the turns that may show it.
+        self._may_notice = True
+        self._waiting: list[Turn] = []
         self._poses: tuple[np.ndarray, np.ndarray] | None = None
         # In the frames of their links, for as long as the run.
         self._centers = self._shapes.centers[:, self._movers]
@@ -117,50 +114,52 @@ class Lidar:
         `pose` is x, y, z (m) and the quaternion w, x, y, z of the robot's first link; `places` (L, 3) m and `turns` (L, 3, 3)
         are the poses of all links of the moving models, model after model. All are in the world frame.
         """
-        settings = self._settings
-        mount = (settings.x, settings.y, settings.z)
-        place = Pose(tuple(pose[:3]), tuple(pose[3:])) @ Pose(mount)
-        if self._move(places, turns) or not (self._near and self._near.has(place)):
+        place = Pose(pose[:3], pose[3:]) @ self._mount
+        moved, before, self._place = self._move(places, turns), self._place, place
+        if moved or not (self._near and self._near.has(place)):
             self._work_out_waiting()
-            self._near = self._near_by(place)
-        # One draw for each beam, whatever it meets: what is removed elsewhere changes no other range.
-        noise = self._random.standard_normal(len(self._fan.angles))
-        taken = Taken(now, self._fan.angles, mount, self, place, self._near, noise)
-        if self._unseen[self._near.owners].any():
-            self._waiting.append(taken)
+            calm = not moved and before is not None and are_near(before, place, CALM)
+            self._near = Near.of(self._fan, self._shapes, self._owners, place, calm)
+            self._may_notice = bool(self._unseen[self._near.owners].any())
+        turn = Turn(now, self._turns, place, self._near)
+        self._turns += 1
+        if self._may_notice:
+            self._waiting.append(turn)
         if len(self._waiting) == TOGETHER:
             self._work_out_waiting()
-        return taken
+        return Taken(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
 
-    def work_out(self, taken: Taken) -> None:
-        """Works out the ranges of one of its scans."""
-        self._work_out_waiting()
-        if taken.measured is None:
-            self._measure([taken])
+    def _ranges(self, turn: Turn) -> np.ndarray:
+        if turn.ranges is None:
+            self._work_out_waiting()
+        if turn.ranges is None:
+            self._measure([turn])
+        return turn.ranges
 
     def _work_out_waiting(self) -> None:
         if self._waiting:
             waiting, self._waiting = self._waiting, []
             self._notice(waiting, self._measure(waiting))
+            self._may_notice = bool(self._unseen[self._near.owners].any())
 
-    def _measure(self, scans: list[Taken]) -> Ends:
-        """Where the beams of `scans`, taken with the same shapes near, end, from which they get their ranges."""
-        settings = self._settings
-        origins = np.array([taken.place.position for taken in scans])
-        axes = np.array([taken.place.rotation() for taken in scans]).transpose(0, 2, 1)
-        ends = cast(self._fan, scans[0].near.shapes, origins, axes)
-        for taken, distances in zip(scans, ends.distances, strict=True):
-            ranges = settings.noise * taken.noise
-            ranges += distances
-            ranges[(ranges < settings.nearest) | (ranges > settings.range)] = np.inf
-            object.__setattr__(taken, "measured", ranges)
+    def _measure(self, turns: list[Turn]) -> Ends:
+        """Where the beams of `turns`, with the same shapes near, end, from which they get their ranges."""
+        nearest, farthest = self._settings.nearest, self._settings.range
+        origins = np.array([turn.place.position for turn in turns])
+        axes = np.array([turn.place.rotation() for turn in turns]).transpose(0, 2, 1)
+        ends = cast(self._fan, turns[0].near.shapes, origins, axes)
+        for turn, distances in zip(turns, ends.distances, strict=True):
+            ranges = self._noise(turn.number) + distances
+            ranges[(ranges < nearest) | (ranges > farthest)] = np.inf
+            turn.ranges = ranges
         return ends
 
-    def _near_by(self, place: Pose) -> Near:
-        """The shapes that beams may meet from `place`, or from where that is near."""
-        origin, axes = np.array(place.position), place.rotation().T
-        rows = in_the_way(self._fan, self._shapes, origin, axes, AROUND, LIFT, TILT)
-        return Near(place.position, _up(place), self._shapes.take(rows), self._owners[rows])
+    def _noise(self, number: int) -> np.ndarray:
+        """What is wrong with the ranges of a turn, (B,) m: the same whatever beams meet, and whatever else is asked for."""
+        bits = self._random.bit_generator
+        bits.state = self._state
+        bits.advance(number * DRAWS)
+        return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
 
     def _move(self, places: np.ndarray, turns: np.ndarray) -> bool:
         """Moves the shapes to where their links are; returns whether that is elsewhere than before."""
@@ -178,21 +177,17 @@ class Lidar:
         self._shapes.frames[:, :, self._movers] = frames
         return True
 
-    def _notice(self, scans: list[Taken], ends: Ends) -> None:
+    def _notice(self, turns: list[Turn], ends: Ends) -> None:
         """Remembers the models on which a beam ended that measured something, for the first time."""
-        owners = scans[0].near.owners[ends.shapes]
+        beams, shapes = ends.first()
+        owners = turns[0].near.owners[shapes]
         (fresh,) = self._unseen[owners].nonzero()
         count = len(self._fan.angles)
-        for beam, owner in sorted(zip(ends.beams[fresh].tolist(), owners[fresh].tolist(), strict=True)):
-            taken = scans[beam // count]
-            if self._unseen[owner] and math.isfinite(taken.measured[beam % count]):
+        for beam, owner in sorted(zip(beams[fresh].tolist(), owners[fresh].tolist(), strict=True)):
+            turn = turns[beam // count]
+            if self._unseen[owner] and math.isfinite(turn.ranges[beam % count]):
                 self._unseen[owner] = False
-                self._first_seen[self._names[owner]] = taken.time
-
-
-def _up(place: Pose) -> Vector:
-    w, x, y, z = place.quaternion
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+                self._first_seen[self._names[owner]] = turn.time
 
 
 def _firsts(models: Sequence[Model]) -> list[int]:
