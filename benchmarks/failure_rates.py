@@ -2,8 +2,8 @@
 
     python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
 
-Repaired are: the ditch filled, the cinder blocks of the rubble gone, all patches as rough as the asphalt. Failed is every run that does
-not reach the goal, f those that end within epsilon of the medoid of all that failed. Intervals are Wilson's, 95 %.
+Repaired are: the ditch filled, the cinder blocks of the rubble gone, all patches as rough as the asphalt. Failed is every run that
+does not reach the goal, f those that end within epsilon of the medoid of all that failed. Intervals are Wilson's, 95 %.
 """
 
 import argparse

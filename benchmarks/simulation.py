@@ -2,11 +2,11 @@
 
     python benchmarks/simulation.py [--seeds N] [--scenarios ditch,friction,rubble]
 
-Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter, controller,
-recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is `Simulator.AdvanceTo` in the same
-context with the same wheel speeds at the same times, and nothing else. Loose models then are never at rest: it has no
-such thing as sleep, which is why it is slower where there are many. Seconds are CPU seconds of one core; the first run in a world,
-which works out how loose piles settle, is left out.
+Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter,
+controller, recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is
+`Simulator.AdvanceTo` in the same context with the same wheel speeds at the same times, and nothing else. Loose models then are
+never at rest: it has no such thing as sleep, which is why it is slower where there are many. Seconds are CPU seconds of one core;
+the first run in a world, which works out how loose piles settle, is left out.
 """
 
 import argparse

@@ -82,7 +82,6 @@ def test_who_came_up_again_did_not_fall():
 
 def test_the_first_word_that_is_true_is_told():
     lying = way(20, lambda t: (0, 0, 0), lambda t: rolled(120 if t > 3 else 0))
-    standing = way(20, lambda t: (0, 0, 0))
     driving = way(20, lambda t: (min(t, 10), 0, 0))
     assert kind(lying, fell=True, arrived=9.0) == "fell"
     assert kind(lying, arrived=9.0) == "tipped over"

@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -132,6 +133,13 @@ def test_it_also_works_in_another_thread(tmp_path):
     thread.start()
     thread.join()
     assert answers == [Twist(1.0, 0.0)]
+
+
+def test_its_random_numbers_are_those_of_its_seed(tmp_path):
+    draws = stepping("import random", "import numpy", "return random.random(), numpy.random.random()")
+    first, again, other = (own(tmp_path, draws, replace(SETUP, seed=seed)) for seed in (2**40, 2**40, 7))
+    answers = [controller.step(READING) for controller in (first, again, other)]
+    assert answers[0] == answers[1] != answers[2]
 
 
 def test_what_it_prints_goes_to_stderr(tmp_path, capsys):

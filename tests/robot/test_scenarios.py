@@ -1,4 +1,4 @@
-"""The three scenarios: they fail for the world's reasons, a few models make it so, and nothing depends on how a world was made smaller."""
+"""The three scenarios: they fail for few models' sake, and nothing depends on how a world was made smaller."""
 
 from __future__ import annotations
 

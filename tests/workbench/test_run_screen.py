@@ -133,6 +133,13 @@ async def test_v_before_the_first_round(run):
         assert session.notices() == ["there are no candidates yet"]
 
 
+async def test_v_after_the_last_round(run):
+    fake_run.confirming(run).hold()
+    async with Attached(run) as session:
+        await session.press("v")
+        assert (session.notices(), session.commands()) == (["the rounds are over"], [])
+
+
 async def test_t_switches_between_automatic_and_ask(run):
     fake_run.mid_round(run).hold()
     async with Attached(run) as session:

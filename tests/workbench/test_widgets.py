@@ -1,5 +1,6 @@
 """The panels' text, without an app."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import fake_run
@@ -10,6 +11,7 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
+from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Point
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.processes import last_line
@@ -140,6 +142,13 @@ def test_full_runs_of_what_is_left_have_rows(run):
         ("- crate_00", "1", "run 2", "▶ 26.8 s"),
         ("- crate_01", "1", "run 1", "▶ 10.8 s"),
     ]
+
+
+def test_models_left_out_are_told_apart_by_the_ends_of_their_names(run):
+    state = snapshot(fake_run.confirming(run)).state
+    tests = [replace(test, without=f"construction_barrel_{test.id:02}") for test in state.confirm_tests]
+    rows = _confirm(Snapshot(state.changed(tests=PersistentTuple.of(tests))))
+    assert [row["candidate"] for row in rows.values()] == [f"- cons…_{test.id:02}" for test in tests]
 
 
 def test_tests_of_a_dead_engine_do_not_run(run):

@@ -58,6 +58,34 @@ def test_what_cannot_start_is_told_in_one_line(words, command, complaint):
         words(command)
 
 
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"echo hi\n", "its first line does not name an interpreter, as '#!/bin/sh' does"),
+        (b"", "its first line does not name an interpreter"),
+        (b"#!/bin/sh\r\necho hi\r\n", "has the line ends of Windows"),
+        (b"#! /no/such/python -u\n", ":1: there is no interpreter '/no/such/python'"),
+        (b"#!", ":1: there is no interpreter ''"),
+    ],
+)
+def test_a_script_that_the_system_cannot_start_is_told(words, tmp_path, content, complaint):
+    (tmp_path / "run.sh").write_bytes(content)
+    with pytest.raises(UserError, match=f"^oracle.command: .*run.sh:? ?{complaint}"):
+        words("./run.sh")
+
+
+@pytest.mark.parametrize("content", [b"\x7fELF\0\0", b"#! /bin/sh -e\n"])
+def test_other_programs_may_start(words, tmp_path, content):
+    (tmp_path / "run.sh").write_bytes(content)
+    assert words("./run.sh")
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path):
+    gone = {"oracle": Oracle(command="sh"), "folder": tmp_path / "gone"}
+    with pytest.raises(UserError, match=r"^folder: .*gone: there is no such folder"):
+        command_words(load_scenario(DATA / "wall.yaml").model_copy(update=gone))
+
+
 def test_it_is_told_before_a_run_is_written(tmp_path):
     scenario = load_scenario(DATA / "wall.yaml").model_copy(update={"oracle": Oracle(command="./gone.sh")})
     with pytest.raises(UserError, match=r"^oracle.command: .*gone.sh"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import random
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
@@ -12,6 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+
 from ddenv.errors import printable
 from ddenv.robot.deadline import TooLate, call_within
 from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
@@ -20,6 +23,8 @@ from ddenv.schemas import nearest
 # Faster is a mistake: m/s, or rad/s.
 FASTEST = 1000.0
 LONGEST_REASON = 300
+# As many does NumPy's own generator know.
+SEEDS = 2**32
 # Of no interest to whoever wrote a controller.
 OURS = Path(__file__).parent
 
@@ -50,6 +55,9 @@ class Guarded:
     def step(self, reading: Reading) -> Twist | WheelSpeeds:
         """The command for the next period. Raises ControllerFailed."""
         if self._controller is None:
+            # What it draws without a generator of its own is the same whenever its run is made.
+            random.seed(self._setup.seed)
+            np.random.seed(self._setup.seed % SEEDS)
             self._controller = self._guarded("__init__", self._make, self._setup)
         return self._guarded("step", self._ask, reading)
 

@@ -16,13 +16,16 @@ from ddenv.world.scenario import Scenario
 
 PLACEHOLDERS = ("world", "seed", "log")
 KEY = "oracle.command"
+# Linux reads no more of the first line of a script.
+LONGEST_FIRST_LINE = 256
 _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
     """The words of the scenario's oracle, the program's first as a path or a name on PATH, placeholders as they stand.
 
-    Raises UserError for what can be known to fail: an unknown placeholder, a program that is not there or cannot be executed.
+    Raises UserError for what can be known to fail: an unknown placeholder, a folder or a program that is not there, or one that
+    cannot be executed.
     """
     try:
         words = shlex.split(scenario.oracle.command)
@@ -38,7 +41,11 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
                 f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
                 "use {world}, {seed} and {log}; there is no shell that knows others"
             )
-    return _program(words[0], scenario.folder), *words[1:]
+    if not scenario.folder.is_dir():
+        raise UserError(f"folder: {scenario.folder}: there is no such folder to start the command in")
+    program = _program(words[0], scenario.folder)
+    _check_first_line(program)
+    return program, *words[1:]
 
 
 def _program(word: str, folder: Path) -> str:
@@ -54,6 +61,27 @@ def _program(word: str, folder: Path) -> str:
     if not os.access(path, os.X_OK):
         raise UserError(f"{KEY}: {path}: is not executable; 'chmod +x' makes it so")
     return str(path)
+
+
+def _check_first_line(program: str) -> None:
+    """Raises UserError for a script that the system could not start, which would only say that there is no such file."""
+    try:
+        with open(program, "rb") as file:
+            head = file.read(LONGEST_FIRST_LINE)
+    except OSError:
+        # What may be executed may be unreadable.
+        return
+    line = head.partition(b"\n")[0]
+    if not line.startswith(b"#!"):
+        # A program that is no script has bytes that no text has.
+        if b"\0" not in head:
+            raise UserError(f"{KEY}: {program}: its first line does not name an interpreter, as '#!/bin/sh' does")
+        return
+    if line.endswith(b"\r"):
+        raise UserError(f"{KEY}: {program}: has the line ends of Windows; save it with those of Unix")
+    interpreter = os.fsdecode((line[2:].split() or [b""])[0])
+    if not os.access(interpreter, os.X_OK):
+        raise UserError(f"{KEY}: {program}:1: there is no interpreter '{interpreter}'")
 
 
 def _why_no_file(path: Path) -> str:

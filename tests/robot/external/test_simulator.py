@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import textwrap
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_what_a_command_leaves_behind_is_killed(simulator_of):
     ("code", "complaint"),
     [
         ("exit(3)", "the command's exit code is 3, neither 0 nor 1"),
-        ("1 / 0", "the pose log has no rows; .*: ZeroDivisionError: division by zero"),
+        ("1 / 0", "the command ended with an exception: ZeroDivisionError: division by zero"),
         ("import sys; print('no display\\n\\x1b[2J', file=sys.stderr); exit(255)", "exit code is 255, .*: .*2J"),
         ("import os; os.kill(os.getpid(), 11)", "the command was ended by SIGSEGV"),
         ("import os; os.abort()", "the command was ended by SIGABRT"),
@@ -117,6 +118,32 @@ def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
     assert result.end_position == (0, 0, 0.45)
     assert re.search(complaint, result.failure), result.failure
     assert result.failure.isprintable() and len(result.failure) < 400
+
+
+@pytest.mark.parametrize(
+    ("code", "outcome"),
+    [
+        ("1 / 0", "error"),
+        ("raise ExceptionGroup('two', [ValueError('a'), KeyError('b')])", "error"),
+        # What somebody caught and told, and what was stopped because all is over, is no reason for the exit code.
+        ("import sys; sys.excepthook(*caught()); print('going on', file=sys.stderr); exit(1)", "failed"),
+        ("import sys; sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None); exit(1)", "failed"),
+        ("import sys; sys.excepthook(*caught()); exit(0)", "pass"),
+    ],
+)
+def test_an_exception_is_no_failure_of_the_robot(simulator_of, code, outcome):
+    caught = """
+        import sys
+        def caught():
+            try:
+                1 / 0
+            except ZeroDivisionError:
+                return sys.exc_info()
+        print("0,1,2,3,0,0,0,1", flush=True)
+    """
+    result = simulator_of(textwrap.dedent(caught) + code).run(EVERYTHING, 0)
+    assert result.outcome == outcome
+    assert result.end_position == (1, 2, 3)
 
 
 def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkeypatch):

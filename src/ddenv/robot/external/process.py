@@ -26,17 +26,24 @@ STOP_WAIT = 10.0
 # What may still lie in a pipe when the command has ended.
 MOST_LEFT = 16 * PIECE
 # How much of the end of what a command complains is kept, in bytes, and how much of its last line told, in characters.
-KEPT = 4096
+KEPT = 16384
 SHOWN = 200
+# Python exits with 1 for an exception that nobody catches, and says so with this line.
+TRACEBACK = b"Traceback (most recent call last):"
+STOPPED = b"KeyboardInterrupt"
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: with the exit code `code`, or without one for a `reason`; and the last line that it wrote to stderr."""
+    """How a command ended: with the exit code `code`, or without one for a `reason`; and the last line that it wrote to stderr.
+
+    `raised` tells whether that is the last one of an exception's traceback.
+    """
 
     code: int | None
     reason: str
     complaint: str
+    raised: bool = False
 
 
 class Complaints:
@@ -52,6 +59,12 @@ class Complaints:
         lines = [line.strip() for line in self._end.decode(errors="replace").splitlines()]
         last = next((line for line in reversed(lines) if line), "")
         return printable(last if len(last) <= SHOWN else f"{last[: SHOWN - 3]}...")
+
+    def is_exception(self) -> bool:
+        """Whether they end with an exception's traceback. That of one who was interrupted only says that all is over."""
+        _, found, after = self._end.rpartition(TRACEBACK)
+        not_indented = [line for line in after.splitlines() if line.strip() and not line.startswith(b" ")]
+        return bool(found) and len(not_indented) <= 1 and not any(line.startswith(STOPPED) for line in not_indented)
 
 
 @dataclass(frozen=True)
@@ -113,7 +126,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
     for stream, taker in takers.items():
         _drain(stream, taker)
     code, reason = _read(said)
-    return Ended(None if why else code, why or reason, complaints.last_line())
+    return Ended(None if why else code, why or reason, complaints.last_line(), complaints.is_exception())
 
 
 def _look(

@@ -117,6 +117,8 @@ class ExternalSimulator:
         if ended.code not in OUTCOMES:
             why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
             return "error", why + said, self._rows(log)
+        if ended.code == 1 and ended.raised:
+            return "error", f"the command ended with an exception{said}", self._rows(log)
         try:
             outcome, rows = OUTCOMES[ended.code], log.finish()
             return outcome, kind_of(rows, fell=False, arrived=None) if outcome == "failed" else "", rows

@@ -76,14 +76,16 @@ class Controls(Screen[None]):
 
     def action_veto(self) -> None:
         candidate = self.query_one(Candidates).under_cursor
-        current = self.snapshot.state.round
-        if current is None or candidate is None:
+        state, current = self.snapshot.state, self.snapshot.state.round
+        if state.confirming and not state.ended:
+            self.refuse("the rounds are over")
+        elif current is None or candidate is None:
             self.refuse("there are no candidates yet")
         elif candidate.verdict:
             self.refuse(f"{candidate.label} is {candidate.verdict} already")
         elif current.done or current.winner is not None:
             self.refuse("this round is over")
-        elif candidate.index == self.snapshot.state.waiting_candidate:
+        elif candidate.index == state.waiting_candidate:
             self.refuse(f"{candidate.label} showed f and waits: reject it with x")
         elif self._works():
             self.send("veto", round=current.number, candidate=candidate.index)

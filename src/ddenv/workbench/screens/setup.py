@@ -21,6 +21,7 @@ from ddenv.workbench.chosen import Chosen, read_choice
 from ddenv.workbench.place import place_of
 from ddenv.workbench.processes import Engine
 from ddenv.workbench.screens.dialogs import Help, OpenFile
+from ddenv.workbench.widgets.about import About
 from ddenv.workbench.widgets.map import Place, WorldMap
 from ddenv.workbench.widgets.options import OptionsForm
 from ddenv.workbench.widgets.runs import RunList
@@ -71,7 +72,7 @@ class SetupScreen(Screen[None]):
                 with Vertical(id="preview", classes="panel") as panel:
                     panel.border_title = "World"
                     yield WorldMap(id="map")
-                    yield Static("", id="about", markup=False)
+                    yield About(id="about")
                 yield Explained(id="explained", classes="panel", can_focus=False)
                 yield OptionsForm(id="options", classes="panel")
         yield Footer(compact=True, show_command_palette=False)
@@ -139,7 +140,7 @@ class SetupScreen(Screen[None]):
         self._form.tell("")
         self.query_one("#preview").border_title = Text(shorten(plain(path.name), 40))
         self.query_one("#preview").border_subtitle = ""
-        self.query_one("#about", Static).update("")
+        self.query_one(About).tell("")
         self.query_one(WorldMap).set_place(Place(), "reading the world ...")
         self._read(path)
 
@@ -168,7 +169,7 @@ class SetupScreen(Screen[None]):
         scenario = chosen.scenario
         self._form.ask_for_places(scenario is None)
         self.query_one("#preview").border_title = Text(shorten(plain(chosen.name), 40))
-        self.query_one("#about", Static).update(Text(chosen.about))
+        self.query_one(About).tell(chosen.about)
         self._form.show_settings(chosen.settings)
         self._form.suggest_name(free_run_path(chosen.settings.name).stem)
         self._mark_places()

@@ -8,10 +8,11 @@ from rich.text import Text
 from textual.message import Message
 from textual.widgets import DataTable
 
+from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, Test
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.settings import settings
-from ddenv.workbench.wording import VERDICT, metres, outcome, plain, shorten
+from ddenv.workbench.wording import VERDICT, metres, outcome, plain
 
 # Name, width in cells with the space between columns, and whether it stays when there is little room.
 COLUMNS = (
@@ -22,8 +23,8 @@ COLUMNS = (
     ("tests", 7, True),
     ("verdict", 15, True),
 )
-# Of a model's name so many letters, with what stands before it.
-NAME = 10
+# Of a model's name so many columns, behind a sign and a space.
+NAME = 8
 # By row key, then by column.
 Rows = dict[str, dict[str, str]]
 RIGHT = ("models", "distance", "tests")
@@ -192,10 +193,10 @@ def _confirm(snapshot: Snapshot) -> Rows:
     rows = {}
     left = len(snapshot.state.environment)
     for number, test in enumerate(snapshot.state.confirm_tests, start=1):
-        name = "all left" if test.without is None else f"- {plain(test.without)}"
+        name = "all left" if test.without is None else f"- {shortened(test.without, NAME)}"
         models, run = left - (test.without is not None), f"run {test.run + 1}"
         rows[f"t{test.id}"] = _row(
-            str(number), shorten(name, NAME), str(models), metres(test.distance), run, _ended(snapshot, test)
+            str(number), name, str(models), metres(test.distance), run, _ended(snapshot, test)
         )
     return rows
 
