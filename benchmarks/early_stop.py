@@ -19,7 +19,7 @@ from ddenv.launch.scenarios import load_parts
 from ddenv.reduction.statistics import wilson_interval
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
+from ddenv.robot.variants import Variants
 from ddenv.runfile.state import Test
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
@@ -68,17 +68,17 @@ def tests(elements: tuple[str, ...], environments: int, seeds: int, first: int) 
 
 
 def prepare(scenario: Scenario) -> None:
-    """Builds the world once in each process."""
-    global _template
-    _template = Template(*load_parts(scenario), scenario)
+    """Builds the world once in each process, as the engine's workers do."""
+    global _simulator
+    _simulator = Variants(*load_parts(scenario), scenario)
 
 
 def full_run(asked: Asked) -> RunResult:
-    return _template.run(*asked, full=True)
+    return _simulator.run(*asked, full=True)
 
 
 def both_runs(asked: Asked) -> Both:
-    return Both(_template.run(*asked, full=True), _template.run(*asked, full=False))
+    return Both(_simulator.run(*asked, full=True), _simulator.run(*asked, full=False))
 
 
 def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:

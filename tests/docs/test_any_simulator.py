@@ -53,7 +53,8 @@ def test_the_same_seed_gives_the_same_run(tmp_path):
     assert json.loads(again.stdout)["runs"][0]["end_pose"] == one["end_pose"] != other["end_pose"]
 
 
-def test_the_page_shows_the_scenario_the_placeholders_and_the_variables():
+def test_the_page_shows_the_scenario_the_placeholders_and_the_variables(monkeypatch):
+    monkeypatch.delenv("DDENV_HOME", raising=False)
     (shown,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
     assert yaml.safe_load(shown)["oracle"] == yaml.safe_load(SCENARIO.read_text())["oracle"]
     assert re.findall(r"^\| `\{(\w+)\}`", PAGE, re.MULTILINE) == list(PLACEHOLDERS)

@@ -32,6 +32,11 @@ def test_the_husky_has_four_wheels(husky):
     assert drive == find_drive(husky, ALL)
 
 
+def test_a_robot_that_is_static_is_refused(husky):
+    with pytest.raises(UserError, match="is static, and would never move"):
+        find_drive(replace(husky, static=True))
+
+
 def test_wheel_speeds_of_a_skid_steered_turn(husky):
     drive = find_drive(husky)
     assert drive.wheel_speeds(Twist(1.0, 0.0), 0.5) == pytest.approx(np.full(4, 1.0 / 0.1651))

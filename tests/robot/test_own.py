@@ -180,6 +180,18 @@ def test_modules_of_one_name_in_two_folders(tmp_path):
     assert sys.path == path
 
 
+def test_modules_that_it_imports_later(tmp_path):
+    path = sys.path[:]
+    (tmp_path / "late_helper.py").write_text("SPEED = 2.0")
+    (tmp_path / "later_helper.py").write_text("TURN = 3.0")
+    body = (
+        "def __init__(self, setup):\n    from late_helper import SPEED\n    self.speed = SPEED\n"
+        "def step(self, reading):\n    import later_helper\n    return self.speed, later_helper.TURN"
+    )
+    assert own(tmp_path, body).step(READING) == Twist(2.0, 3.0)
+    assert sys.path == path
+
+
 def test_a_module_that_is_installed(tmp_path):
     assert load("ddenv.robot.navigation.straight:Straight", tmp_path) is load("straight", tmp_path)
 

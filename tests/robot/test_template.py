@@ -63,6 +63,18 @@ def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_o
     assert template.run(NOTHING, seed=1).outcome == "pass"
 
 
+def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(world_of, husky, scenario_of):
+    at = Pose.from_rpy(1.0, 2.0, 3.0, 0.0, 0.0, 0.5)
+    links = tuple(replace(link, pose=at @ link.pose) for link in husky.links)
+    joints = tuple(replace(joint, pose=at @ joint.pose, axis=tuple(at.rotate(joint.axis))) for joint in husky.joints)
+    posed = replace(husky, pose=at @ husky.pose, links=links, joints=joints)
+    starts = [
+        Template(world_of(), robot, scenario_of(failure={"timeout": 0.2})).run(NOTHING, seed=1).trajectory[0, 1:]
+        for robot in (husky, posed)
+    ]
+    assert starts[1] == pytest.approx(starts[0], abs=1e-9)
+
+
 def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
     template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",)))
     assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))

@@ -130,6 +130,16 @@ async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
 
 
+async def test_a_description_that_does_not_fit_says_so(scenarios):
+    own = fake_run.scenario() | {"description": "far " * 60 + "end"}
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    for size, whole in (((80, 24), False), ((120, 36), True)):
+        async with Opened(size) as session:
+            told = session.screen.query_one("#about", Static).render().plain
+            assert told.endswith("far end" if whole else " far …")
+            assert whole or len(told.splitlines()) == 2
+
+
 async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios, started):
     own = fake_run.scenario() | {"failure": {"early_stop": True}}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))

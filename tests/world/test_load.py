@@ -44,6 +44,16 @@ WRONG = {
     "infinite": ({"failure": {"timeout": float("inf")}}, "failure.timeout: should be a finite number"),
     "word": ({"goal": {"x": "far", "y": 0}}, "goal.x: .*found 'far'"),
     "missing": ({"goal": {"x": 1}}, "goal.y: is missing"),
+    "controller": (
+        {"controller": {"use": "timid"}},
+        "controller.use: expected straight, costmap or module:Class, found 'timid'",
+    ),
+    "no list": ({"protected": "deck"}, "protected: should be a list, found 'deck'"),
+    "empty oracle": ({"oracle": {"command": ""}}, "oracle.command: .*at least 1 character"),
+    "beams": (
+        {"sensors": {"lidar": {"beams": 1}}},
+        "sensors.lidar.beams: should be greater than or equal to 2, found 1",
+    ),
     "partitions": ({"reduction": {"n_partitions": 1}}, "n_partitions: should be greater than or equal to 2"),
 }
 

@@ -39,6 +39,8 @@ def prepare(scenario: Scenario, world: World, robot: Model, progress: Any) -> No
     """
     global _simulator, _progress
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Whatever is printed here, also by native code, must not get into what our caller prints for programs to read.
+    os.dup2(2, 1)
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
     _progress = progress
     try:

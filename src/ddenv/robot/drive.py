@@ -56,6 +56,8 @@ class Drive:
 
 def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
     """The drive of `robot`: the joints in `wheels`, or else every joint that turns about one axis. Raises UserError."""
+    if robot.static:
+        raise UserError(f"robot '{robot.name}': is static, and would never move; take <static> out of its file")
     sides = _placed(robot) if wheels is None else _named(robot, wheels)
     joints = [joint for joint in robot.joints if joint.name in sides]
     across = [robot.pose.inverse().rotate(joint.axis)[1] for joint in joints]

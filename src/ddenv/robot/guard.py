@@ -5,8 +5,8 @@ from __future__ import annotations
 import copy
 import random
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout, suppress
 from math import isfinite
 from numbers import Real
 from pathlib import Path
@@ -40,14 +40,16 @@ class ControllerFailed(Exception):
 class Guarded:
     """The controller that `make` gives for `setup`. It is made when it is asked for the first time.
 
-    Every answer has to come within `answer_within` s of real time. What it prints goes to stderr: stdout may be read by a program.
+    Modules that it imports only then are looked for in `folder` first, as its own was. Every answer has to come within
+    `answer_within` s of real time. What it prints goes to stderr: stdout may be read by a program.
     """
 
-    def __init__(self, make: Callable[[Setup], Any], setup: Setup, answer_within: float) -> None:
+    def __init__(self, make: Callable[[Setup], Any], setup: Setup, folder: Path, answer_within: float) -> None:
         self._name = getattr(make, "__qualname__", type(make).__name__)
         self._make = make
         # A copy: what one run changes in its options must not reach the next.
         self._setup = copy.deepcopy(setup)
+        self._folder = folder
         self._seconds = answer_within
         self._controller: Any = None
         self.arrived = False
@@ -68,7 +70,7 @@ class Guarded:
 
     def _guarded(self, what: str, call: Callable[[Any], Any], given: Any) -> Any:
         try:
-            with redirect_stdout(sys.stderr):
+            with first_on_path(self._folder), redirect_stdout(sys.stderr):
                 return call_within(self._seconds, call, given)
         except TooLate:
             problem = f"took longer than {self._seconds:g} s (controller.answer_within)"
@@ -78,6 +80,17 @@ class Guarded:
         except BaseException as error:
             problem = f"raised {told(error)}"
         raise ControllerFailed(f"controller {self._name}: {what} {problem}")
+
+
+@contextmanager
+def first_on_path(folder: Path) -> Iterator[None]:
+    """Modules of `folder` come first. What else is done to the path stays so."""
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        with suppress(ValueError):
+            sys.path.remove(str(folder))
 
 
 class _WrongAnswer(Exception):

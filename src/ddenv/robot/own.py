@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +13,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.robot.deadline import TooLate, call_within
-from ddenv.robot.guard import ControllerFailed, Guarded, told
+from ddenv.robot.guard import ControllerFailed, Guarded, first_on_path, told
 from ddenv.robot.protocol import Drives, Setup
 from ddenv.schemas import nearest
 from ddenv.world.scenario import Controller
@@ -34,7 +34,9 @@ _brought: set[str] = set()
 def controllers(settings: Controller, folder: Path) -> Callable[[Setup], Drives]:
     """What makes a controller for each run. Raises UserError as `load` does; an own one raises ControllerFailed in `step`."""
     make = load(settings.use, folder)
-    return make if settings.use in BUILT_IN else partial(Guarded, make, answer_within=settings.answer_within)
+    if settings.use in BUILT_IN:
+        return make
+    return partial(Guarded, make, folder=folder.resolve(), answer_within=settings.answer_within)
 
 
 def load(use: str, folder: Path) -> Callable[[Setup], Any]:
@@ -61,8 +63,10 @@ def _import(name: str, folder: Path) -> ModuleType:
     if _has(folder, top):
         _check_name(top, folder)
     before = set(sys.modules)
+    # Those written a moment ago are to be seen.
+    importlib.invalidate_caches()
     try:
-        with _first_on_path(folder), redirect_stdout(sys.stderr):
+        with first_on_path(folder), redirect_stdout(sys.stderr):
             call_within(LONGEST_IMPORT, __import__, name)
             return sys.modules[name]
     except TooLate:
@@ -88,15 +92,3 @@ def _check_name(top: str, folder: Path) -> None:
     elsewhere = loaded is not None and not any(place and Path(place).is_relative_to(folder) for place in places)
     if elsewhere or top in sys.stdlib_module_names:
         raise UserError(f"controller.use: '{top}' in {folder} has the name of another module; rename it")
-
-
-@contextmanager
-def _first_on_path(folder: Path) -> Iterator[None]:
-    """Modules of `folder` come first, and those written a moment ago are seen."""
-    importlib.invalidate_caches()
-    before = sys.path[:]
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path[:] = before

@@ -31,6 +31,7 @@ from ddenv.robot.surroundings import Surroundings
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
+from ddenv.world.placement import spawn_pose
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
 
@@ -185,8 +186,8 @@ class Template:
 
     def _place(self) -> None:
         """Puts everything where it starts; the plant's default context has it all in the world's origin."""
-        plant, spawn = self._built.plant, self._scenario.robot.spawn
-        at = Pose.from_rpy(spawn.x, spawn.y, spawn.z, 0.0, 0.0, spawn.yaw)
+        plant = self._built.plant
+        at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         for body, origin in [(self._built.robot, at), *((body, Pose()) for body in self._built.moving.values())]:
             for link, pose in zip(body.links, body.poses, strict=True):
                 if link.is_floating_base_body():

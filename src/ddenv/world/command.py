@@ -66,7 +66,7 @@ def _program(word: str, folder: Path) -> str:
 def _check_first_line(program: str) -> None:
     """Raises UserError for a script that the system could not start, which would only say that there is no such file."""
     try:
-        with open(program, "rb") as file:
+        with Path(program).open("rb") as file:
             head = file.read(LONGEST_FIRST_LINE)
     except OSError:
         # What may be executed may be unreadable.

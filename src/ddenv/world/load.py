@@ -19,6 +19,13 @@ from ddenv.world.bundled import SCENARIOS, bundled_names
 from ddenv.world.files.whole import read_bytes
 from ddenv.world.scenario import Scenario
 
+# What pydantic's words for its errors would not tell a user.
+PLAINLY = {
+    "tuple_type": "should be a list",
+    "too_short": "should have at least one entry",
+    "path_type": "should be a file name",
+}
+
 
 def find_scenario(name: str) -> Path:
     """The file of a bundled scenario, or the path itself. Raises UserError, with the nearest name for a typo."""
@@ -95,6 +102,10 @@ def complaint(error: Any, model: type[BaseModel]) -> str:
         allowed = context["expected"].replace("'", "").replace(" or ", ", ")
         near = nearest(str(error["input"]), allowed.split(", "))
         return f"{key}: {_shown(error['input'])} is not allowed{near}; use one of {allowed}"
+    if error["type"] in PLAINLY:
+        return f"{key}: {PLAINLY[error['type']]}, found {_shown(error['input'])}"
+    if error["type"] == "string_pattern_mismatch" and key == "controller.use":
+        return f"{key}: expected straight, costmap or module:Class, found {_shown(error['input'])}"
     message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
     return f"{key}: {message.replace('input should', 'should')}, found {_shown(error['input'])}"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.external import pose_log
+from ddenv.robot.external import pose_log, process
 from tests.conftest import DATA
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 
@@ -92,6 +92,13 @@ def test_a_command_that_hangs_is_killed_with_all_that_it_started(simulator_of, c
     result = simulator_of(code, wall_timeout=0.6).run(EVERYTHING, 0)
     assert (result.outcome, result.failure) == ("error", "took longer than 0.6 s of wall clock")
     assert result.end_position[0] == ends_at
+
+
+def test_a_command_that_stops_its_supervisor_is_killed_with_it(simulator_of, monkeypatch):
+    monkeypatch.setattr(process, "STOP_WAIT", 0.5)
+    stop = "import os, time; os.kill(os.getppid(), 19); time.sleep(1000)"
+    result = simulator_of(stop, wall_timeout=0.5).run(EVERYTHING, 0)
+    assert (result.outcome, result.failure) == ("error", "took longer than 0.5 s of wall clock")
 
 
 def test_what_a_command_leaves_behind_is_killed(simulator_of):

@@ -123,6 +123,10 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             late = f"took longer than {seconds:g} s of wall clock" if time.monotonic() > deadline else ""
             if said is None and not why and (why := late or too_much()):
                 _ask_to_end(command)
+                deadline = time.monotonic() + STOP_WAIT
+            elif said is None and late:
+                # It was stopped itself, and will be killed.
+                said = ""
     for stream, taker in takers.items():
         _drain(stream, taker)
     code, reason = _read(said)

@@ -91,7 +91,8 @@ class ExternalSimulator:
         try:
             with running(words, self._scenario.folder, environment, world.parent) as command:
                 ended = watch(command, self._scenario.simulation.wall_timeout, take, too_much)
-                if file is not None:
+                # Reading what is too large would take longer than writing it did.
+                if file is not None and ended.reason != TOO_LARGE:
                     _read(file, log)
         except OSError as error:
             ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")

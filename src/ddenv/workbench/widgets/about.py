@@ -28,6 +28,7 @@ class About(Static):
         if most is None or len(lines) <= most.cells:
             self.update(Text(self._words))
             return
-        shown = [line.plain.rstrip() for line in lines[: most.cells]]
-        shown[-1] = shown[-1][: max(0, width - len(MORE))].rstrip() + MORE
-        self.update(Text("\n".join(shown)))
+        *shown, last = (line.plain.rstrip() for line in lines[: most.cells])
+        if len(last) + len(MORE) > width:
+            last = last.rpartition(" ")[0]
+        self.update(Text("\n".join([*shown, f"{last}{MORE}"])))

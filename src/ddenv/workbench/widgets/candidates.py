@@ -195,9 +195,7 @@ def _confirm(snapshot: Snapshot) -> Rows:
     for number, test in enumerate(snapshot.state.confirm_tests, start=1):
         name = "all left" if test.without is None else f"- {shortened(test.without, NAME)}"
         models, run = left - (test.without is not None), f"run {test.run + 1}"
-        rows[f"t{test.id}"] = _row(
-            str(number), name, str(models), metres(test.distance), run, _ended(snapshot, test)
-        )
+        rows[f"t{test.id}"] = _row(str(number), name, str(models), metres(test.distance), run, _ended(snapshot, test))
     return rows
 
 
