@@ -1,5 +1,6 @@
 """The lines that are printed while a run is followed."""
 
+from ddenv.console.summary import broken
 from ddenv.console.words import baseline, headline, news
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
@@ -74,3 +75,9 @@ def test_full_runs_of_what_is_left_are_told():
 def test_the_headline_counts_tests_that_ended_and_that_run():
     state = states(*map(started, (1, 2, 3, 4)), ended(2, "pass"), ("test_lost", {"test": 3}))[-1]
     assert headline(state).endswith("4 of 4 models · 1 tests, 2 running")
+
+
+def test_why_tests_broke_is_told_at_the_end():
+    state = states(started(1), ended(1, "error", "the controller Follow raised ValueError: no"))[-1]
+    assert broken(state) == ["1 test broke, the last one: the controller Follow raised ValueError: no"]
+    assert broken(states(started(1), ended(1, "pass"))[-1]) == []

@@ -234,7 +234,8 @@ def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
         state = follow(path, engine, sys.stderr if as_json else sys.stdout)
         code = 0 if state.minimal else 1
     except Interrupted as interrupted:
-        state, code = interrupted.state, 130
+        # It may have ended just then.
+        state, code = interrupted.state, 0 if interrupted.state.minimal else 130
     print(json.dumps(summary(state, path)) if as_json else "\n".join(lines(state, path)), flush=True)
     if sdf is not None and state.baseline is not None:
         _tell_needs(sdf, export_world(path, sdf, None).needs)

@@ -46,9 +46,16 @@ def lines(state: RunState, path: Path) -> list[str]:
         f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names(state)}",
         f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{early}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
+        *broken(state),
         f"run file: {path}",
     ]
     return [printable(line) for line in told]
+
+
+def broken(state: RunState) -> list[str]:
+    """Why the last test that broke did, if one did: such tests count as tests without the failure."""
+    tests = [test for test in state.tests if test.outcome in ("error", "timeout")]
+    return [f"{count(len(tests), 'test')} broke, the last one: {tests[-1].failure}"] if tests else []
 
 
 def names(state: RunState) -> str:

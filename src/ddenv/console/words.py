@@ -69,6 +69,7 @@ def baseline(state: RunState) -> str:
     x, y, z = found.position
     failure, others = state.failure or "ending", state.other_failures
     also = f", {count(others, 'run')} failed in another way" if others else ""
+    also += f", {count(broke, 'run')} broke" if (broke := state.broken_runs) else ""
     return (
         f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
         f"{found.high:.0%}){also}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m; {iterations(state)}"

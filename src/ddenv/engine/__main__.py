@@ -68,6 +68,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         journal.record("engine_stopped", reason=str(stop))
         return 1
     except UserError as error:
+        journal.lose_running()
         journal.record("engine_failed", reason=str(error))
         raise
     except Exception as error:

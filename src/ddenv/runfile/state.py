@@ -211,6 +211,12 @@ class RunState:
         return sum(test.outcome == "other" for test in baseline)
 
     @property
+    def broken_runs(self) -> int:
+        """How many baseline runs broke, and count as runs without f."""
+        baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
+        return sum(test.outcome in ("error", "timeout") for test in baseline)
+
+    @property
     def cut_tests(self) -> int:
         """How many tests were ended before their time."""
         return sum(test.cut for test in self.tests)

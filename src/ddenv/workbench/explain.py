@@ -65,6 +65,7 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
     if base is None:
         return ""
     others = f"; {count(state.other_failures, 'run')} failed in another way" if state.other_failures else ""
+    others += f"; {count(state.broken_runs, 'run')} broke" if state.broken_runs else ""
     sentence = (
         f"Baseline: the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')} "
         f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){others}."
