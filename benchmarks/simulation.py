@@ -79,7 +79,8 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
     kept = [body for name, body in built.moving.items() if name in present]
     template._sleeping = False
     try:
-        with template._presence.without(template._names - present), template._asleep(kept, present):
+        template._presence.remove(template._names - present)
+        with template._asleep(kept, present):
             motors = built.plant.get_desired_state_input_port(built.robot.instance)
             simulator = Simulator(built.diagram, template._context)
 

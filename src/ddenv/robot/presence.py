@@ -25,22 +25,24 @@ class Presence:
             built.scene_graph.GetMyMutableContextFromRoot(context)
         )
         self._robot = GeometrySet(list(built.robot.geometry))
+        self._removed: frozenset[str] = frozenset()
         self._kept = built.static
-        self._ground = _set(built.static.values())
+        self._all_kept: GeometrySet | None = None
         self.part(tuple(built.moving.values()), ())
 
-    @contextmanager
-    def without(self, removed: frozenset[str]) -> Iterator[None]:
-        """The world without what never moves of the models `removed`; moving ones are simply not joined."""
-        gone = _set(geometry for name, geometry in self._built.static.items() if name in removed)
-        self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
-        self._ground = _set(self._kept.values())
-        self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(gone, self._robot))
-        try:
-            yield
-        finally:
-            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(gone, self._robot))
-            self._kept, self._ground = self._built.static, _set(self._built.static.values())
+    def remove(self, removed: frozenset[str]) -> None:
+        """From now on the world is without what never moves of the models `removed`; moving ones are simply not joined.
+
+        Only what differs from the last time costs: a world is mostly run again, or with few models more or less.
+        """
+        gone, back = self._static(removed - self._removed), self._static(self._removed - removed)
+        if gone:
+            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._robot))
+        if back:
+            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._robot))
+        if gone or back:
+            self._removed, self._all_kept = removed, None
+            self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
 
     @contextmanager
     def without_robot(self) -> Iterator[None]:
@@ -50,6 +52,16 @@ class Presence:
             yield
         finally:
             self._filters.Apply(CollisionFilterDeclaration().AllowBetween(self._ground, self._robot))
+
+    @property
+    def _ground(self) -> GeometrySet:
+        """All that never moves and is kept."""
+        if self._all_kept is None:
+            self._all_kept = _set(self._kept.values())
+        return self._all_kept
+
+    def _static(self, names: frozenset[str]) -> list[tuple[GeometryId, ...]]:
+        return [geometry for name in names if (geometry := self._built.static.get(name))]
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
         """Lets `bodies` touch each other, `others`, what never moves and is kept, and the robot."""

@@ -60,7 +60,7 @@ class Rehearsals:
     def scripts(self, kept: Sequence[Body], present: frozenset[str]) -> list[Script]:
         """The scripts of all piles of `kept` that start away from the robot, where the models `present` are kept.
 
-        To be called within `Presence.without` those which are not.
+        To be called after `Presence.remove` of those which are not.
         """
         piles = self._piles({body.name for body in kept})
         found = [self._find(pile, present) for pile in piles]

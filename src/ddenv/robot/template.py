@@ -130,7 +130,8 @@ class Template:
         removed = self._names - keep - self._always
         kept = [body for name, body in self._built.moving.items() if name not in removed]
         present = self._names - removed
-        with self._presence.without(removed), self._asleep(kept, present) as sleep:
+        self._presence.remove(removed)
+        with self._asleep(kept, present) as sleep:
             notice = Notice(self._surroundings, self._scenario.sensors, self._plant_context, sleep, kept, present)
             suite = SensorSuite(self._scenario.sensors, seed)
             run = Run(
