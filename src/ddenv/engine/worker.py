@@ -6,11 +6,10 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
 from typing import Any, Protocol
 
 from ddenv.errors import UserError
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Progress, RunResult
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -23,7 +22,7 @@ class Simulator(Protocol):
         self,
         keep: frozenset[str],
         seed: int,
-        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult: ...
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ddenv.world.pose import Vector
+
+# Is told the simulated time (s) and the robot's x, y, z (m), qw, qx, qy, qz while it runs.
+Progress = Callable[[float, tuple[float, ...]], None]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -19,13 +19,12 @@ from ddenv.robot.observe import Observer, PoseRow
 from ddenv.robot.own import ControllerFailed
 from ddenv.robot.plant import Body, Built
 from ddenv.robot.recording import Recording
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sleep import Sleep
 from ddenv.robot.stuck import Stuck
 from ddenv.world.scenario import Scenario
 
-Progress = Callable[[float, PoseRow], None]
 # Outcome, failure, and whether the run was cut short.
 End = tuple[str, str, bool]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -20,7 +20,7 @@ from ddenv.robot.presence import Presence
 from ddenv.robot.protocol import Setup
 from ddenv.robot.rehearsal import Rehearsals
 from ddenv.robot.repertoire import Repertoire
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.run import Run
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
@@ -115,7 +115,7 @@ class Template:
         self,
         keep: frozenset[str],
         seed: int,
-        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`; protected models and grounds are always there.

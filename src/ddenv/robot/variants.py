@@ -7,10 +7,9 @@ switched off costs nothing.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
 
 from ddenv.robot.clock import Clock
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.template import Template
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -43,7 +42,7 @@ class Variants:
         self,
         keep: frozenset[str],
         seed: int,
-        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult:
         """As `Template.run`."""

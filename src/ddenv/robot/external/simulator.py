@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
 from ddenv.robot.external.process import Ended, running, watch
 from ddenv.robot.kinds import kind_of
-from ddenv.robot.result import RunResult
+from ddenv.robot.result import Progress, RunResult
 from ddenv.world.command import command_words, filled, has_placeholder
 from ddenv.world.files.resolve import ENVIRONMENT
 from ddenv.world.model import World
@@ -43,7 +43,7 @@ class ExternalSimulator:
         self,
         keep: frozenset[str],
         seed: int,
-        progress: Callable[[float, tuple[float, ...]], None] | None = None,
+        progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`; those that cannot be removed are always there.
@@ -71,9 +71,7 @@ class ExternalSimulator:
             seed=seed,
         )
 
-    def _execute(
-        self, world: Path, seed: int, progress: Callable[[float, tuple[float, ...]], None] | None
-    ) -> tuple[Ended, PoseLog]:
+    def _execute(self, world: Path, seed: int, progress: Progress | None) -> tuple[Ended, PoseLog]:
         """Runs the command on the file `world` to its end, and takes in its pose log."""
         file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
         log = PoseLog(progress if file is None else None)
