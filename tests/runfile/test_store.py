@@ -103,7 +103,7 @@ def test_an_older_file_that_an_engine_goes_on_with_is_one_of_this_version(path):
         assert version_of(path) == 1
         file.own()
         file.append("paused", {})
-    assert version_of(path) == SCHEMA_VERSION == 3
+    assert version_of(path) == SCHEMA_VERSION == 4
 
 
 def version_of(path) -> int:

@@ -69,6 +69,7 @@ class FakeRun:
         self.file.own()
         self.tests = 0
         self.round = 0
+        self.trials = 0
         self._stack = ExitStack()
 
     def engine(self):
@@ -159,10 +160,11 @@ class FakeRun:
         )
         return self
 
-    def start_round(self, parts: int, environment: list[str] | None = None) -> None:
-        """A round of `parts` partitions of neighbours, each with its complement."""
+    def start_round(self, parts: int, environment: list[str] | None = None, pinned: tuple[str, ...] = ()) -> None:
+        """A round of `parts` partitions of neighbours, each with its complement; `pinned` models are in all of them."""
         self.round += 1
-        kept = [self.elements.index(name) for name in environment or self.elements]
+        whole = self.numbers(environment or self.elements)
+        kept = [number for number in whole if self.elements[number] not in pinned]
         cuts = [round(len(kept) * index / parts) for index in range(parts + 1)]
         partitions = [kept[a:b] for a, b in pairwise(cuts)]
         kinds = ("partition", "complement") if parts > 2 else ("partition",)
@@ -171,9 +173,10 @@ class FakeRun:
             "round_started",
             round=self.round,
             n_partitions=parts,
-            environment=kept,
+            environment=whole,
             partitions=partitions,
             candidates=candidates,
+            pinned=self.numbers(list(pinned)),
         )
 
     def judge(self, candidate: int, verdict: str, tests: list[int], known: int = 0) -> None:
@@ -188,6 +191,36 @@ class FakeRun:
         test = self.test(candidate, "similar", 0.12, failure="stuck")
         self.judge(candidate, "similar", [test])
         return test
+
+    def numbers(self, names: list[str]) -> list[int]:
+        return [self.elements.index(name) for name in names]
+
+    def pin(self, *names: str) -> None:
+        self.write("pinned", models=self.numbers(list(names)))
+
+    def try_out(self, kept: list[str]) -> int:
+        """A selection by hand; returns its number."""
+        self.trials += 1
+        self.write("trial_started", trial=self.trials, models=self.numbers(kept))
+        return self.trials
+
+    def start_hand(self, trial: int, run: int = 0) -> int:
+        """A test of a trial starts."""
+        self.tests += 1
+        place = {"phase": "hand", "round": None, "candidate": None, "trial": trial}
+        self.write("test_started", test=self.tests, **place, run=run, seed=run)
+        return self.tests
+
+    def judge_trial(self, trial: int, verdict: str, tests: list[int], known: int = 0) -> None:
+        self.write("trial_judged", trial=trial, verdict=verdict, tests=tests, known=known)
+
+    def adopt(self, trial: int, kept: list[str], test: int) -> None:
+        self.write("adopted", trial=trial, environment=self.numbers(kept), evidence_test=test)
+        self.write("leg_started", round=self.round + 1, n_partitions=2)
+
+    def go_back(self, node: int, rejected: int | None = None) -> None:
+        self.write("went_back", node=node, rejected=rejected)
+        self.write("leg_started", round=self.round + 1, n_partitions=2)
 
     def reduce(self, candidate: int, environment: list[str], test: int) -> None:
         numbers = [self.elements.index(name) for name in environment]
@@ -245,6 +278,34 @@ def _rounds(run: FakeRun) -> FakeRun:
     run.dissimilar(0)
     run.dissimilar(1)
     run.write("round_finished")
+    return run
+
+
+def guided(run: FakeRun) -> FakeRun:
+    """Two reductions, one taken back; a pinned model; three selections by hand: one adopted, one in vain, one under way."""
+    run.created().baseline()
+    run.start_round(2)
+    left = run.elements[:6]
+    run.reduce(0, left, run.similar(0))
+    run.start_round(3, left)
+    run.reduce(1, left[:2] + left[4:], run.similar(1))
+    run.go_back(1, rejected=2)
+    run.pin(left[0])
+    kept = left[:5]
+    adopted = run.try_out(kept)
+    test = run.start_hand(adopted)
+    run.finish(test, "similar", 0.12, failure="stuck")
+    run.judge_trial(adopted, "similar", [test])
+    run.adopt(adopted, kept, test)
+    vain = run.try_out(kept[:2])
+    tests = [run.start_hand(vain, number) for number in range(4)]
+    for number in tests:
+        run.finish(number, "other", 2.3, failure="tipped over")
+    run.judge_trial(vain, "dissimilar", tests)
+    run.start_round(2, kept, pinned=(left[0],))
+    run.dissimilar(0)
+    under_way = run.try_out(kept[1:])
+    run.live((run.start(1, 0), 0.4), (run.start_hand(under_way), 0.7))
     return run
 
 

@@ -9,13 +9,13 @@ import time
 from pathlib import Path
 from typing import TextIO
 
-from ddenv.console.words import headline, news
 from ddenv.errors import UserError, printable
 from ddenv.launch.programs import last_words
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.words import headline, news
 
 POLL = 0.2
 # How long an engine that was asked to stop may take to write its last event, s.

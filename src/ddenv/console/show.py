@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.console.words import count
 from ddenv.map.cells import FAINT, PLAIN, picture, signs
 from ddenv.map.names import padded, shortened, width
 from ddenv.map.paint import Canvas, Run
 from ddenv.map.plan import Drawn, plan
 from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.map.ticks import tick_step, tick_text, ticks
+from ddenv.words import count
 from ddenv.world.model import World
 
 # Columns of numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.

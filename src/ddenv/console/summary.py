@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ddenv.console.words import count
 from ddenv.errors import printable
 from ddenv.runfile.state import RunState
+from ddenv.words import count
 
 # More names than this are not read by anyone in a line.
 MOST_NAMES = 12

@@ -13,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
@@ -53,7 +54,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     scenario, world, robot = read_parts(file)
     file.own()
     journal = Journal(file)
-    if journal.state.status == "finished":
+    if journal.state.status == "finished" and not file.commands(journal.state.last_command):
         return 0
     try:
         _begin(journal, jobs, options.accept_mode)
@@ -85,7 +86,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     journal.lose_running()
-    journal.record("engine_started", pid=os.getpid(), jobs=jobs)
+    journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__)
     if accept_mode and accept_mode != journal.state.accept_mode:
         journal.record("accept_mode", mode=accept_mode)
 

@@ -1,4 +1,7 @@
-"""Where tests are made: the first in line on a free worker, the next ones ahead of time on the others; all is recorded."""
+"""Where tests are made: the first in line on a free worker, the next ones ahead of time on the others; all is recorded.
+
+What the user tries by hand goes before all that.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ddenv.engine.control import Control
+from ddenv.engine.control import Control, Steered, Stopped
+from ddenv.engine.failures import failures_of
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.told import told
+from ddenv.engine.trials import judge_trials, open_trials
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import ROBOT
+from ddenv.world.scenario import FailureSpec
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -29,11 +35,11 @@ Wanted = list[tuple[Keep, int, int | None]]
 class Bench:
     """Makes tests with `pool`, as `control` allows, and records them in `journal`.
 
-    `failure` is f once it is fixed; before, a run that failed is recorded as "failed".
+    Before f is fixed, a run that failed is recorded as "failed".
     """
 
     def __init__(self, journal: Journal, pool: Pool, control: Control) -> None:
-        self.failure: Failure | None = None
+        self._failures: tuple[Failure, ...] = ()
         self._journal = journal
         self._pool = pool
         self._control = control
@@ -46,8 +52,8 @@ class Bench:
         """Makes tests until none is wanted.
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is asked again at every look around. Raises Stopped, and UserError if nothing can be simulated or all tests
-        break.
+        them; it is asked again at every look around. Raises Stopped, Steered, and UserError if nothing can be simulated or all
+        tests break.
         """
         full = self._journal.is_full(phase)
         while tests := wanted():
@@ -59,16 +65,53 @@ class Bench:
         free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
         full = self._journal.is_full(phase)
         for keep, run, candidate in tests[:free]:
-            if not self._control.may_start():
+            if not self._control.may_start() or self._is_spent():
                 return
             test = self._journal.start_test(phase, keep, run, round, candidate)
             self._started.add((keep, run, full))
             self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
             self._control.started()
 
+    def finish_trials(self) -> None:
+        """Makes the tests that the user asked for. Raises as `work`."""
+        while self._journal.state.failures and open_trials(self._journal):
+            self.tick()
+
+    def _serve_trials(self) -> None:
+        """They are made while the rounds are paused, too."""
+        if not self._journal.state.failures or not open_trials(self._journal):
+            return
+        full = self._journal.is_full("hand")
+        wanted = [one for one in judge_trials(self._journal) if (*one[:2], full) not in self._started]
+        for keep, run, trial in wanted[: self._pool.idle]:
+            test = self._journal.start_test("hand", keep, run, trial=trial)
+            self._started.add((keep, run, full))
+            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
+
+    def _is_spent(self) -> bool:
+        """Whether no test may start any more. Raises Stopped once none runs."""
+        state = self._journal.state
+        if state.budget is None or state.tests_done + self._pool.busy < state.budget:
+            return False
+        if self._pool.busy == 0:
+            raise Stopped(f"the budget of {state.budget} tests is used up")
+        return True
+
     def tick(self) -> None:
-        """Obeys commands, takes in what has finished, shows the running robots. Raises Stopped, and UserError as `work`."""
+        """Obeys commands, takes in what has finished, shows the running robots. Raises as `work`.
+
+        Where the user has changed something nobody comes back from here: what the old search would make of a test that
+        ends now must not count.
+        """
+        self._look_around()
+        while self._control.holds:
+            if self._control.may_search:
+                raise Steered
+            self._look_around()
+
+    def _look_around(self) -> None:
         self._control.poll()
+        self._serve_trials()
         finished = self._pool.finished(WAIT)
         for test, result in finished:
             self._record(test, result)
@@ -101,9 +144,17 @@ class Bench:
         if isinstance(result, RunResult):
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
-        data = told(result, self.failure)
+        data = told(result, self._counted())
         noticed = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
         self._journal.record("test_finished", motions, test=test, **data | noticed)
+
+    def _counted(self) -> tuple[Failure, ...]:
+        """f, and what the user took for as good."""
+        state = self._journal.state
+        if len(self._failures) != len(state.failures):
+            spec = FailureSpec.model_validate(state.scenario["failure"])
+            self._failures = failures_of(self._journal.file, state, spec)
+        return self._failures
 
     def _numbered(self, times: dict[str, float]) -> list[list[float]]:
         """`times` by name, s, as [number of the model, s] in the order of time; without what is no element."""

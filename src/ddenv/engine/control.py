@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 
 from ddenv.engine.journal import Journal
+from ddenv.engine.steering import STEERING, Steering
 from ddenv.runfile.store import Event
+
+# Several decisions in a row make one new search of it, s.
+SETTLE = 0.5
 
 
 class Stopped(Exception):
     """The engine was asked to stop."""
+
+
+class Steered(Exception):
+    """The user changed something that the search has to begin anew for."""
 
 
 class Control:
@@ -27,6 +36,9 @@ class Control:
         self._paused = False
         self._credit: int | None = None
         self._pause_after_round = False
+        self._searches = False
+        self._last = -math.inf
+        self._steering = Steering(journal)
         self._forget_old_stops(since)
 
     def _forget_old_stops(self, since: float) -> None:
@@ -45,6 +57,21 @@ class Control:
             raise Stopped("the engine was terminated")
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
+            self._last = time.monotonic()
+
+    def search_begins(self) -> None:
+        """From now on what the user changes ends a search."""
+        self._searches = True
+
+    @property
+    def holds(self) -> bool:
+        """Whether the search that is on is over, since the user changed something."""
+        return self._searches and self._journal.steered
+
+    @property
+    def may_search(self) -> bool:
+        """Whether a new search may begin: not while the run is paused, and not before the user has come to rest."""
+        return not self._paused and time.monotonic() - self._last > SETTLE
 
     def may_start(self) -> bool:
         """Whether a test may start now."""
@@ -72,9 +99,19 @@ class Control:
     def _obey(self, command: Event) -> None:
         # Marked first: a stop leaves by an exception, and must not be met again.
         self._handled(command)
+        if command.kind in STEERING:
+            self._steer(command)
+            return
         obey = getattr(self, f"_obey_{command.kind}", None)
         if obey is not None:
             obey(command.data)
+
+    def _steer(self, command: Event) -> None:
+        why = STEERING[command.kind](self._steering, command.data)
+        if why:
+            self._journal.record("command_refused", command=command.id, why=why)
+        elif command.kind == "go_back" and not self._paused:
+            self._pause()
 
     def _handled(self, command: Event) -> None:
         self._journal.record("command_handled", command=command.id)

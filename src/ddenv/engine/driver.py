@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
-
-import numpy as np
 
 from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.confirm import Confirmation
-from ddenv.engine.control import Control
+from ddenv.engine.control import Control, Steered
 from ddenv.engine.evidence import Sight
+from ddenv.engine.failures import rows_of
 from ddenv.engine.journal import Journal, Keep, other_way
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.guide import Guide, make_guide, search
+from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.verdict import Standing, standing
-from ddenv.robot.oracle import Failure
-from ddenv.runfile.store import COLUMNS
 from ddenv.schemas import split_pair
 from ddenv.world.model import World
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Reduction, Scenario
 
 # No machine has more idle workers than this: further candidates need not be looked at.
 ENOUGH = 2048
@@ -43,65 +41,101 @@ class Driver:
         self._trials: list[Trial] = []
         self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
-        # How many candidates of the round have their verdict, and were without f.
+        self._pinned: Keep = frozenset()
+        # How many candidates of the round have their verdict, and were without f; as of so many refusals.
         self._judged = 0
+        self._refusals = 0
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
-        guide = self._guide()
-        algorithm = search(self._reduction.algorithm, self._journal.state.elements, guide)
+        # Unknown names are told before a robot has run.
+        self._begin(self._reduction, self._journal.state.elements)
         reason = self._baseline()
         if reason:
             self._end(False, reason)
             return
-        number, winner = 0, None
+        self._control.search_begins()
+        # Before this engine was started the user may have gone back, to pause there.
+        with suppress(Steered):
+            while self._journal.steered:
+                self._bench.tick()
+        while True:
+            try:
+                self._search()
+                return
+            except Steered:
+                continue
+
+    def _search(self) -> None:
+        """From where the user left it to its end. Raises Steered where the user changes something."""
+        leg = self._journal.begin_leg()
+        self._reduction = Reduction.model_validate(leg.settings)
+        self._pinned = leg.pinned
+        self._learnt = set(leg.tests)
+        self._trials = [self._learnt_from(test) for test in leg.tests]
+        self._look_at(leg.evidence_test)
+        free = tuple(name for name in leg.environment if name not in leg.pinned)
+        algorithm = self._begin(self._reduction, free, leg.n_partitions)
+        number, winner = leg.first_round, None
         try:
             while True:
-                round = algorithm.send(winner)
+                winner = self._round(number, algorithm.send(winner))
                 number += 1
-                winner = self._round(number, round)
         except StopIteration as end:
-            self._finish(end.value)
+            self._finish(end.value | self._pinned)
 
-    def _guide(self) -> Guide:
-        """The schemas that the scenario names. Raises UserError where there are none of these names."""
-        asked = self._reduction
+    def _begin(self, asked: Reduction, elements: tuple[str, ...], n_partitions: int | None = None) -> Search:
+        """The algorithm and the schemas by name. Raises UserError where there are none of these names."""
         partitioning, prioritization = split_pair(asked.pair)
-        return make_guide(
+        guide = make_guide(
             partitioning,
             prioritization,
             lambda: replace(self._evidence, trials=self._trials),
             prior=asked.prior,
-            n_partitions=asked.n_partitions,
+            n_partitions=n_partitions or asked.n_partitions,
             candidates=asked.candidates,
             complement_order=asked.complement_order,
             growth=asked.growth,
             skip=asked.skip,
         )
+        return search(asked.algorithm, elements, guide)
+
+    def _keep(self, candidate: Candidate) -> Keep:
+        """All that is there when a candidate is tested."""
+        return candidate.models | self._pinned
 
     def _finish(self, kept: Keep) -> None:
+        free = [name for name in self._journal.state.elements if name in kept - self._pinned]
         # Each model must have been left out, in tests and without success; a veto or a reject leaves that open.
-        untried = [name for name in kept if not self._is_dissimilar(kept - {name})]
-        reason = "no single model can be removed" if kept else "f needs none of the models that can be removed"
+        untried = [name for name in free if not self._is_dissimilar(kept - {name})]
+        reason = self._reason(kept, free)
         if untried:
             why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
             reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"
-        tried = [name for name in self._journal.state.elements if name in kept and name not in untried]
+        tried = [name for name in free if name not in untried]
         doubt = self._confirm(kept, tried) if self._failure_spec.early_stop else ""
         runs = range(1 + self._reduction.iterations)
-        broken = [name for name in kept if self._journal.only_broke(kept - {name}, runs)]
+        broken = [name for name in free if self._journal.only_broke(kept - {name}, runs)]
         if broken and not untried:
             reason = f"{len(broken)} of the {len(kept)} models left may not be needed: all tests without them broke"
         self._end(not untried and not broken and not doubt, doubt or reason)
 
+    def _reason(self, kept: Keep, free: list[str]) -> str:
+        if not kept:
+            return "f needs none of the models that can be removed"
+        if len(free) == len(kept):
+            return "no single model can be removed"
+        return f"no single model can be removed but those that are pinned ({len(kept) - len(free)})"
+
     def _confirm(self, kept: Keep, tried: list[str]) -> str:
         """Makes the full runs that the end still lacks; returns what they contradict, or ""."""
-        self._journal.record_once("confirm_started")
+        self._journal.record("confirm_started")
         confirmation = Confirmation(self._journal, kept, tried, self._reduction.iterations, ENOUGH)
         self._bench.work("confirm", None, confirmation.wanted)
         return confirmation.doubt()
 
     def _end(self, minimal: bool, reason: str) -> None:
+        self._bench.finish_trials()
         # What ran ahead of time is not needed any more.
         self._journal.lose_running()
         self._journal.record("finished", minimal=minimal, reason=reason)
@@ -120,16 +154,12 @@ class Driver:
         self._bench.work("baseline", None, wanted)
         if journal.state.baseline is None:
             tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in runs]
-            trajectories = {test.id: self._trajectory(test.id) for test in tests if test.outcome == "failed"}
+            trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
             found = fix_failure(tests, trajectories, self._failure_spec, self._reduction.iterations)
             if isinstance(found, str):
                 return found
             journal.record("baseline_finished", **found)
             self._control.round_finished()
-        f = journal.state.baseline
-        spec = self._failure_spec
-        self._bench.failure = Failure(f.position, self._trajectory(f.failure_test), spec.epsilon, spec.similarity)
-        self._look_at(f.failure_test)
         return ""
 
     def _round(self, number: int, round: Round) -> Candidate | None:
@@ -159,32 +189,36 @@ class Driver:
             "round_started",
             number,
             n_partitions=round.n_partitions,
-            environment=self._numbers(round.environment),
+            environment=self._numbers((*round.environment, *self._pinned)),
             partitions=partitions,
             candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
+            **({"pinned": self._numbers(self._pinned)} if self._pinned else {}),
         )
         if self._journal.partitions[number] != partitions:
             raise UserError(other_way(number))
         if self._journal.state.round.number != number:
             return
         for index, one in enumerate(round.candidates) if self._journal.refused else ():
-            if verdict := self._journal.refused.get(one.models):
-                self._journal.record_once("vetoed", number, index, verdict=verdict)
+            if verdict := self._journal.refused.get(self._keep(one)):
+                self._journal.record_once("vetoed", number, index, verdict=verdict, again=True)
 
     def _judge(self, number: int, round: Round) -> int | None:
         """The index of the first similar candidate that was not rejected, or None when all are judged."""
 
         def wanted() -> Wanted:
+            if self._refusals != self._journal.refusals:
+                # One that was passed over may be wanted after all.
+                self._refusals, self._judged = self._journal.refusals, 0
             now = self._standing(round)
             self._record_verdicts(number, round, now.verdicts)
-            return [(round.candidates[index].models, run, index) for index, run in now.wanted]
+            return [(self._keep(round.candidates[index]), run, index) for index, run in now.wanted]
 
         self._bench.work("round", number, wanted)
         return self._standing(round).winner
 
     def _standing(self, round: Round) -> Standing:
         """Of the candidates that have no verdict yet."""
-        open_ones = (candidate.models for candidate in islice(round.candidates, self._judged, None))
+        open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
         similar, refused = self._journal.is_similar, self._journal.refused
         return standing(open_ones, similar, self._reduction.iterations, refused, first=self._judged, enough=ENOUGH)
 
@@ -193,9 +227,9 @@ class Driver:
         for verdict in verdicts:
             if not verdict:
                 return
-            models = round.candidates[self._judged].models
+            models = self._keep(round.candidates[self._judged])
             if models not in self._journal.refused:
-                tests = self._tests_of(models)
+                tests = self._journal.tests_of(models, self._reduction.iterations)
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
                 self._journal.record_once(
                     "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
@@ -215,20 +249,13 @@ class Driver:
             rejected = journal.decisions.get((number, index)) == "reject"
             if rejected or not journal.has("candidate_judged", number, index):
                 continue
-            models = candidate.models
-            for test in self._tests_of(models):
+            for test in journal.tests_of(self._keep(candidate), self._reduction.iterations):
                 if test not in self._learnt:
                     self._learnt.add(test)
-                    self._trials.append(Trial(models, journal.state.tests[test - 1].outcome == "similar"))
+                    self._trials.append(self._learnt_from(test))
 
-    def _tests_of(self, keep: Keep) -> list[int]:
-        """The tests that a candidate's verdict rests on, in the order of runs."""
-        tests = []
-        for run in range(1 + self._reduction.iterations):
-            tests.append(self._journal.ledger[keep, run, False])
-            if self._journal.state.tests[tests[-1] - 1].outcome == "similar":
-                break
-        return tests
+    def _learnt_from(self, test: int) -> Trial:
+        return Trial(self._journal.keep_of_test(test), self._journal.state.tests[test - 1].outcome == "similar")
 
     def _is_accepted(self, number: int, winner: int) -> bool:
         """In accept mode `ask`, waits for the user."""
@@ -245,18 +272,17 @@ class Driver:
 
     def _take(self, number: int, round: Round, winner: int) -> None:
         """The winner becomes the environment; its similar run is what the next rounds look at."""
-        models = round.candidates[winner].models
-        test = self._tests_of(models)[-1]
-        environment = self._numbers(name for name in round.environment if name in models)
+        models = self._keep(round.candidates[winner])
+        test = self._journal.tests_of(models, self._reduction.iterations)[-1]
+        environment = self._numbers(models)
         self._journal.record_once("reduced", number, winner, environment=environment, evidence_test=test)
         self._look_at(test)
 
     def _look_at(self, test: int) -> None:
         """The schemas see `test`, the last similar run."""
-        self._evidence = self._sight.evidence(self._journal.state, test, self._trajectory(test), self._trials)
-
-    def _trajectory(self, test: int) -> np.ndarray:
-        return np.array(self._journal.file.trajectory(test)).reshape(-1, COLUMNS)
+        self._evidence = self._sight.evidence(
+            self._journal.state, test, rows_of(self._journal.file, test), self._trials
+        )
 
     def _numbers(self, names: Iterable[str]) -> list[int]:
         """In the order of the world, which is not always the algorithm's."""

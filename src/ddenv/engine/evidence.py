@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from ddenv.reduction.evidence import Evidence, Traits, Trial
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import RunState, Test
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
 
@@ -25,6 +26,12 @@ def traits_of(model: Model) -> Traits:
     size = 0.0 if box is None else float((box[1] - box[0]).max())
     friction = min((collision.mu for collision in model.collisions), default=1.0)
     return Traits(size, friction, not model.static)
+
+
+def _end(state: RunState, run: Test) -> tuple[float, float, float]:
+    """Where f ended; of several failures that count as f the one that `run` showed."""
+    ends = [state.baseline.position, *(state.tests[test - 1].end_pose[:3] for test in state.failures[1:])]
+    return ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, run.end_pose[:3]))
 
 
 class Sight:
@@ -45,7 +52,7 @@ class Sight:
             elements=self._elements,
             positions=self._positions,
             trajectory=trajectory_of(rows),
-            failure_position=f.position,
+            failure_position=_end(state, run),
             first_sensed=dict(run.first_sensed),
             touched=frozenset(name for name, _ in run.first_touched),
             traits=self._traits,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 from ddenv.errors import UserError
@@ -11,6 +12,24 @@ from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
+# After these the search begins anew from what the user left it.
+STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back", "changed")
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A search from its beginning: the number of its first round, n there, and what the user and the rounds before have left it.
+
+    `n_partitions` None is the scenario's own. `tests` are those known before, for schemas that learn.
+    """
+
+    first_round: int
+    n_partitions: int | None
+    environment: tuple[str, ...]
+    pinned: Keep
+    evidence_test: int | None
+    settings: dict[str, Any]
+    tests: tuple[int, ...] = ()
 
 
 def other_way(round: int) -> str:
@@ -28,7 +47,8 @@ class Journal:
     for is there with full False, what ran to its end with full True, most tests as both: `early_stop` only changes runs that
     it cuts. What only confirms stays out of the algorithm's sight, so that a resumed run takes the same way.
     `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
-    they stay refused in later rounds, whatever is known of them. `partitions` are those of each round, as numbers of models.
+    they stay refused in later rounds, whatever is known of them; `refusals` counts how often that changed. `partitions` are those
+    of each round, as numbers of models. `leg` is the search that is on; once `steered`, a new one has to begin.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -37,8 +57,14 @@ class Journal:
         self.ledger: dict[tuple[Keep, int, bool], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
         self.refused: dict[Keep, str] = {}
+        self.refusals = 0
+        self.steered = False
+        self.leg: Leg | None = None
         self.partitions: dict[int, list[list[int]]] = {}
         self._keeps: dict[int, Keep] = {}
+        self._refused_in: dict[Keep, int | None] = {}
+        # How fine the last round in each node was.
+        self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         for event in file.events():
             self._take(event)
@@ -66,11 +92,50 @@ class Journal:
         outcomes = {self.state.tests[test - 1].outcome for test in tests if test is not None}
         return bool(outcomes) and outcomes <= {"error", "timeout"}
 
+    def tests_of(self, keep: Keep, iterations: int) -> list[int]:
+        """The tests that the verdict on `keep` rests on, in the order of runs."""
+        tests = []
+        for run in range(1 + iterations):
+            tests.append(self.ledger[keep, run, False])
+            if self.state.tests[tests[-1] - 1].outcome == "similar":
+                break
+        return tests
+
+    def keep_of_test(self, test: int) -> Keep:
+        """The models that were there in a test."""
+        return self._keeps[test]
+
+    def begin_leg(self) -> Leg:
+        """The search that is on, or a new one where the user changed something. It begins as fine as the last one was here."""
+        if self.steered:
+            first = max(self.partitions, default=0) + 1
+            self.record("leg_started", round=first, n_partitions=self._fineness.get(self.state.node))
+        elif self.leg is None:
+            state = self.state
+            self.leg = Leg(
+                1, None, state.elements, frozenset(), state.baseline.failure_test, state.scenario["reduction"]
+            )
+        return self.leg
+
+    def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
+        state = self.state
+        known = tuple(test.id for test in state.tests if test.phase in ("round", "hand") and test.is_finished)
+        evidence, settings = state.evidence_test, state.scenario["reduction"]
+        return Leg(first_round, n_partitions, state.environment, state.pinned, evidence, settings, known)
+
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even where the robot is stuck for good."""
-        return phase != "round" or not self.state.scenario["failure"].get("early_stop", False)
+        return phase not in ("round", "hand") or not self.state.scenario["failure"].get("early_stop", False)
 
-    def start_test(self, phase: str, keep: Keep, run: int, round: int | None, candidate: int | None) -> int:
+    def start_test(
+        self,
+        phase: str,
+        keep: Keep,
+        run: int,
+        round: int | None = None,
+        candidate: int | None = None,
+        trial: int | None = None,
+    ) -> int:
         """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise.
 
         Raises UserError for a test of a round that is over: the file must not hold what makes no sense.
@@ -84,6 +149,8 @@ class Journal:
         if phase == "confirm":
             left_out = [name for name in self.state.environment if name not in keep]
             place["without"] = self.state.elements.index(left_out[0]) if left_out else None
+        if phase == "hand":
+            place["trial"] = trial
         self.record("test_started", test=test, phase=phase, **place, run=run, seed=seed)
         return test
 
@@ -100,20 +167,61 @@ class Journal:
     def _take(self, event: Event) -> None:
         self.state = apply(self.state, event)
         data = event.data
-        round, candidate = data.get("round"), data.get("candidate")
-        self._seen.add((event.kind, round, candidate))
-        if event.kind == "round_started":
-            self.partitions[round] = data["partitions"]
-        elif event.kind == "test_started":
-            self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
-        elif event.kind == "test_finished":
-            self._enter(self.state.tests[data["test"] - 1])
-        elif event.kind == "decided":
-            self.decisions[round, candidate] = data["decision"]
-            if data["decision"] == "reject":
-                self.refused[self._keep_of(candidate)] = "rejected"
-        elif event.kind == "vetoed":
-            self.refused.setdefault(self._keep_of(candidate), data["verdict"])
+        self._seen.add((event.kind, data.get("round"), data.get("candidate")))
+        follow = _FOLLOWED.get(event.kind)
+        if follow is not None:
+            follow(self, data)
+        if event.kind in STEERED:
+            self.steered = True
+
+    def _round_started(self, data: dict[str, Any]) -> None:
+        self.partitions[data["round"]] = data["partitions"]
+        self._fineness[self.state.node] = data["n_partitions"]
+
+    def _arrived(self, _: dict[str, Any]) -> None:
+        if self.state.round is not None:
+            self._fineness[self.state.node] = self.state.round.n_partitions
+
+    def _leg_started(self, data: dict[str, Any]) -> None:
+        self.leg, self.steered = self._leg(data["round"], data["n_partitions"]), False
+
+    def _test_started(self, data: dict[str, Any]) -> None:
+        self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
+
+    def _test_finished(self, data: dict[str, Any]) -> None:
+        self._enter(self.state.tests[data["test"] - 1])
+
+    def _decided(self, data: dict[str, Any]) -> None:
+        round, candidate = data["round"], data["candidate"]
+        self.decisions[round, candidate] = data["decision"]
+        if data["decision"] == "reject":
+            self._refuse(self._keep_of(candidate), "rejected", round)
+
+    def _vetoed(self, data: dict[str, Any]) -> None:
+        self._refuse(self._keep_of(data["candidate"]), data["verdict"], data.get("round"))
+
+    def _unvetoed(self, data: dict[str, Any]) -> None:
+        """One of an earlier round was in the way of what came since: the search begins anew."""
+        keep, round = self._keep_of(data["candidate"]), data["round"]
+        self.refused.pop(keep, None)
+        self.decisions.pop((round, data["candidate"]), None)
+        self.refusals += 1
+        if self._refused_in.pop(keep, None) != round:
+            self.steered = True
+
+    def _refuse(self, keep: Keep, verdict: str, round: int | None = None) -> None:
+        self.refused.setdefault(keep, verdict)
+        self._refused_in.setdefault(keep, round)
+        self.refusals += 1
+
+    def _went_back(self, data: dict[str, Any]) -> None:
+        """What is undone is not to be taken again; what is gone to is wanted after all."""
+        nodes = self.state.nodes
+        wanted = frozenset(nodes[data["node"]].environment)
+        self.refused.pop(wanted, None)
+        self._refused_in.pop(wanted, None)
+        if data.get("rejected") is not None:
+            self._refuse(frozenset(nodes[data["rejected"]].environment), "rejected")
 
     def _enter(self, test: Test) -> None:
         keep = self._keeps[test.id]
@@ -128,8 +236,25 @@ class Journal:
             return frozenset(self.state.elements)
         if test.phase == "confirm":
             return frozenset(self.state.environment) - {test.without}
+        if test.phase == "hand":
+            return frozenset(self.state.trials[test.trial - 1].models)
         return self._keep_of(test.candidate)
 
     def _keep_of(self, candidate: int) -> Keep:
         """The models of a candidate of the current round."""
         return frozenset(self.state.round.candidates[candidate].models)
+
+
+_FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
+    "round_started": Journal._round_started,
+    "reduced": Journal._arrived,
+    "adopted": Journal._arrived,
+    "accepted_other": Journal._arrived,
+    "leg_started": Journal._leg_started,
+    "test_started": Journal._test_started,
+    "test_finished": Journal._test_finished,
+    "decided": Journal._decided,
+    "vetoed": Journal._vetoed,
+    "unvetoed": Journal._unvetoed,
+    "went_back": Journal._went_back,
+}

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from ddenv.engine.pool import Broken
-from ddenv.robot.oracle import Failure, judge
+from ddenv.robot.oracle import Failure, Judgement, judge
 from ddenv.robot.result import RunResult
 
 
-def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
+def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
     """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
 
+    `failures` are f, and what the user took for as good; the nearest one counts.
     `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None. `cut` says that it
     was ended before its time because the robot was stuck for good.
@@ -22,8 +24,8 @@ def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
         unnoticed = {"first_sensed": {}, "first_touched": {}}
         return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed, "cut": False}
     outcome, distance = result.outcome, None
-    if failure is not None:
-        judgement = judge(result, failure)
+    if failures:
+        judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
     pose = [float(value) for value in result.end_pose]
     return {
@@ -37,6 +39,11 @@ def told(result: RunResult | Broken, failure: Failure | None) -> dict[str, Any]:
         "first_touched": _to_ms(result.first_touched),
         "cut": result.cut,
     }
+
+
+def nearest(judgements: Sequence[Judgement]) -> Judgement:
+    """The one that counts: a similar one, or else the one that is nearest."""
+    return min(judgements, key=lambda each: (each.outcome != "similar", each.distance))
 
 
 def _to_ms(times: dict[str, float]) -> dict[str, float]:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from ddenv.engine.failures import failures_of
 from ddenv.engine.pool import Pool
 from ddenv.engine.told import told
 from ddenv.errors import UserError
@@ -15,20 +14,20 @@ from ddenv.launch.runs import read_parts
 from ddenv.robot.oracle import Failure
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.runfile.store import RunFile
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is tried. `failure` is f of a run whose baseline is done; without it a failed run is just "failed"."""
+    """What is tried. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
 
     scenario: Scenario
     world: World
     robot: Model
     state: RunState | None = None
-    failure: Failure | None = None
+    failures: tuple[Failure, ...] = ()
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -48,12 +47,8 @@ def subject_of_run(file: RunFile) -> Subject:
     """The world of a run, with its f if the baseline is done."""
     scenario, world, robot = read_parts(file)
     state = fold(file.events())
-    failure = None
-    if state.baseline is not None:
-        trajectory = np.array(file.trajectory(state.baseline.failure_test)).reshape(-1, COLUMNS)
-        spec = scenario.failure
-        failure = Failure(state.baseline.position, trajectory, spec.epsilon, spec.similarity)
-    return Subject(scenario, world, robot, state, failure)
+    failures = failures_of(file, state, scenario.failure)
+    return Subject(scenario, world, robot, state, failures)
 
 
 def plan(
@@ -105,7 +100,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
             for index, result in pool.finished(1.0):
                 trial = trials[index]
                 asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
-                results[index] = asked | told(result, subject.failure)
+                results[index] = asked | told(result, subject.failures)
             while shown in results:
                 yield results.pop(shown)
                 shown += 1

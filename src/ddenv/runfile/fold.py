@@ -3,14 +3,17 @@
 The kinds of events, with their data (models are numbers into the run's `elements`):
 
     created              scenario {...}, elements [names]
-    engine_started       pid, jobs
-    test_started         test, phase, round, candidate, run, seed; where phase is "confirm" also without: model or null
+    engine_started       pid, jobs, version (of ddenv, absent in older files)
+    test_started         test, phase, round, candidate, run, seed; where phase is "confirm" also without: model or null,
+                         where it is "hand" trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]] (both absent in files of version 1),
                          cut (absent before version 3); trajectories beside it
     test_lost            test: it was running when the engine died
     baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
-    round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]]
+    leg_started          round: the number of the next one, n_partitions: a new search begins after the user changed something
+    round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
+                         pinned [..] (absent where there are none)
     candidate_judged     candidate, verdict, tests [ids], known
     waiting              candidate
     decided              candidate, decision: accept or reject
@@ -19,7 +22,17 @@ The kinds of events, with their data (models are numbers into the run's `element
     confirm_started      the rounds are over, and what is left is run in full
     paused / resumed
     accept_mode          mode
-    vetoed               candidate, verdict: vetoed, or rejected if the same models were rejected in an earlier round
+    vetoed               candidate, verdict: vetoed, or rejected if the same models were rejected in an earlier round, which
+                         `again` says
+    unvetoed             round, candidate
+    pinned / unpinned    models [..]
+    trial_started        trial, models [..]: the user's own selection is tried
+    trial_judged         trial, verdict, tests [ids], known
+    adopted              trial, environment [..], evidence_test
+    accepted_other       test, what, trial or null, environment [..], outcomes {test: outcome}, distances {test: m}
+    went_back            node, rejected: the node that is undone, or null
+    changed              settings {...}: keys of the scenario's section `reduction`
+    command_refused      command, why
     command_handled      command
     finished             minimal, reason
     engine_stopped       reason
@@ -29,9 +42,11 @@ The kinds of events, with their data (models are numbers into the run's `element
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_rounds, fold_tests
+from ddenv.runfile import fold_guiding, fold_nodes, fold_rounds, fold_tests
+from ddenv.runfile.guiding import Node
 from ddenv.runfile.state import Point, RunState
 from ddenv.runfile.store import Event
 from ddenv.runfile.values import Changes, Data
@@ -59,8 +74,13 @@ def apply(state: RunState, event: Event) -> RunState:
 
 def _created(state: RunState, data: Data, _: float) -> Changes:
     elements = tuple(str(name) for name in data["elements"])
-    points = (Point(0, len(elements)),)
-    return {"scenario": dict(data["scenario"]), "elements": elements, "environment": elements, "history": points}
+    return {
+        "scenario": dict(data["scenario"]),
+        "elements": elements,
+        "environment": elements,
+        "history": (Point(0, len(elements)),),
+        "nodes": (Node(0, None, "start", "the whole world", elements),),
+    }
 
 
 def _engine_started(state: RunState, data: Data, at: float) -> Changes:
@@ -71,7 +91,9 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "reason": "",
         "paused": False,
         "waiting_candidate": None,
+        "confirming": False,
         "jobs": int(data["jobs"]),
+        "engine_version": str(data.get("version", "")),
         "started_at": at,
         "working_seconds": state.working_seconds + spent,
     }
@@ -90,8 +112,12 @@ def _resumed(state: RunState, _: Data, __: float) -> Changes:
     return {"paused": False, "status": working if state.status == "paused" else state.status}
 
 
-def _accept_mode(state: RunState, data: Data, _: float) -> Changes:
-    return {"accept_mode": str(data["mode"])}
+def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
+    mode = str(data["mode"])
+    if mode == state.accept_mode:
+        return {}
+    words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"
+    return {"accept_mode": mode, **fold_nodes.decision(state, at, "accept_mode", words)}
 
 
 def _command_handled(state: RunState, data: Data, _: float) -> Changes:
@@ -99,8 +125,16 @@ def _command_handled(state: RunState, data: Data, _: float) -> Changes:
 
 
 def _finished(state: RunState, data: Data, at: float) -> Changes:
-    history = (*state.history, Point(state.tests_done, len(state.environment)))
-    return {**_ended(state, "finished", data, at), "minimal": bool(data["minimal"]), "history": history}
+    minimal, size = bool(data["minimal"]), len(state.environment)
+    nodes = list(state.nodes)
+    if nodes:
+        nodes[state.node] = replace(nodes[state.node], minimal=minimal)
+    return {
+        **_ended(state, "finished", data, at),
+        "minimal": minimal,
+        "nodes": tuple(nodes),
+        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
+    }
 
 
 def _engine_stopped(state: RunState, data: Data, at: float) -> Changes:
@@ -142,6 +176,17 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "resumed": _resumed,
     "accept_mode": _accept_mode,
     "vetoed": fold_rounds.vetoed,
+    "unvetoed": fold_rounds.unvetoed,
+    "pinned": fold_guiding.pinned,
+    "unpinned": fold_guiding.unpinned,
+    "trial_started": fold_guiding.trial_started,
+    "trial_judged": fold_guiding.trial_judged,
+    "adopted": fold_guiding.adopted,
+    "accepted_other": fold_guiding.accepted_other,
+    "went_back": fold_guiding.went_back,
+    "changed": fold_guiding.changed,
+    "leg_started": fold_guiding.leg_started,
+    "command_refused": fold_guiding.command_refused,
     "command_handled": _command_handled,
     "finished": _finished,
     "engine_stopped": _engine_stopped,

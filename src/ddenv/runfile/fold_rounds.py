@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from ddenv.runfile.fold_nodes import arrived, decision
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Candidate, Point, Round, RunState, Split
 from ddenv.runfile.values import Changes, Data, names, number
@@ -13,7 +14,7 @@ from ddenv.runfile.values import Changes, Data, names, number
 def round_started(state: RunState, data: Data, _: float) -> Changes:
     environment = names(state.elements, data["environment"])
     partitions = tuple(names(state.elements, part) for part in data["partitions"])
-    split = Split(environment, partitions)
+    split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
     _check(split, data["candidates"])
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, None if distance is None else number(distance))
@@ -24,7 +25,7 @@ def round_started(state: RunState, data: Data, _: float) -> Changes:
 
 def _check(split: Split, candidates: list[Any]) -> None:
     """Partitions are disjoint and within the environment, and each makes at most two candidates: there are not many."""
-    models = [name for partition in split.partitions for name in partition]
+    models = [*(name for partition in split.partitions for name in partition), *split.pinned]
     environment = set(split.environment)
     if len(set(models)) != len(models) or not environment.issuperset(models) or not all(split.partitions):
         raise ValueError("partitions")
@@ -40,34 +41,66 @@ def _check(split: Split, candidates: list[Any]) -> None:
 
 
 def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
+    candidate = replace(
+        tried(state, data["candidate"]),
+        verdict=str(data["verdict"]),
+        tests=tuple(map(int, data["tests"])),
+        known=int(data["known"]),
+    )
+    round = with_candidate(state, candidate)["round"]
+    if candidate.verdict != "dissimilar":
+        return {"round": round}
+    # What it leaves out is needed in part; what different complements leave out has nothing in common.
+    apart = candidate.kind == "complement" or len(round.partitions) == 2
+    round = replace(round, missed=round.missed + apart)
+    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    if needed == state.lower_bound:
+        return {"round": round}
+    point = Point(state.tests_done, len(state.environment), needed)
+    return {"round": round, "lower_bound": needed, "history": (*state.history, point)}
+
+
+def vetoed(state: RunState, data: Data, at: float) -> Changes:
+    candidate = replace(tried(state, data["candidate"]), verdict=str(data["verdict"]))
+    changes = with_candidate(state, candidate)
+    if data.get("again"):
+        return changes
+    return changes | decision(state, at, "veto", f"vetoed {_told(state, candidate)}")
+
+
+def unvetoed(state: RunState, data: Data, at: float) -> Changes:
     candidate = tried(state, data["candidate"])
-    tests, known = tuple(map(int, data["tests"])), int(data["known"])
-    return with_candidate(state, replace(candidate, verdict=str(data["verdict"]), tests=tests, known=known))
-
-
-def vetoed(state: RunState, data: Data, _: float) -> Changes:
-    return with_candidate(state, replace(tried(state, data["candidate"]), verdict=str(data["verdict"])))
+    words = f"took back the veto of {_told(state, candidate)}"
+    if candidate.verdict == "rejected":
+        words = f"took back the rejection of {_told(state, candidate)}"
+    return with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
 
 
 def waiting(state: RunState, data: Data, _: float) -> Changes:
     return {"status": "waiting", "waiting_candidate": tried(state, data["candidate"]).index}
 
 
-def decided(state: RunState, data: Data, _: float) -> Changes:
+def decided(state: RunState, data: Data, at: float) -> Changes:
     changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
+    candidate = tried(state, data["candidate"])
+    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_told(state, candidate)}"
+    changes |= decision(state, at, str(data["decision"]), said)
     if data["decision"] == "accept":
         return changes
-    return changes | with_candidate(state, replace(tried(state, data["candidate"]), verdict="rejected"))
+    return changes | with_candidate(state, replace(candidate, verdict="rejected"))
 
 
-def reduced(state: RunState, data: Data, _: float) -> Changes:
-    environment = names(state.elements, data["environment"])
-    return {
-        "environment": environment,
-        "round": replace(state.round, winner=tried(state, data["candidate"]).index),
-        "history": (*state.history, Point(state.tests_done, len(environment))),
-        "evidence_test": int(data["evidence_test"]),
-    }
+def reduced(state: RunState, data: Data, at: float) -> Changes:
+    winner = tried(state, data["candidate"])
+    # One part alone shows f, and yet others seemed to be needed: what was known is not so.
+    if winner.kind == "partition" and state.round.missed > 1:
+        state = state.changed(lower_bound=0)
+    changes = arrived(state, data, at, "reduced", winner.label)
+    return changes | {"round": replace(state.round, winner=winner.index)}
+
+
+def _told(state: RunState, candidate: Candidate) -> str:
+    return f"{candidate.label} of round {state.round.number} ({candidate.size} models)"
 
 
 def round_finished(state: RunState, _: Data, __: float) -> Changes:

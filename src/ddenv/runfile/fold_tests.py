@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from ddenv.runfile.failures import as_now
 from ddenv.runfile.fold_rounds import tried, with_candidate
+from ddenv.runfile.guiding import Trial
 from ddenv.runfile.state import Baseline, Point, RunState, Test
 from ddenv.runfile.values import Changes, Data, moments, names, number, vector
 
@@ -21,10 +22,13 @@ def test_started(state: RunState, data: Data, _: float) -> Changes:
         run=int(data["run"]),
         seed=int(data["seed"]),
         without=None if without is None else names(state.elements, [without])[0],
+        trial=data.get("trial"),
     )
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
     changes = {"tests": state.tests.added(test), **_counts(state, None, test)}
+    if test.trial is not None:
+        return changes | {"trials": _with_test_of_trial(state, test)}
     if round is None:
         return changes
     if round != state.round.number:
@@ -65,26 +69,38 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
         miss_chance=number(data["miss_chance"]),
         iterations_95=int(data["iterations_95"]),
     )
-    compared = _compared(state, data)
+    compared = with_outcomes(state, data)
     point = Point(compared.tests_done, len(state.environment))
+    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=baseline.failure_test),)
     return {
         "tests": compared.tests,
         "tally": compared.tally,
         "deflake_runs": compared.deflake_runs,
         "baseline": baseline,
         "evidence_test": baseline.failure_test,
+        "failures": (baseline.failure_test,),
+        "nodes": (*root, *state.nodes[1:]),
         "history": (*state.history, point),
         "status": state.status if state.paused else "running",
     }
 
 
-def _compared(state: RunState, data: Data) -> RunState:
-    """The state with what the baseline's tests turned out to be, now that f is known."""
+def with_outcomes(state: RunState, data: Data) -> RunState:
+    """The state with what tests turned out to be, now that f is known, or that another failure counts as f."""
     for test, outcome in data["outcomes"].items():
         distance = data["distances"].get(test)
         values = {"outcome": str(outcome), "distance": None if distance is None else number(distance)}
         state = state.changed(**_with_test(state, int(test), values))
     return state
+
+
+def _with_test_of_trial(state: RunState, test: Test) -> tuple[Trial, ...]:
+    if type(test.trial) is not int or not 0 < test.trial <= len(state.trials):
+        raise IndexError(test.trial)
+    trials = list(state.trials)
+    trial = trials[test.trial - 1]
+    trials[test.trial - 1] = replace(trial, tests=(*trial.tests, test.id))
+    return tuple(trials)
 
 
 def _with_test(state: RunState, id: int, values: Data) -> Changes:

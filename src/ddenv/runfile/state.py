@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import islice, takewhile
 from typing import Any
 
+from ddenv.runfile.guiding import Decision, Node, Trial
 from ddenv.runfile.persistent import PersistentTuple
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
@@ -19,11 +20,12 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
-    "round" or "confirm": a full run of what is left, or of that without the model `without`. `run` is i of seed = base + i: above
-    0 in a round it is a re-run (deflaking). `distance` is how far from f's end the robot ended, m. `end_pose` is x, y, z m,
-    qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see `ddenv.runfile.failures`. `first_sensed` and
-    `first_touched` are the models that the robot sensed or touched, each with the simulated time it was first so, s; empty in files
-    of version 1. `cut` says that it was ended before its time because the robot was stuck for good.
+    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the model
+    `without`. `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's end
+    the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see
+    `ddenv.runfile.failures`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the
+    simulated time it was first so, s; empty in files of version 1. `cut` says that it was ended before its time because the
+    robot was stuck for good.
     """
 
     id: int
@@ -42,6 +44,7 @@ class Test:
     first_touched: tuple[tuple[str, float], ...] = ()
     cut: bool = False
     without: str | None = None
+    trial: int | None = None
 
     @property
     def is_finished(self) -> bool:
@@ -55,10 +58,14 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own."""
+    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own.
+
+    `pinned` models of the environment are in no part: they are in every candidate.
+    """
 
     environment: tuple[str, ...]
     partitions: tuple[tuple[str, ...], ...]
+    pinned: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,7 @@ class Candidate:
         """The models' names. They are gathered at each call: ask for `size` where their number is enough."""
         part = self.split.partitions[self.partition]
         if self.kind == "partition":
-            return part
+            return (*part, *self.split.pinned)
         left_out = frozenset(part)
         return tuple(name for name in self.split.environment if name not in left_out)
 
@@ -92,7 +99,8 @@ class Candidate:
     def size(self) -> int:
         """How many models it has."""
         part = len(self.split.partitions[self.partition])
-        return part if self.kind == "partition" else len(self.split.environment) - part
+        whole = len(self.split.environment)
+        return part + len(self.split.pinned) if self.kind == "partition" else whole - part
 
     @property
     def label(self) -> str:
@@ -102,7 +110,10 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One turn of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None."""
+    """One turn of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
+
+    `missed` counts the parts without which f did not show.
+    """
 
     number: int
     n_partitions: int
@@ -110,6 +121,7 @@ class Round:
     candidates: PersistentTuple[Candidate]
     winner: int | None = None
     done: bool = False
+    missed: int = 0
 
     @property
     def environment(self) -> tuple[str, ...]:
@@ -141,10 +153,11 @@ class Baseline:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """The size of the environment after so many finished tests."""
+    """The size of the environment after so many finished tests; at least `needed` of its models were known to be needed."""
 
     tests: int
     models: int
+    needed: int = 0
 
 
 @dataclass(frozen=True)
@@ -161,6 +174,10 @@ class RunState:
     failed     the engine could not go on: `reason` says why
 
     `confirming` says that the rounds are over, and that what is left is run in full because tests were cut.
+    `pinned` models stay. `nodes` are the environments that the run came to, `node` is the number of the current one.
+    `trials` are the user's own selections, `decisions` all that the user decided. The ends of `failures` (tests) count as f.
+    `lower_bound`: at least so many models are needed, as far as f shows wherever all that it needs is there.
+    `refusal` is the last command that the engine could not obey, with its reason.
     `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how
     long engines have worked on it up to their ends, s; `started_at` (Unix time, s) is set while one works.
     """
@@ -184,7 +201,16 @@ class RunState:
     history: tuple[Point, ...] = ()
     evidence_test: int | None = None
     minimal: bool = False
+    pinned: frozenset[str] = frozenset()
+    nodes: tuple[Node, ...] = ()
+    node: int = 0
+    trials: tuple[Trial, ...] = ()
+    decisions: tuple[Decision, ...] = ()
+    failures: tuple[int, ...] = ()
+    lower_bound: int = 0
     last_command: int = 0
+    refusal: tuple[int, str] = (0, "")
+    engine_version: str = ""
     jobs: int = 0
     working_seconds: float = 0.0
     started_at: float | None = None
@@ -220,6 +246,18 @@ class RunState:
     def cut_tests(self) -> int:
         """How many tests were ended before their time."""
         return sum(test.cut for test in self.tests)
+
+    @property
+    def budget(self) -> int | None:
+        """The most tests in all, None for any number."""
+        reduction = self.scenario.get("reduction")
+        most = reduction.get("budget") if isinstance(reduction, dict) else None
+        return most if isinstance(most, int) and most > 0 else None
+
+    @property
+    def here(self) -> Node | None:
+        """The current node; None before the run was made."""
+        return self.nodes[self.node] if self.nodes else None
 
     @property
     def finished_tests(self) -> tuple[Test, ...]:

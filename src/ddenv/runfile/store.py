@@ -23,7 +23,7 @@ from ddenv.errors import UserError
 
 APPLICATION_ID = 0x64644531
 # The tables are those of version 1; documents and events may hold what a reader of an earlier version does not know.
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # How long to wait for another's write: a screen must not stand still, an engine must not give up. s
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0

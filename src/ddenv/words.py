@@ -7,14 +7,20 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ddenv.runfile.failures import DEEDS
+from ddenv.runfile.guiding import Trial
 from ddenv.runfile.state import Candidate, RunState
 
 CONFIRMING = "confirming what is left with full runs"
 # Of what is always the same.
 SAID = {
-    "paused": "paused from a workbench; it resumes from there too: attach with 'ddenv open'",
+    "paused": "paused",
     "resumed": "resumed",
     "confirm_started": CONFIRMING,
+}
+# For readers who see nothing but these lines.
+HINTS = {
+    "paused": " from a workbench; it resumes from there too: attach with 'ddenv open'",
+    "waiting": ": attach with 'ddenv open'",
 }
 
 
@@ -32,8 +38,13 @@ def _where(state: RunState) -> str:
     return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
 
 
-def news(kind: str, before: RunState, after: RunState) -> str:
-    """What one event changed, or "" if it is not worth a line."""
+def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:
+    """What one event changed, or "" if it is not worth a line. Where the reader is `attached` already, it is not told how to be."""
+    line = _news(kind, before, after)
+    return line if attached or not line else f"{line}{HINTS.get(kind, '')}"
+
+
+def _news(kind: str, before: RunState, after: RunState) -> str:
     match kind:
         case "engine_started":
             resumed = " again" if before.tests else ""
@@ -48,19 +59,32 @@ def news(kind: str, before: RunState, after: RunState) -> str:
             )
         case "candidate_judged" if after.round is not None:
             changed = after.round.candidates.changed_since(before.round.candidates)
-            return "".join(
-                f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {count(len(one.tests), 'test')}"
-                f"{_ways(after, one)}"
-                for one in changed
-            )
+            return "".join(_judged(after, one) for one in changed)
         case "waiting":
             waiting = after.round.candidates[after.waiting_candidate]
-            return f"  {waiting.label} shows f and waits for accept or reject: attach with 'ddenv open'"
+            return f"  {waiting.label} shows f and waits for accept or reject"
         case "reduced":
             return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
         case "finished" | "engine_stopped" | "engine_failed":
             return f"{after.status}: {after.reason}"
+    return _news_by_hand(kind, before, after)
+
+
+def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
+    if kind == "trial_judged":
+        changed = (one for one, was in zip(after.trials, before.trials, strict=True) if one != was)
+        return "".join(_judged(after, one) for one in changed)
+    if kind == "command_refused":
+        return f"not done: {after.refusal[1]}"
+    # Everything else that the user decided has its words already.
+    if len(after.decisions) > len(before.decisions):
+        return after.decisions[-1].words
     return SAID.get(kind, "")
+
+
+def _judged(state: RunState, one: Candidate | Trial) -> str:
+    tests = count(len(one.tests), "test")
+    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{_ways(state, one)}"
 
 
 def baseline(state: RunState) -> str:
@@ -76,8 +100,8 @@ def baseline(state: RunState) -> str:
     )
 
 
-def _ways(state: RunState, one: Candidate) -> str:
-    """How a candidate's tests ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
+def _ways(state: RunState, one: Candidate | Trial) -> str:
+    """How a candidate's or a trial's tests ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
     tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
     ways = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
     return f" ({', '.join(f'{number} {way}' for way, number in ways.items())})" if ways else ""

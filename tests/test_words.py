@@ -1,10 +1,10 @@
 """The lines that are printed while a run is followed."""
 
 from ddenv.console.summary import broken
-from ddenv.console.words import baseline, headline, news
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event
+from ddenv.words import baseline, headline, news
 
 
 def states(*happened: tuple[str, dict], scenario: dict | None = None) -> list[RunState]:

@@ -1,0 +1,149 @@
+"""What the user's decisions change in a run's state: pins, selections tried by hand, other settings, the way back and branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ddenv.runfile.fold_nodes import arrived, decision, left_round
+from ddenv.runfile.fold_tests import with_outcomes
+from ddenv.runfile.guiding import Node, Trial
+from ddenv.runfile.state import Point, RunState
+from ddenv.runfile.values import Changes, Data, names
+
+# A decision names so many models, each with so many letters.
+NAMED, LONGEST = 3, 40
+
+
+def pinned(state: RunState, data: Data, at: float) -> Changes:
+    models = names(state.elements, data["models"])
+    return {"pinned": state.pinned.union(models), **decision(state, at, "pin", f"pinned {told(models)}")}
+
+
+def unpinned(state: RunState, data: Data, at: float) -> Changes:
+    models = names(state.elements, data["models"])
+    return {"pinned": state.pinned.difference(models), **decision(state, at, "unpin", f"unpinned {told(models)}")}
+
+
+def trial_started(state: RunState, data: Data, at: float) -> Changes:
+    trial = Trial(int(data["trial"]), names(state.elements, data["models"]), state.node)
+    if trial.number != len(state.trials) + 1 or len(set(trial.models)) != len(trial.models):
+        raise ValueError(trial.number)
+    inside = frozenset(trial.models)
+    without = [name for name in state.environment if name not in inside]
+    what = f"without {told(without)}" if 0 < len(without) <= trial.size else f"with {told(trial.models)} alone"
+    words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
+    return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
+
+
+def trial_judged(state: RunState, data: Data, _: float) -> Changes:
+    tests = tuple(map(int, data["tests"]))
+    trial = tried(state, data["trial"])
+    return _with_trial(state, replace(trial, verdict=str(data["verdict"]), tests=tests, known=int(data["known"])))
+
+
+def adopted(state: RunState, data: Data, at: float) -> Changes:
+    trial = replace(tried(state, data["trial"]), adopted=True)
+    words = f"adopted {trial.label}: {trial.size} models"
+    return {
+        **_with_trial(state, trial),
+        **arrived(state, data, at, "adopted", trial.label),
+        **decision(state, at, "adopt", words),
+    }
+
+
+def accepted_other(state: RunState, data: Data, at: float) -> Changes:
+    """Another failure counts as f from now on, and where it showed becomes the environment."""
+    test = state.tests[_index(data["test"])]
+    # A trial that led there is known by its number; else it was a candidate.
+    trial = None if data.get("trial") is None else tried(state, data["trial"])
+    what = trial.label if trial else str(data["what"])
+    judged = with_outcomes(state, data)
+    changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
+    return {
+        "tests": judged.tests,
+        "tally": judged.tally,
+        "deflake_runs": judged.deflake_runs,
+        "failures": (*state.failures, test.id),
+        **changes,
+        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
+        **decision(state, at, "accept_other", f"took another failure for as good: {what}, test {test.id}"),
+    }
+
+
+def went_back(state: RunState, data: Data, at: float) -> Changes:
+    node = state.nodes[_node(state, data["node"])]
+    undone = data.get("rejected")
+    nodes = list(state.nodes)
+    nodes[node.number] = replace(node, rejected=False)
+    if undone is None:
+        words = f"went to {place(node)}"
+    else:
+        last = nodes[_node(state, undone)]
+        nodes[last.number] = replace(last, rejected=True)
+        words = f"took back {last.what}: {len(node.environment)} models again"
+    return {
+        **left_round(state),
+        "nodes": tuple(nodes),
+        "node": node.number,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
+        "lower_bound": 0,
+        "minimal": False,
+        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        **decision(state, at, "undo" if undone is not None else "go_back", words),
+    }
+
+
+def changed(state: RunState, data: Data, at: float) -> Changes:
+    settings = dict(data["settings"])
+    before = dict(state.scenario["reduction"])
+    words = ", ".join(f"{key} {before.get(key, 'none')} to {value}" for key, value in settings.items())
+    scenario = {**state.scenario, "reduction": before | settings}
+    return {"scenario": scenario, **decision(state, at, "change", f"changed {words}")}
+
+
+def leg_started(state: RunState, _: Data, __: float) -> Changes:
+    """A new search begins from the environment as it is."""
+    return left_round(state)
+
+
+def command_refused(state: RunState, data: Data, _: float) -> Changes:
+    return {"refusal": (int(data["command"]), str(data["why"]))}
+
+
+def tried(state: RunState, number: int) -> Trial:
+    """The trial of this number. Raises IndexError if there is none."""
+    return state.trials[_index(number)]
+
+
+def told(models: Sequence[str]) -> str:
+    """The first names of some models."""
+    shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
+    more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
+    return ", ".join(shown) + more
+
+
+def place(node: Node) -> str:
+    """A node in words."""
+    size = len(node.environment)
+    models = f"{size} model{'s' * (size != 1)}"
+    return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+
+
+def _with_trial(state: RunState, trial: Trial) -> Changes:
+    trials = list(state.trials)
+    trials[trial.number - 1] = trial
+    return {"trials": tuple(trials)}
+
+
+def _index(number: int) -> int:
+    if type(number) is not int or number < 1:
+        raise IndexError(number)
+    return number - 1
+
+
+def _node(state: RunState, number: int) -> int:
+    if type(number) is not int or not 0 <= number < len(state.nodes):
+        raise IndexError(number)
+    return number

@@ -1,0 +1,376 @@
+"""A reduction that the user guides by hand: on a simulator that costs nothing."""
+
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddenv.engine.control import Stopped
+from ddenv.engine.journal import Journal
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.test_driver import Killed, _finished, _kill, flaky, needs
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    """Nobody waits for the user to come to rest."""
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    monkeypatch.setattr("ddenv.engine.bench.WAIT", 0.0)
+
+
+class Guided(FakePool):
+    """`guide` is a generator: it is sent the state at each look around, and yields commands as (kind, data), or None to wait."""
+
+    def __init__(self, path, oracle, guide, jobs=1):
+        super().__init__(oracle, jobs)
+        self.viewer = RunFile(path)
+        self.guide = guide
+        next(guide)
+
+    def finished(self, seconds):
+        state = fold(self.viewer.events())
+        if state.last_command == len(self.viewer.commands()):
+            try:
+                asked = self.guide.send(state)
+            except StopIteration:
+                asked = None
+            if asked:
+                self.viewer.send(asked[0], **asked[1])
+                return []
+        return super().finished(seconds)
+
+
+def numbers(*names):
+    return [ELEMENTS.index(name) for name in names]
+
+
+def until(condition):
+    """Waits for a state, not for ever; returns it."""
+    for _ in range(2000):
+        state = yield
+        if condition(state):
+            return state
+    raise AssertionError(f"{state.status}, round {state.round and state.round.number}, {state.decisions}")
+
+
+def guided(path, oracle, guide, jobs=1):
+    return drive(path, Guided(path, oracle, guide, jobs))
+
+
+def events(path):
+    with RunFile(path) as file:
+        return file.events()
+
+
+def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "pin", {"models": numbers("ball")}
+
+    path = new_run(tmp_path)
+    pool = Guided(path, needs("wall"), guide())
+    state = drive(path, pool)
+    assert set(state.environment) == {"wall", "ball"}
+    assert state.minimal
+    assert "pinned (1)" in state.reason
+    leg = next(event.id for event in events(path) if event.kind == "leg_started")
+    started = [event.data["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
+    with RunFile(path) as file:
+        journal = Journal(file)
+    assert all("ball" in journal.keep_of_test(test) for test in started)
+    assert [one.kind for one in state.decisions] == ["pin"]
+
+
+def test_what_is_unpinned_can_go_again(tmp_path):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "pin", {"models": numbers("ball", "beam")}
+        yield from until(lambda state: state.round.split.pinned)
+        yield "unpin", {"models": numbers("ball")}
+
+    state = guided(new_run(tmp_path), needs("wall"), guide())
+    assert set(state.environment) == {"wall", "beam"}
+
+
+def test_all_pinned_is_the_end(tmp_path):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "pin", {"models": list(range(len(ELEMENTS)))}
+
+    state = guided(new_run(tmp_path), needs("wall"), guide())
+    assert state.environment == ELEMENTS
+    assert state.minimal
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_selection_by_hand_is_tested_and_adopted(tmp_path, jobs):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "pause", {}
+        yield "try", {"models": numbers("ball", "beam")}
+        yield "try", {"models": numbers("wall", "beam")}
+        # They are tested while the rounds are paused.
+        state = yield from until(lambda state: len(state.trials) == 2 and all(one.verdict for one in state.trials))
+        assert state.status == "paused"
+        assert [trial.verdict for trial in state.trials] == ["dissimilar", "similar"]
+        yield "adopt", {"trial": 1}
+        state = yield from until(lambda state: state.refusal[1])
+        assert "did not show f" in state.refusal[1]
+        yield "adopt", {"trial": 2}
+        state = yield from until(lambda state: state.here.how == "adopted")
+        assert set(state.environment) == {"wall", "beam"}
+        yield "resume", {}
+
+    state = guided(new_run(tmp_path, iterations=3), needs("wall"), guide(), jobs)
+    assert state.environment == ("wall",)
+    assert state.minimal
+    assert state.trials[1].adopted
+    assert len(state.trials[0].tests) == 4
+    *_, adopted, last = state.nodes
+    assert (adopted.how, last.how, last.parent) == ("adopted", "reduced", adopted.number)
+
+
+def test_no_test_is_made_twice_for_a_trial(tmp_path):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "try", {"models": numbers("wall", "beam")}
+
+    path = new_run(tmp_path)
+    pool = Guided(path, needs("wall", "beam"), guide(), 2)
+    state = drive(path, pool)
+    assert set(state.environment) == {"wall", "beam"}
+    assert len(pool.made) == len(set(pool.made))
+
+
+def test_another_failure_is_taken_for_as_good(tmp_path):
+    def oracle(keep, _):
+        # Without the beam the robot gets stuck elsewhere.
+        return "similar" if {"wall", "beam"} <= keep else "other" if "wall" in keep else "pass"
+
+    def guide():
+        state = yield from until(lambda state: any(test.outcome == "other" for test in state.tests))
+        test = next(test for test in state.tests if test.outcome == "other")
+        yield "pause", {}
+        yield "accept_other", {"test": test.id}
+        state = yield from until(lambda state: len(state.failures) == 2)
+        assert not any(test.outcome == "other" for test in state.tests)
+        assert state.here.how == "accepted"
+        yield "resume", {}
+
+    state = guided(new_run(tmp_path), oracle, guide())
+    assert state.environment == ("wall",)
+    assert state.minimal
+
+
+def test_an_undone_reduction_is_not_made_again(tmp_path):
+    def guide():
+        state = yield from until(lambda state: len(state.nodes) == 2)
+        first.append(frozenset(state.environment))
+        yield "undo", {}
+
+    first = []
+    path = new_run(tmp_path)
+    state = guided(path, needs("wall"), guide())
+    assert state.nodes[1].rejected
+    assert (state.nodes[2].parent, state.nodes[2].rejected) == (0, False)
+    later = [frozenset(node.environment) for node in state.nodes[2:]]
+    assert later
+    assert first[0] not in later
+    assert "wall" in state.environment
+
+
+def test_from_any_reduction_there_is_a_branch_and_nothing_is_lost(tmp_path):
+    def guide():
+        yield from until(lambda state: len(state.nodes) == 3)
+        yield "go_back", {"node": 1}
+        state = yield from until(lambda state: state.node == 1)
+        assert state.paused
+        yield "pin", {"models": numbers(state.environment[0])}
+        yield "change", {"settings": {"pair": "timeseg/random", "iterations": 2}}
+        yield "resume", {}
+
+    path = new_run(tmp_path)
+    state = guided(path, needs("wall", "beam"), guide())
+    assert state.nodes[2].environment
+    assert state.nodes[3].parent == 1
+    assert state.nodes[3].method.endswith("timeseg/random")
+    assert state.scenario["reduction"]["iterations"] == 2
+    assert {"wall", "beam"} <= set(state.environment)
+    assert [one.kind for one in state.decisions] == ["go_back", "pin", "change"]
+
+
+def test_a_finished_run_can_be_taken_up_again(tmp_path):
+    path = new_run(tmp_path)
+    assert drive(path, FakePool(needs("wall"), 1)).environment == ("wall",)
+    with RunFile(path) as viewer:
+        viewer.send("undo")
+    state = drive(path, FakePool(needs("wall"), 1))
+    assert state.status == "finished"
+    assert "wall" in state.environment
+    assert len(state.decisions) == 1
+
+
+def test_a_budget_stops_the_run_and_more_of_it_goes_on(tmp_path):
+    path = new_run(tmp_path, budget=5)
+    with pytest.raises(Stopped, match="the budget of 5 tests is used up"):
+        drive(path, FakePool(needs("wall"), 2))
+    assert fold(events(path)).tests_done == 5
+    with RunFile(path) as viewer:
+        viewer.send("change", settings={"budget": 500})
+    assert drive(path, FakePool(needs("wall"), 2)).minimal
+
+
+def test_a_veto_is_taken_back(tmp_path):
+    def guide():
+        state = yield from until(lambda state: state.round is not None and len(state.round.candidates) > 3)
+        # The first two: that one is passed over when it is wanted again.
+        for candidate in (0, 1):
+            yield "veto", {"round": state.round.number, "candidate": candidate}
+        yield from until(lambda now: now.round.candidates[1].verdict == "vetoed")
+        for candidate in (0, 1):
+            yield "unveto", {"round": state.round.number, "candidate": candidate}
+
+    path = new_run(tmp_path)
+    undisturbed = drive(new_run(tmp_path), FakePool(needs("wall"), 1))
+    state = guided(path, needs("wall"), guide())
+    assert state.environment == undisturbed.environment
+    assert state.minimal
+    assert {one.kind for one in state.decisions} == {"veto", "unveto"}
+
+
+def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
+    def guide():
+        state = yield from until(lambda state: state.round is not None and state.round.n_partitions == 3)
+        for one in state.round.candidates:
+            if "ball" not in one.models:
+                yield "veto", {"round": state.round.number, "candidate": one.index}
+        state = yield from until(
+            lambda now: (
+                now.round.number > state.round.number and any(c.verdict == "vetoed" for c in now.round.candidates)
+            )
+        )
+        one = next(one for one in state.round.candidates if one.verdict == "vetoed")
+        yield "unveto", {"round": state.round.number, "candidate": one.index}
+
+    path = new_run(tmp_path)
+    state = guided(path, needs("wall", "beam"), guide())
+    assert {"wall", "beam"} <= set(state.environment)
+    assert state.status == "finished"
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "why"),
+    [
+        ("pin", {"models": [99]}, "no such models"),
+        ("pin", {"models": "wall"}, "no such models"),
+        ("unpin", {"models": [0]}, "not pinned"),
+        ("try", {"models": list(range(6))}, "as it is"),
+        ("try", {"models": [True]}, "no such models"),
+        ("adopt", {"trial": 1}, "no such trial"),
+        ("accept_other", {"test": 1}, "did not end in another failure"),
+        ("accept_other", {"test": -1}, "no such test"),
+        ("undo", {}, "no reduction"),
+        ("go_back", {"node": 7}, "no such place"),
+        ("go_back", {"node": 0}, "there already"),
+        ("change", {"settings": {"seed": 3}}, "only pair"),
+        ("change", {"settings": {"pair": "timesg/random"}}, "no partitioning 'timesg'"),
+        ("change", {"settings": {"algorithm": "x"}}, "no algorithm 'x'"),
+        ("change", {"settings": {"iterations": -1}}, "iterations"),
+        ("change", {"settings": {"iterations": 1}}, "already"),
+        ("unveto", {"round": 1, "candidate": 0}, "neither vetoed nor rejected"),
+        ("unveto", {"round": 9, "candidate": 0}, "round is over"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_the_reason(tmp_path, kind, data, why):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield kind, data
+
+    state = guided(new_run(tmp_path), needs("wall"), guide())
+    assert state.minimal
+    assert state.refusal[0] == 1
+    assert why in state.refusal[1]
+    assert not state.decisions
+
+
+# Any commands at any moment, and a kill at any event.
+COMMANDS = st.one_of(
+    st.tuples(
+        st.sampled_from(["pin", "unpin", "try"]),
+        st.fixed_dictionaries({"models": st.lists(st.integers(0, 5), min_size=1, max_size=4)}),
+    ),
+    st.tuples(st.just("adopt"), st.fixed_dictionaries({"trial": st.integers(1, 3)})),
+    st.tuples(st.just("accept_other"), st.fixed_dictionaries({"test": st.integers(1, 40)})),
+    st.tuples(st.just("undo"), st.just({})),
+    st.tuples(st.just("go_back"), st.fixed_dictionaries({"node": st.integers(0, 4)})),
+    st.tuples(
+        st.just("change"),
+        st.fixed_dictionaries(
+            {
+                "settings": st.fixed_dictionaries(
+                    {},
+                    optional={
+                        "pair": st.sampled_from(["learner/timestep", "timeseg/random", "model2model/sequential"]),
+                        "iterations": st.integers(0, 2),
+                        "algorithm": st.sampled_from(["ddmin", "splitting", "ddenv"]),
+                    },
+                )
+            }
+        ),
+    ),
+    st.tuples(
+        st.sampled_from(["veto", "unveto"]),
+        st.fixed_dictionaries({"round": st.integers(1, 6), "candidate": st.integers(0, 5)}),
+    ),
+)
+
+
+class Disturbed(FakePool):
+    """Sends each command after so many tests; whatever pauses the run, it is resumed."""
+
+    def __init__(self, path, oracle, jobs, plan, seed=0):
+        super().__init__(oracle, jobs, seed)
+        self.viewer, self.plan = RunFile(path), plan
+
+    def finished(self, seconds):
+        if self.plan and self.plan[0][0] <= len(self.made):
+            _, (kind, data) = self.plan.pop(0)
+            self.viewer.send(kind, **data)
+            self.viewer.send("resume")
+        return super().finished(seconds)
+
+
+@given(
+    salt=st.integers(0, 3),
+    plan=st.lists(st.tuples(st.integers(3, 30), COMMANDS), max_size=6),
+    moments=st.lists(st.integers(5, 80), max_size=2),
+    jobs=st.integers(1, 3),
+)
+@settings(max_examples=25)
+def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(salt, plan, moments, jobs):
+    with tempfile.TemporaryDirectory() as folder:
+        path, oracle, plan = new_run(Path(folder)), flaky(salt, "wall", "beam"), sorted(plan, key=lambda one: one[0])
+        for moment in moments:
+            try:
+                drive(
+                    path,
+                    Disturbed(path, oracle, jobs, plan, moment),
+                    prepare=lambda file, after=moment: _kill(file, after),
+                )
+            except Killed:
+                continue
+            break
+        state = drive(path, Disturbed(path, oracle, jobs, plan))
+        assert state.status == "finished"
+        # Whoever folds the file sees the same.
+        assert fold(events(path)) == state
+        assert state.pinned <= set(state.environment) or any(one.kind == "go_back" for one in state.decisions)
+        finished = _finished(path)
+        assert len(finished) == len(set(finished))
+        for node in state.nodes[1:]:
+            assert node.parent < node.number
+            assert state.tests[node.evidence_test - 1].outcome == "similar"
