@@ -137,9 +137,9 @@ class RunFile:
         rows = self._all("SELECT name, content FROM document WHERE substr(name, 1, ?) = ?", (len(prefix), prefix))
         return {name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)}
 
-    def events(self, after: int = 0) -> list[Event]:
-        """All events with an id above `after`, in order."""
-        return self._entries("event", after)
+    def events(self, after: int = 0, most: int = -1) -> list[Event]:
+        """All events with an id above `after`, in order; not more than `most` of them where that is not negative."""
+        return self._entries("event", after, most)
 
     def commands(self, after: int = 0) -> list[Event]:
         """What viewers asked for, in order."""
@@ -220,8 +220,8 @@ class RunFile:
             f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text)
         ).lastrowid
 
-    def _entries(self, table: str, after: int) -> list[Event]:
-        rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id", (after,))
+    def _entries(self, table: str, after: int, most: int = -1) -> list[Event]:
+        rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
         try:
             entries = [Event(id, float(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
         except (ValueError, TypeError, RecursionError):

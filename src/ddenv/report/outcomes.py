@@ -1,0 +1,111 @@
+"""How sure a run is of what it says: its baseline, and what its tests came to."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from ddenv.report.blocks import Block, Cell, Picture, Section, Table, plain, say
+from ddenv.report.interval import interval
+from ddenv.report.numbers import percent, section, thousands
+from ddenv.report.read import Record
+from ddenv.runfile.failures import DEEDS, deed
+from ddenv.runfile.state import RunState
+from ddenv.words import count
+
+MEANING = {
+    "similar": "f again: the goal was not reached, and the robot ended where it ended in f",
+    "other": "another failure",
+    "pass": "the goal was reached",
+    "error": "the simulation broke",
+    "timeout": "the test took too long on the clock",
+    "failed": "failed, before f was fixed",
+}
+PHASES = (("baseline", "whole world"), ("round", "in rounds"), ("hand", "by hand"), ("confirm", "full runs at the end"))
+
+
+def sureness(record: Record) -> Section | None:
+    """The section on baseline and tests; None where none has ended."""
+    state = record.state
+    if not state.tests_done:
+        return None
+    return Section("How sure it is", (*_baseline(state), *_tests(state), *_confirmed(state)))
+
+
+def _baseline(state: RunState) -> list[Block]:
+    base = state.baseline
+    if base is None:
+        return [say("The baseline has not ended: how often the whole world fails is not known yet.")]
+    words = (
+        f"In the whole world the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')}: "
+        f"{percent(base.rate)}, 95 % interval (Wilson) {percent(base.low)} to {percent(base.high)}."
+    )
+    if state.other_failures:
+        words += f" {count(state.other_failures, 'run')} failed in another way."
+    if state.broken_runs:
+        words += f" {count(state.broken_runs, 'run')} broke."
+    return [say(words), Picture("interval", interval(base), "The failure rate with its interval."), *_missed(state)]
+
+
+def _missed(state: RunState) -> list[Block]:
+    """What the failure rate means for a candidate."""
+    base = state.baseline
+    iterations = section(state.scenario, "reduction").get("iterations", 3)
+    if base.rate >= 1 or not isinstance(iterations, int):
+        return []
+    words = (
+        f"A candidate is dissimilar when f does not show in {count(1 + iterations, 'test')}; "
+        f"by this rate the chance that they all miss it is {percent(base.miss_chance)}."
+    )
+    if base.iterations_95 > iterations:
+        words += f" For 95 % certainty it needs {base.iterations_95} re-runs (--iterations {base.iterations_95})."
+    return [say(words)]
+
+
+def _tests(state: RunState) -> list[Block]:
+    """A row for each outcome, with a column for each kind of test that there was."""
+    finished = state.finished_tests
+    counts = Counter((test.outcome, test.phase) for test in finished)
+    phases = [(phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)]
+    rows = tuple(
+        _outcome(state, outcome, number, [counts[outcome, phase] for phase, _ in phases])
+        for outcome, number in state.outcomes().items()
+        if number
+    )
+    head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
+    table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
+    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"]:
+        return [table]
+    told = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates that did not show f at first."
+    if state.cut_tests:
+        told += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
+    if lost := state.tally["lost"]:
+        told += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
+    return [table, say(told)]
+
+
+def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) -> tuple[Cell, ...]:
+    share = percent(number / state.tests_done)
+    meaning = MEANING[outcome]
+    if outcome == "other":
+        ways = Counter(test.failure for test in state.tests if test.outcome == "other" and test.failure in DEEDS)
+        meaning += f" ({', '.join(f'{word} {times}' for word, times in ways.most_common())})" if ways else ""
+    if outcome in ("error", "timeout"):
+        last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
+        meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
+    return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
+
+
+def _confirmed(state: RunState) -> list[Block]:
+    tests = [test for test in state.confirm_tests if test.is_finished]
+    if not tests:
+        return []
+    whole = [test for test in tests if test.without is None]
+    shown = sum(test.outcome == "similar" for test in whole)
+    without = [test for test in tests if test.without is not None]
+    missed = sum(test.outcome != "similar" for test in without)
+    return [
+        say(
+            f"Full runs of what was left at the end: f showed in {shown} of {len(whole)}; "
+            f"with one more model left out it did not show in {missed} of {len(without)}."
+        )
+    ]

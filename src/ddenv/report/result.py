@@ -1,0 +1,108 @@
+"""What is left of the world: a map, and each model with its place and size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ddenv.report.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, plain, say
+from ddenv.report.drawing import CORNERS, close_up, picture
+from ddenv.report.numbers import place
+from ddenv.report.read import Record
+from ddenv.runfile.state import RunState
+from ddenv.words import count
+from ddenv.world.model import is_ground
+
+if TYPE_CHECKING:
+    from ddenv.map.plan import Drawn
+
+# A table of more models is not read by anyone; so many names of others are told.
+MOST_MODELS, MOST_NAMES = 200, 12
+
+
+def result(record: Record) -> Section:
+    """The section on what is left."""
+    state = record.state
+    title = "The minimal environment" if state.minimal else "What is left so far"
+    if state.baseline is None:
+        title = "The world"
+    if record.world is None:
+        return Section(title, _names_alone(state))
+    from ddenv.map.plan import plan
+
+    drawn = plan(record.world, CORNERS)
+    blocks: list[Block] = [Picture("map", picture(record, drawn), _told(state))]
+    if near := close_up(record, drawn):
+        blocks += [
+            say("Where the robot failed, closer:"),
+            Picture("near", near, "A closer look at where the robot failed."),
+        ]
+    if state.baseline is not None:
+        blocks += _models(state, drawn)
+    blocks += _stay(record)
+    return Section(title, tuple(blocks))
+
+
+def _told(state: RunState) -> str:
+    if state.baseline is None:
+        return "The world from above."
+    return (
+        f"The world from above: {count(len(state.environment), 'model')} left, drawn solid; what was removed is faint. "
+        "The robot's way in f, and its way on the last similar run."
+    )
+
+
+def _models(state: RunState, drawn: tuple[Drawn, ...]) -> list[Block]:
+    """A row for each model that is left, in the file's order."""
+    by_name = {each.model.name: each for each in drawn}
+    touched = _touched(state)
+    names = state.environment
+    rows = tuple(_row(name, by_name.get(name), touched, state) for name in names[:MOST_MODELS])
+    if not rows:
+        return []
+    head = ("model", "kind", "centre x, y, z, m", "size x × y × z, m")
+    table = Table((*head, "first touched, s") if touched else head, rows, frozenset({2, 3, 4}))
+    more = len(names) - len(rows)
+    return [table, say(f"And {count(more, 'more model')}.")] if more else [table]
+
+
+def _row(name: str, each: Drawn | None, touched: dict[str, float], state: RunState) -> tuple[Cell, ...]:
+    shown: Cell = (Name(name), " (pinned)") if name in state.pinned else Name(name)
+    if each is None:
+        return (shown, "", "", "") + (("",) if touched else ())
+    kind = "static" if each.model.static else "dynamic"
+    size = " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
+    at = (f"{touched[name]:.1f}" if name in touched else "never",) if touched else ()
+    return (shown, kind, place(each.center), size, *at)
+
+
+def _touched(state: RunState) -> dict[str, float]:
+    """When the robot first touched each model in the last similar run, s; empty in old files."""
+    test = state.evidence_test
+    if test is None or not 0 < test <= len(state.tests):
+        return {}
+    return dict(state.tests[test - 1].first_touched)
+
+
+def _stay(record: Record) -> list[Block]:
+    """What is no element, and so was always there."""
+    elements = frozenset(record.state.elements)
+    others = [model for model in record.world.models if model.name not in elements]
+    if not others:
+        return []
+    grounds = [model.name for model in others if is_ground(model)]
+    protected = [model.name for model in others if not is_ground(model)]
+    words: list[Part] = [Strong("Always there:"), " "]
+    for number, name in enumerate((grounds + protected)[:MOST_NAMES]):
+        words += [", " if number else "", Name(name)]
+    more = len(others) - MOST_NAMES
+    return [say(*words, f" and {more} more." if more > 0 else ".")]
+
+
+def _names_alone(state: RunState) -> tuple[Block, ...]:
+    if state.baseline is None:
+        return (say(f"{count(len(state.elements), 'model')} can be removed. No map: the world cannot be read."),)
+    words: list[Part] = [Strong("Left:"), " "]
+    for number, name in enumerate(state.environment[:MOST_MODELS]):
+        words += [", " if number else "", Name(plain(name))]
+    more = len(state.environment) - MOST_MODELS
+    return (say(*words, f" and {more} more." if more > 0 else "."), say("No map: the world cannot be read."))

@@ -1,0 +1,131 @@
+"""How a run got where it is: the chart of its models, and a table of its rounds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ddenv.report.blocks import Block, Cell, Picture, Section, Strong, Table, say
+from ddenv.report.chart import chart
+from ddenv.report.read import Record
+from ddenv.runfile.state import Candidate, Round, RunState
+from ddenv.words import count
+
+# A longer table keeps so many rounds, first of all those that reduced; the others are summed up.
+MOST_ROUNDS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """A round, its finished tests, whether it is still on, and whether its reduction was taken back."""
+
+    round: Round
+    tests: int
+    on: bool
+    undone: bool
+
+    @property
+    def tried(self) -> int:
+        """Its candidates that were judged, or have tests."""
+        return sum(one.verdict in ("similar", "dissimilar") or bool(one.tests) for one in self.round.candidates)
+
+    @property
+    def won(self) -> Candidate | None:
+        return None if self.round.winner is None else self.round.candidates[self.round.winner]
+
+
+def way(record: Record) -> Section | None:
+    """The section on the rounds; None before there was one."""
+    state = record.state
+    if state.baseline is None:
+        return None
+    blocks: list[Block] = [Picture("chart", chart(state), _told(state))]
+    if record.rounds:
+        undone = frozenset(node.round for node in state.nodes if node.rejected and node.how == "reduced")
+        tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
+        told = [_Told(each, tests[each.number], _is_on(state, each), each.number in undone) for each in record.rounds]
+        blocks += _table(told)
+    else:
+        blocks.append(say("No round has begun yet."))
+    return Section("How it got there", tuple(blocks))
+
+
+def _told(state: RunState) -> str:
+    bound = f" At least {state.lower_bound} of them are known to be needed." if state.lower_bound else ""
+    return (
+        f"Models left after each test, down to {len(state.environment)} after {count(state.tests_done, 'test')}.{bound}"
+    )
+
+
+def _is_on(state: RunState, round: Round) -> bool:
+    return not state.ended and not round.done and state.round is not None and round.number == state.round.number
+
+
+def _table(told: list[_Told]) -> list[Block]:
+    shown = _shown(told)
+    rows: list[tuple[Cell, ...]] = []
+    for first, last in _spans(len(told), shown):
+        if first in shown:
+            rows.append(_row(told[first]))
+        else:
+            rows.append(_summed(told[first:last]))
+    head = ("round", "parts n", "tried", "first similar", "models left", "tests")
+    table = Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))
+    explained = "A round tries one set of models after the other; the first one that shows f is what is left then."
+    if any(each.tried and not each.tests for each in told):
+        explained += " What was judged before is not tested again."
+    return [say(explained), table]
+
+
+def _shown(told: list[_Told]) -> frozenset[int]:
+    """Which rounds have a row of their own: of very many those that reduced, the first and the last of them."""
+    numbers = range(len(told))
+    if len(told) <= MOST_ROUNDS:
+        return frozenset(numbers)
+    wins = [number for number in numbers if told[number].won is not None]
+    half = MOST_ROUNDS // 2
+    kept = wins if len(wins) <= MOST_ROUNDS else wins[:half] + wins[-half:]
+    return frozenset([*kept, 0, len(told) - 1])
+
+
+def _spans(length: int, shown: frozenset[int]) -> Iterator[tuple[int, int]]:
+    """(first, behind the last) of each row: one round that is shown, or all between two of them."""
+    first = 0
+    while first < length:
+        last = first + 1
+        while first not in shown and last < length and last not in shown:
+            last += 1
+        yield first, last
+        first = last
+
+
+def _row(told: _Told) -> tuple[Cell, ...]:
+    round, won = told.round, told.won
+    left = len(round.environment) if won is None else won.size
+    tried = f"{told.tried} of {len(round.candidates)}"
+    size = str(left) if won is None else Strong(str(left))
+    return str(round.number), str(round.n_partitions), tried, _came(told), size, str(told.tests)
+
+
+def _came(told: _Told) -> str:
+    verdicts = Counter(one.verdict for one in told.round.candidates)
+    refused = [f"{verdicts[word]} {word}" for word in ("vetoed", "rejected") if verdicts[word]]
+    words = f" ({', '.join(refused)})" if refused else ""
+    if told.won is not None:
+        return f"{told.won.label}{', taken back' if told.undone else ''}{words}"
+    if told.on:
+        return f"under way{words}"
+    return f"left before its end{words}" if verdicts[""] else f"none{words}"
+
+
+def _summed(told: list[_Told]) -> tuple[Cell, ...]:
+    """Several rounds in one row."""
+    wins = sum(each.won is not None for each in told)
+    first, last = told[0].round, told[-1].round
+    numbers = f"{first.number} to {last.number}" if len(told) > 1 else str(first.number)
+    tried = str(sum(each.tried for each in told))
+    words = f"{wins} of {len(told)} reduced" if wins else "none"
+    won = told[-1].won
+    left = len(last.environment) if won is None else won.size
+    return numbers, "", tried, words, str(left), str(sum(each.tests for each in told))

@@ -1,0 +1,321 @@
+"""A report tells what a run came to, whatever state it is in, and whatever its names hold."""
+
+import json
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+from xml.sax.saxutils import escape
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.report.blocks import Picture, Table
+from ddenv.report.content import content
+from ddenv.report.read import read_run
+from ddenv.report.rounds import MOST_ROUNDS
+from ddenv.report.write import files_of, write_report
+from tests.workbench import fake_run
+
+VOID = {"meta"}
+INLINE = {"strong", "bdi"}
+EVIL = (
+    "</script><script>alert(1)</script>",
+    '<b>&"x" [bold] ]]>',
+    "\u202eabc`",
+    "\u05e9" * 30,
+    "n" * 300,
+    "a|b *c* _d_ [e](f) ``",
+)
+
+
+class Page(HTMLParser):
+    """The tags and words of a page; fails where tags are not balanced."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.words, self.attributes = [], set(), [], set()
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.attributes.update(name for name, _ in attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+        self.part(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.add(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+        self.part(tag)
+
+    def part(self, tag):
+        self.words.append("" if tag in INLINE else " ")
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join("".join(self.words).split())
+
+
+@pytest.fixture
+def run(tmp_path):
+    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
+    yield made
+    made.close()
+
+
+def page(run, tmp_path):
+    (file,) = write_report(run.path, tmp_path / "report.html", force=True)
+    return Page(file.read_text())
+
+
+def table(report, title):
+    """The rows of the table that has a column of this title."""
+    tables = (block for section in report.sections for block in section.blocks if isinstance(block, Table))
+    return next(each.rows for each in tables if title in each.head)
+
+
+def words(cell):
+    """A cell without what makes parts of it stand out."""
+    parts = cell if isinstance(cell, tuple) else (cell,)
+    return "".join(part if isinstance(part, str) else part.text for part in parts)
+
+
+def test_a_finished_run_in_a_few_words(run, tmp_path):
+    fake_run.finished(run)
+    text = page(run, tmp_path).text
+    assert "2 of 11 models are enough to make the robot fail" in text
+    assert "Minimal: without any one of them the failure was not seen again." in text
+    assert "the robot got stuck at (2.00, 0.40, 0.20) m, 4.0 m short of the goal at (6, 0)" in text
+    assert "got stuck in 3 of 4 runs: 75 %, 95 % interval (Wilson) 30 % to 95 %" in text
+    assert "11 → 6 → 2 models" in text
+    assert f"ddenv test {run.path} --minimal --leave-each-out" in text
+    assert "ddenv run crates.yaml --pair model2model/failure-proximal --iterations 3" in text
+
+
+def test_the_page_needs_nothing_else_and_runs_nothing(run, tmp_path):
+    fake_run.guided(run)
+    made = page(run, tmp_path)
+    assert not made.tags & {"script", "link", "img", "iframe", "a", "object"}
+    assert not made.attributes & {"src", "href", "onload", "onclick"}
+
+
+def test_models_that_are_left_have_place_and_size(run):
+    fake_run.finished(run)
+    rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "model")]
+    assert rows[0] == ("crate_00", "static", "-4.50, 0.00, 0.15", "1.20 × 0.80 × 0.30")
+    assert [row[0] for row in rows] == ["crate_00", "crate_01"]
+
+
+def test_rounds_as_they_ended(run):
+    fake_run.guided(run)
+    rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "round")]
+    assert rows == [
+        ("1", "2", "1 of 2", "part A", "6", "1"),
+        ("2", "3", "1 of 6", "without A, taken back", "4", "1"),
+        ("3", "2", "2 of 2", "under way", "5", "4"),
+    ]
+
+
+def test_what_was_decided_by_hand(run):
+    fake_run.guided(run)
+    report = content(read_run(run.path))
+    done = [words(row[-1]) for row in table(report, "what the user did")]
+    assert done[:2] == ["took back without A: 6 models again", "pinned crate_00"]
+    tried = [(words(row[0]), words(row[-1])) for row in table(report, "tried by hand")]
+    assert tried == [("try 1", "similar, adopted"), ("try 2", "dissimilar"), ("try 3", "under way")]
+    tree = [(words(row[0]), words(row[2]), words(row[-1])) for row in table(report, "came by")]
+    assert tree == [
+        ("0", "the whole world", ""),
+        ("1", "part A", ""),
+        ("├ 2", "without A", "taken back"),
+        ("3", "try 1, adopted by hand", "here"),
+    ]
+
+
+def test_a_branch_with_steps_of_its_own_is_told_before_the_way_to_here(run):
+    run.created().baseline()
+    left = run.elements
+    for _ in range(3):
+        run.start_round(2, left)
+        test, left = run.similar(0), left[: (len(left) + 1) // 2]
+        run.reduce(0, left, test)
+    run.go_back(1)
+    run.start_round(2, run.elements[:6])
+    run.reduce(1, run.elements[3:6], run.similar(1))
+    tree = [words(row[0]) for row in table(content(read_run(run.path)), "came by")]
+    assert tree == ["0", "1", "├ 2", "│ 3", "4"]
+
+
+def test_settings_that_were_changed_on_the_way(run):
+    run.created().baseline().write("changed", settings={"iterations": 7})
+    rows = dict(tuple(map(words, row)) for row in table(content(read_run(run.path)), "setting"))
+    assert rows["re-runs of a candidate"] == "7 (changed on the way; at first 3)"
+    assert rows["goal"] == "x 6 m, y 0 m"
+
+
+@pytest.mark.parametrize(
+    ("made", "told"),
+    [
+        (lambda run: run, "Not started yet"),
+        (lambda run: run.created(), "The engine is not there any more"),
+        (
+            lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
+            "Stopped: as you asked.",
+        ),
+        (lambda run: run.created().write("engine_failed", reason="no disk"), "The engine could not go on: no disk."),
+        (lambda run: run.created().write("finished", minimal=False, reason="no run failed"), "No failure is known yet"),
+    ],
+    ids=["created", "killed", "stopped", "failed", "never failed"],
+)
+def test_a_run_that_has_not_come_to_an_end_says_so(run, tmp_path, made, told):
+    made(run)
+    assert told in page(run, tmp_path).text
+
+
+def test_a_run_that_is_still_on_says_so(run, tmp_path):
+    fake_run.mid_round(run).hold()
+    text = page(run, tmp_path).text
+    assert "This run has not ended. What follows is what was known at" in text
+    assert "6 of 11 models are enough to make the robot fail so far" in text
+
+
+def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
+    fake_run.finished(run).write("reduced", candidate=99, environment=[77], evidence_test=1)
+    text = page(run, tmp_path).text
+    assert "Not all of this run could be read." in text and "makes no sense here" in text
+    assert "2 of 11 models" in text
+
+
+def test_without_a_world_there_is_no_map(run, tmp_path):
+    fake_run.finished(run).file._db.execute("UPDATE document SET content = ? WHERE name = 'world'", (b"<sdf",))
+    report = content(read_run(run.path))
+    assert not any(isinstance(each, Picture) and each.name == "map" for each in report.sections[0].blocks)
+    text = page(run, tmp_path).text
+    assert "No map: the world cannot be read." in text and "Left: crate_00, crate_01." in text
+
+
+def test_what_is_no_run_is_refused(tmp_path):
+    (tmp_path / "x.ddenv").write_text("no")
+    with pytest.raises(UserError, match="is no ddenv run file"):
+        write_report(tmp_path / "x.ddenv", tmp_path / "x.html")
+    assert not (tmp_path / "x.html").exists()
+
+
+def evil(tmp_path):
+    data = fake_run.scenario((), '<i>&x</i> | `y` "')
+    data["description"] = "</p><script>alert(1)</script> # *x*"
+    names = [escape(name, {'"': "&quot;"}) for name in EVIL]
+    run = fake_run.FakeRun(tmp_path / "evil.ddenv", data, fake_run.world_text(names))
+    run.created().baseline()
+    run.start_round(3)
+    run.reduce(1, run.elements[:-1], run.similar(1))
+    run.pin(*run.elements[:3])
+    return run
+
+
+def test_names_are_shown_as_they_are_and_do_nothing(tmp_path):
+    run = evil(tmp_path)
+    made = page(run, tmp_path)
+    assert not made.tags & {"script", "i", "b"}
+    for name in EVIL[:2] + EVIL[3:5]:
+        assert name in made.text
+    assert "\u202e" not in made.text and "\N{REPLACEMENT CHARACTER}abc`" in made.text
+    run.close()
+
+
+def test_markdown_is_the_same_with_pictures_beside_it(tmp_path):
+    run = evil(tmp_path)
+    file, *drawn = write_report(run.path, tmp_path / "a report.md")
+    text = file.read_text()
+    assert not re.search(r"(?<![\\`])<(script|i|b)\b", re.sub(r"(`+).*?(?<!`)\1(?!`)", "", text, flags=re.S))
+    assert "\\<script\\>alert(1)\\</script\\> # \\*x\\*" in text
+    rows = [line for line in text.splitlines() if line.startswith("| ") and "static" in line]
+    assert len(rows) == len(EVIL) and all(len(re.findall(r"(?<!\\)\|", row)) == 5 for row in rows)
+    assert {path.name for path in drawn} == set(re.findall(r"\]\((.*?\.svg)\)", text.replace("%20", " ")))
+    assert {file, *drawn} <= set(files_of(file))
+    for path in drawn:
+        assert ElementTree.fromstring(path.read_text()).tag.endswith("svg")
+    run.close()
+
+
+def test_nothing_is_overwritten_unless_asked(run, tmp_path):
+    fake_run.finished(run)
+    file = tmp_path / "report.md"
+    (tmp_path / "report.chart.svg").write_text("mine")
+    with pytest.raises(UserError, match=r"report\.chart\.svg: exists already; .*--force"):
+        write_report(run.path, file)
+    assert not file.exists()
+    write_report(run.path, file, force=True)
+    assert (tmp_path / "report.chart.svg").read_text() != "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("report.pdf", "ends in .html or .md"), ("no/report.html", "there is no folder")]
+)
+def test_where_a_report_cannot_be_written(run, tmp_path, name, told):
+    with pytest.raises(UserError, match=told):
+        write_report(run.path, tmp_path / name)
+
+
+def many_rounds(run, rounds, won):
+    """Vain rounds of one candidate with four tests each; those in `won` remove a model, found by one test."""
+    run.created().baseline()
+    events, test, left = [], run.tests, list(range(len(run.elements)))
+    for number in range(1, rounds + 1):
+        start = {"round": number, "n_partitions": 2, "environment": left, "partitions": [left[:1], left[1:]]}
+        events.append(("round_started", {**start, "candidates": [["partition", 1, None]]}))
+        tests = range(test + 1, test + (2 if number in won else 5))
+        outcome = "similar" if number in won else "pass"
+        for run_number, test in enumerate(tests):
+            where = {"phase": "round", "round": number, "candidate": 0}
+            events.append(("test_started", {"test": test, **where, "run": run_number, "seed": 0}))
+            seconds = {"simulated_seconds": 1.0, "wall_seconds": 1.0}
+            ended = {"outcome": outcome, "failure": "", "distance": None, "end_pose": None}
+            events.append(("test_finished", {"test": test, **ended, **seconds}))
+        verdict = "similar" if number in won else "dissimilar"
+        events.append(("candidate_judged", {"candidate": 0, "verdict": verdict, "tests": list(tests), "known": 0}))
+        if number in won:
+            left = left[1:]
+            events.append(("reduced", {"candidate": 0, "environment": left, "evidence_test": test}))
+        events.append(("round_finished", {}))
+    rows = [(0.0, kind, json.dumps(data)) for kind, data in events]
+    run.file._db.execute("BEGIN")
+    run.file._db.executemany("INSERT INTO event (time, kind, data) VALUES (?, ?, ?)", rows)
+    run.file._db.execute("COMMIT")
+
+
+def test_very_many_rounds_are_summed_up(run, tmp_path):
+    many_rounds(run, 400, won={7, 8, 200})
+    rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "round")]
+    assert len(rows) <= MOST_ROUNDS
+    assert rows[:3] == [
+        ("1", "2", "1 of 1", "none", "11", "4"),
+        ("2 to 6", "", "5", "none", "11", "20"),
+        ("7", "2", "1 of 1", "part B", "10", "1"),
+    ]
+    assert sum(int(row[-1]) for row in rows) == 3 + 4 * 397
+    assert len((tmp_path / write_report(run.path, tmp_path / "r.html")[0]).read_text()) < 100_000
+
+
+def test_pictures_are_drawn_of_worlds_of_any_kind(tmp_path):
+    empty = b'<sdf version="1.9"><world name="w"/></sdf>'
+    bare = b'<sdf version="1.9"><world name="w"><model name="ghost"><link name="l"/></model></world></sdf>'
+    far = fake_run.box("a", 0, 0) + fake_run.box("b", 9e5, 0) + fake_run.box("hall", 0, 0, size=(9e5, 9e5, 1))
+    huge = f'<sdf version="1.9"><world name="w">{far}</world></sdf>'.encode()
+    for number, world in enumerate((empty, bare, huge)):
+        run = fake_run.FakeRun(tmp_path / f"{number}.ddenv", fake_run.scenario(()), world)
+        run.created().baseline()
+        for section in content(read_run(run.path)).sections:
+            for block in section.blocks:
+                if isinstance(block, Picture):
+                    ElementTree.fromstring(block.svg)
+                    assert "nan" not in block.svg and "inf" not in block.svg
+        run.close()
