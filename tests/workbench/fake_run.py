@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
+from ddenv.version import __version__
 from ddenv.world.read import parse_world
 
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
@@ -91,7 +92,7 @@ class FakeRun:
 
     def created(self) -> FakeRun:
         self.write("created", scenario=self.data, elements=self.elements)
-        self.write("engine_started", pid=1, jobs=2)
+        self.write("engine_started", pid=1, jobs=2, version=__version__)
         return self
 
     def start(self, candidate: int | None = None, run: int = 0) -> int:

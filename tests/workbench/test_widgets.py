@@ -1,6 +1,5 @@
 """The panels' text, without an app."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import fake_run
@@ -11,17 +10,12 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
-from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.state import Point
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.processes import last_line
 from ddenv.workbench.recent import recent_runs
-from ddenv.workbench.widgets.candidates import _candidates, _confirm
-from ddenv.workbench.widgets.chart import steps
 from ddenv.workbench.widgets.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
-from ddenv.workbench.widgets.status import time_left
 from ddenv.workbench.widgets.strips import strip
-from ddenv.workbench.wording import duration, metres, percent, plain, shorten
+from ddenv.workbench.wording import about, brief, duration, metres, percent, plain, shorten
 from ddenv.world.read import parse_world
 
 
@@ -32,6 +26,28 @@ def snapshot(run, engine="alive") -> Snapshot:
 @pytest.mark.parametrize(("seconds", "words"), [(0, "0 s"), (59.4, "59 s"), (100, "1 min 40 s"), (7500, "2 h 05 min")])
 def test_durations(seconds, words):
     assert duration(seconds) == words
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.42, "0.4 s"), (9.96, "10 s"), (312, "312 s"), (1500, "25 min"), (40_000, "11 h")]
+)
+def test_times_in_a_table_are_short(seconds, words):
+    assert brief(seconds) == words
+    assert len(words) <= 7
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        ((4.2, 8.1, 22), "8 s (4 to 20)"),
+        ((61, 122, 301), "2 min (1 to 5)"),
+        ((1, 1, 1), "1 s"),
+        ((3000, 9000, 40_000), "2 h (1 to 10)"),
+        ((0, 0, 0), "1 s"),
+    ],
+)
+def test_what_is_not_known_exactly_is_told_roughly(seconds, words):
+    assert about(*seconds) == words
 
 
 @pytest.mark.parametrize(
@@ -105,63 +121,6 @@ def test_text_ends_at_the_edge_of_the_map():
     canvas = Canvas(1, 4, (0, 0, 0))
     canvas.put((0, 3), "AB")
     assert strip(canvas, 0).text == "   A"
-
-
-def test_steps_fall_with_the_environment():
-    text = steps((Point(0, 40), Point(10, 20), Point(20, 5)), 20, 46, 9).plain.splitlines()
-    assert len(text) == 9
-    assert text[0].startswith("40┤█")
-    assert text[-1].strip().startswith("0")
-    assert text[-1].endswith("20 tests")
-    heights = [sum(line[column] != " " for line in text[:-1]) for column in range(4, 45)]
-    assert heights == sorted(heights, reverse=True)
-    assert heights[0] == 8
-    assert heights[-1] == 1
-
-
-@pytest.mark.parametrize("size", [(5, 2), (0, 0), (12, 3)])
-def test_a_chart_without_room_does_no_harm(size):
-    steps((Point(0, 4),), 0, *size)
-
-
-def test_rows_say_how_many_tests_of_how_many(run):
-    rows = _candidates(snapshot(fake_run.mid_round(run)))
-    assert rows["0"]["tests"] == "4/4"
-    assert rows["0"]["verdict"] == "○ dissimilar"
-    assert rows["1"]["tests"] == "1/4"
-    assert rows["1"]["verdict"].startswith("▶ 2")
-    assert rows["3"]["tests"] == ""
-
-
-def test_full_runs_of_what_is_left_have_rows(run):
-    rows = _confirm(snapshot(fake_run.confirming(run)))
-    told = [(row["candidate"], row["models"], row["tests"], row["verdict"]) for row in rows.values()]
-    assert told == [
-        ("all left", "2", "run 1", "● stuck"),
-        ("- crate_00", "1", "run 1", "◇ tipped over"),
-        ("- crate_00", "1", "run 2", "▶ 26.8 s"),
-        ("- crate_01", "1", "run 1", "▶ 10.8 s"),
-    ]
-
-
-def test_models_left_out_are_told_apart_by_the_ends_of_their_names(run):
-    state = snapshot(fake_run.confirming(run)).state
-    tests = [replace(test, without=f"construction_barrel_{test.id:02}") for test in state.confirm_tests]
-    rows = _confirm(Snapshot(state.changed(tests=PersistentTuple.of(tests))))
-    assert [row["candidate"] for row in rows.values()] == [f"- cons…_{test.id:02}" for test in tests]
-
-
-def test_tests_of_a_dead_engine_do_not_run(run):
-    rows = _candidates(snapshot(fake_run.mid_round(run), "absent"))
-    assert rows["1"]["verdict"] == ""
-
-
-def test_time_left_is_the_most_a_round_can_take(run):
-    fake_run.mid_round(run)
-    # 19 tests at 2 s on 2 workers: 3 open for candidate 2, 4 for each of the four others.
-    assert time_left(snapshot(run)) == "round: ≤ 19 s left"
-    run.write("paused")
-    assert time_left(snapshot(run)) == ""
 
 
 def test_recent_runs_say_how_they_stand(runs):

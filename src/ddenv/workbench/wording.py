@@ -70,6 +70,29 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02} min"
 
 
+def brief(seconds: float) -> str:
+    """`seconds` in at most seven characters: 0.4 s, 312 s, 25 min, 3 h."""
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    if seconds < 599.5:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 36_000 else f"{seconds / 3600:.0f} h"
+
+
+def about(low: float, middle: float, high: float) -> str:
+    """A time of so many seconds with its interval, no finer than it is known: 2 min (1 to 5)."""
+    unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
+    low, middle, high = (_rounded(each / unit) for each in (low, middle, high))
+    interval = f" ({low} to {high})" if low < high else ""
+    return f"{middle} {name}{interval}"
+
+
+def _rounded(number: float) -> int:
+    """To the next five above ten, to the next ten above fifty."""
+    step = 1 if number < 10 else 5 if number < 50 else 10
+    return max(1, step * round(number / step))
+
+
 def metres(value: Any, digits: int = 1) -> str:
     """A distance in m, or nothing where there is none."""
     if not isinstance(value, (int, float)) or not math.isfinite(value):

@@ -2,207 +2,247 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
+from rich.cells import cell_len, set_cell_size
+from rich.segment import Segment
+from rich.style import Style
 from rich.text import Text
+from textual import events
+from textual.binding import Binding
+from textual.geometry import Region, Size
 from textual.message import Message
-from textual.widgets import DataTable
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
 
-from ddenv.map.names import shortened
+from ddenv.runfile.guiding import Trial
 from ddenv.runfile.state import Candidate, Test
 from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.settings import settings
-from ddenv.workbench.wording import VERDICT, metres, outcome, plain
+from ddenv.workbench.widgets.rows import Column, Listed, Words, fitting, listed, words
 
-# Name, width in cells with the space between columns, and whether it stays when there is little room.
-COLUMNS = (
-    ("#", 3, True),
-    ("candidate", 11, True),
-    ("models", 6, True),
-    ("distance", 10, False),
-    ("tests", 7, True),
-    ("verdict", 15, True),
-)
-# Of a model's name so many columns, behind a sign and a space.
-NAME = 8
-# By row key, then by column.
-Rows = dict[str, dict[str, str]]
-RIGHT = ("models", "distance", "tests")
+STRONG, WEAK = Style(bold=True), Style(dim=True)
 
 
-class Candidates(DataTable):
-    """Rows are updated by key, a cell only when it changed. The cursor follows the run until it is moved by hand."""
+def _binding(keys: str, action: str, name: str, tooltip: str) -> Binding:
+    return Binding(keys, action, name, show=False, id=f"candidates.{name}", tooltip=tooltip)
+
+
+class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
+    """Only rows in sight are ever made into text, and only lines that changed are drawn again.
+
+    The cursor follows the run until it is moved by hand.
+    """
+
+    ALLOW_SELECT = False
+    COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
+    DEFAULT_CSS = """
+    Candidates {
+        background: $background;
+        color: $foreground;
+        scrollbar-size: 1 1;
+        overflow-x: hidden;
+        & > .candidates--header { color: $text-muted; }
+        & > .candidates--cursor { background: $primary 25%; color: $foreground; }
+        &:focus > .candidates--cursor { background: $primary 45%; color: $foreground; }
+        &:nocolor > .candidates--cursor { text-style: underline; }
+        &:nocolor:focus > .candidates--cursor { text-style: reverse; }
+        &:ansi > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: underline; }
+        &:ansi:focus > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: reverse; }
+    }
+    """
+    BINDINGS: ClassVar = [
+        _binding("up", "move(-1)", "up", "the candidate above: the map shows its models"),
+        _binding("down", "move(1)", "down", "the candidate below: the map shows its models"),
+        _binding("pageup", "page(-1)", "page_up", "one page of candidates up"),
+        _binding("pagedown", "page(1)", "page_down", "one page of candidates down"),
+        _binding("home,ctrl+home", "first", "first", "the first candidate"),
+        _binding("end,ctrl+end", "last", "last", "the last candidate"),
+        _binding("enter", "choose", "choose", "stay on this candidate"),
+    ]
 
     class Chosen(Message):
         """The cursor was moved by hand, or given back to the run."""
 
     def __init__(self, *, id: str | None = None) -> None:
-        super().__init__(id=id, cursor_type="row", cell_padding=0)
+        super().__init__(id=id)
         self.following = True
-        self._of: tuple = ()
-        self._names: tuple[str, ...] = ()
-        self._cells: Rows = {}
-        self._round: Sequence[Candidate] = ()
+        self.cursor_row = 0
+        self.columns: tuple[Column, ...] = fitting(Listed(), 0)
+        self._snapshot = Snapshot()
+        self._listed = Listed()
+        self._narrow = False
+        self._drawn: dict[int, Words] = {}
 
-    def on_mount(self) -> None:
-        self.set_narrow(False)
-
-    def set_narrow(self, narrow: bool) -> None:
-        """With little room the distance is left out."""
-        names = tuple(name for name, _, stays in COLUMNS if stays or not narrow)
-        if names == self._names:
-            return
-        row, rows = self.cursor_row, self._cells
-        self.clear(columns=True)
-        self._names, self._cells = names, {}
-        for name, width, _ in COLUMNS:
-            if name in names:
-                self.add_column(_cell(name, name), width=width, key=name)
-        self._fill(self._of, rows)
-        self.move_cursor(row=row)
+    # What is listed.
 
     @property
-    def chosen(self) -> Candidate | None:
-        """The candidate that was chosen by hand."""
+    def row_count(self) -> int:
+        return len(self._listed)
+
+    @property
+    def under_cursor(self) -> Candidate | Trial | None:
+        item = self._listed.item(self.cursor_row)
+        return None if isinstance(item, Test) else item
+
+    @property
+    def chosen(self) -> Candidate | Trial | None:
+        """The candidate or trial that was chosen by hand."""
         return None if self.following else self.under_cursor
 
-    @property
-    def under_cursor(self) -> Candidate | None:
-        row = self.cursor_row
-        return self._round[row] if 0 <= row < len(self._round) else None
+    def get_row_at(self, row: int) -> list[Text]:
+        """The cells of a row, in the order of the columns."""
+        cells = words(self._snapshot, self._listed, row)
+        return [_text(column, cells.get(column.name, "")) for column in self.columns]
+
+    def get_cell(self, key: str, name: str) -> Text:
+        """A cell of the candidate whose index is `key`."""
+        row = len(self._listed.trials) + int(key)
+        return Text(words(self._snapshot, self._listed, row).get(name, ""))
+
+    def set_narrow(self, narrow: bool) -> None:
+        """With little room all columns go that can be spared."""
+        self._narrow = narrow
+        self._arrange()
 
     def show(self, snapshot: Snapshot) -> None:
-        state, current = snapshot.state, snapshot.state.round
-        if state.confirming and not state.ended:
-            self._round = ()
-            self._fill(("confirm",), _confirm(snapshot))
-            return
-        self._round = current.candidates if current else ()
-        rows = _candidates(snapshot) if current else _baseline(snapshot)
-        self._fill(("round", current.number) if current else ("baseline",), rows)
-        focus = snapshot.focus
-        if self.following and focus is not None and self.cursor_row != focus.index:
-            self.move_cursor(row=focus.index)
-
-    def _fill(self, of: tuple, rows: Rows) -> None:
-        if of != self._of or any(key not in rows for key in self._cells):
-            self.clear()
-            self._of, self._cells, self.following = of, {}, True
-        for key, cells in rows.items():
-            if key not in self._cells:
-                self.add_row(*(_cell(cells[name], name) for name in self._names), key=key)
-            else:
-                self._update(key, cells)
-        self._cells = rows
-
-    def _update(self, key: str, cells: dict[str, str]) -> None:
-        for name in self._names:
-            if cells[name] != self._cells[key][name]:
-                self.update_cell(key, name, _cell(cells[name], name))
+        """The run as it is now."""
+        before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
+        if self._listed.of != before.of:
+            self.following, self.cursor_row = True, 0
+            self.scroll_to(y=0, animate=False, force=True)
+        elif shift := len(self._listed.trials) - len(before.trials):
+            # What is looked at stays where it is.
+            self.cursor_row += shift
+            if self.scroll_offset.y:
+                self.scroll_to(y=self.scroll_offset.y + shift, animate=False, force=True)
+        self.cursor_row = min(self.cursor_row, max(0, len(self._listed) - 1))
+        self._arrange()
+        if self.following and snapshot.focus is not None:
+            self._put(self._listed.row(snapshot.focus))
+        self._redraw()
 
     def follow(self) -> None:
         """Gives the cursor back to the run."""
         self.following = True
         self.post_message(self.Chosen())
 
-    def _by_hand(self) -> None:
+    # Keys and mouse.
+
+    def action_move(self, rows: int) -> None:
+        self._by_hand(self.cursor_row + rows)
+
+    def action_page(self, pages: int) -> None:
+        self._by_hand(self.cursor_row + pages * self._page)
+
+    def action_first(self) -> None:
+        self._by_hand(0)
+
+    def action_last(self) -> None:
+        self._by_hand(len(self._listed) - 1)
+
+    def action_choose(self) -> None:
+        self._by_hand(self.cursor_row)
+
+    def on_click(self, event: events.Click) -> None:
+        row = event.y - 1 + self.scroll_offset.y
+        if event.y > 0 and row < len(self._listed):
+            event.stop()
+            self._by_hand(row)
+
+    def _by_hand(self, row: int) -> None:
         self.following = False
+        self._put(min(max(row, 0), max(0, len(self._listed) - 1)), reveal=True)
         self.post_message(self.Chosen())
 
-    def action_cursor_up(self) -> None:
-        super().action_cursor_up()
-        self._by_hand()
+    # From rows to lines: the first one is the header, and does not scroll.
 
-    def action_cursor_down(self) -> None:
-        super().action_cursor_down()
-        self._by_hand()
+    @property
+    def _page(self) -> int:
+        return max(1, self.size.height - 1)
 
-    def action_page_up(self) -> None:
-        super().action_page_up()
-        self._by_hand()
+    def _in_sight(self, row: int) -> bool:
+        return self.scroll_offset.y <= row < self.scroll_offset.y + self._page
 
-    def action_page_down(self) -> None:
-        super().action_page_down()
-        self._by_hand()
+    def _put(self, row: int | None, reveal: bool = False) -> None:
+        """Moves the cursor. The view goes with it, if the cursor was in sight."""
+        if row is None:
+            return
+        reveal = reveal or self._in_sight(self.cursor_row)
+        for each in (self.cursor_row, row) if row != self.cursor_row else ():
+            self._refresh_row(each)
+        self.cursor_row = row
+        if reveal:
+            self._reveal()
 
-    # With a cursor of whole rows, home and end mean the first and the last candidate.
+    def _reveal(self) -> None:
+        top = self.scroll_offset.y
+        if not self.size.height or self._in_sight(self.cursor_row):
+            return
+        y = self.cursor_row if self.cursor_row < top else self.cursor_row - self._page + 1
+        self.scroll_to(y=y, animate=False, force=True)
 
-    def action_scroll_home(self) -> None:
-        self.action_scroll_top()
+    def on_resize(self) -> None:
+        self._arrange()
+        self._reveal()
 
-    def action_scroll_end(self) -> None:
-        self.action_scroll_bottom()
+    def _arrange(self) -> None:
+        """Makes room for the rows and columns."""
+        columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
+        if columns != self.columns:
+            self.columns = columns
+            self.refresh()
+        size = Size(0, len(self._listed) + 1)
+        if size != self.virtual_size:
+            self.virtual_size = size
+            self.refresh()
 
-    def action_scroll_top(self) -> None:
-        super().action_scroll_top()
-        self._by_hand()
+    def _redraw(self) -> None:
+        top = self.scroll_offset.y
+        rows = range(top, min(top + self._page, len(self._listed)))
+        drawn = {row: words(self._snapshot, self._listed, row) for row in rows}
+        for row, cells in drawn.items():
+            if self._drawn.get(row) != cells:
+                self._refresh_row(row)
+        self._drawn = drawn
 
-    def action_scroll_bottom(self) -> None:
-        super().action_scroll_bottom()
-        self._by_hand()
+    def _refresh_row(self, row: int) -> None:
+        if self._in_sight(row):
+            self.refresh(Region(0, row + 1 - self.scroll_offset.y, self.size.width, 1))
 
-    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
-        event.stop()
-        self._by_hand()
+    def render_line(self, y: int) -> Strip:
+        row = y - 1 + self.scroll_offset.y
+        if y == 0:
+            style = self.get_component_rich_style("candidates--header")
+            return self._strip({column.name: column.name for column in self.columns}, style)
+        cells = words(self._snapshot, self._listed, row)
+        if not cells:
+            return Strip.blank(self.size.width, self.rich_style)
+        is_cursor = row == self.cursor_row
+        style = self.get_component_rich_style("candidates--cursor") if is_cursor else self.rich_style
+        return self._strip(cells, style)
 
-
-def _cell(words: str, name: str) -> Text:
-    style = "bold" if words.startswith(("●", "▶", "?")) else "dim" if words.startswith(("○", "⊘")) else ""
-    if name == "verdict":
-        words = f"  {words}"
-    return Text(words, style, justify="right" if name in RIGHT else "left", no_wrap=True)
-
-
-def _candidates(snapshot: Snapshot) -> Rows:
-    full = 1 + settings(snapshot.state).iterations
-    return {str(each.index): _candidate(snapshot, each, full) for each in snapshot.state.round.candidates}
-
-
-def _candidate(snapshot: Snapshot, each: Candidate, full: int) -> dict[str, str]:
-    tests = [snapshot.state.tests[id - 1] for id in each.tests if 0 < id <= len(snapshot.state.tests)]
-    done = sum(test.is_finished for test in tests)
-    verdict = VERDICT.get(each.verdict, plain(each.verdict)) or _open(snapshot, tests)
-    if snapshot.state.waiting_candidate == each.index:
-        verdict = "? a or x"
-    ran = f"{done}/{full}" if done or any(test.outcome == "running" for test in tests) else ""
-    return _row(str(each.index + 1), each.label, str(each.size), metres(each.distance), ran, verdict)
-
-
-def _open(snapshot: Snapshot, tests: list[Test]) -> str:
-    running = [test for test in tests if test.outcome == "running"]
-    if not running or snapshot.engine != "alive":
-        return ""
-    return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
-
-
-def _seconds(snapshot: Snapshot, test: Test) -> str:
-    seconds = snapshot.seconds(test.id)
-    return "" if seconds is None else f" {seconds:.1f} s"
-
-
-def _baseline(snapshot: Snapshot) -> Rows:
-    rows = {}
-    for test in snapshot.state.tests:
-        models = str(len(snapshot.state.elements))
-        words = f"run {test.run + 1}", models, metres(test.distance), "", _ended(snapshot, test)
-        rows[f"t{test.id}"] = _row(str(test.id), *words)
-    return rows
+    def _strip(self, cells: Words, style: Style) -> Strip:
+        *others, last = self.columns
+        row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
+        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
+        segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
+        return Strip(segments).adjust_cell_length(self.size.width, style)
 
 
-def _confirm(snapshot: Snapshot) -> Rows:
-    rows = {}
-    left = len(snapshot.state.environment)
-    for number, test in enumerate(snapshot.state.confirm_tests, start=1):
-        name = "all left" if test.without is None else f"- {shortened(test.without, NAME)}"
-        models, run = left - (test.without is not None), f"run {test.run + 1}"
-        rows[f"t{test.id}"] = _row(str(number), name, str(models), metres(test.distance), run, _ended(snapshot, test))
-    return rows
+def _aligned(column: Column, text: str) -> str:
+    """As wide as its column, with a space before it but in the first."""
+    if column.right:
+        return " " * (column.width - cell_len(text)) + text
+    before = "" if column.name in ("#", "verdict") else " "
+    room = column.width - len(before)
+    return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
 
 
-def _ended(snapshot: Snapshot, test: Test) -> str:
-    running = test.outcome == "running" and snapshot.engine == "alive"
-    return f"▶{_seconds(snapshot, test)}" if running else outcome(test)
+def _emphasis(words: str) -> Style:
+    if words.startswith(("●", "▶", "?")):
+        return STRONG
+    return WEAK if words.startswith(("○", "⊘")) else Style.null()
 
 
-def _row(*words: str) -> dict[str, str]:
-    return dict(zip((name for name, _, _ in COLUMNS), words, strict=True))
+def _text(column: Column, words: str) -> Text:
+    return Text(words, _emphasis(words), justify="right" if column.right else "left", no_wrap=True)

@@ -2,140 +2,223 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv import __version__
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import RunState, Test
+from ddenv.workbench.branches import path
+from ddenv.workbench.estimate import Remaining, remaining
 from ddenv.workbench.methods import labels
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.rounds import GROUPS
 from ddenv.workbench.settings import settings
-from ddenv.workbench.wording import STATUS, count, duration, shorten
+from ddenv.workbench.widgets.inks import ink
+from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
+# What is said in fewer words, or not at all, until the rest has room: from the least important on.
+SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
 
 
-class Line(Widget):
-    """One line of text that is drawn again only when it changed."""
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """Scenario and method on the left, in the longest of `lefts` that fits; how far the reduction is on the right."""
+
+    lefts: tuple[str, ...] = ()
+    rights: tuple[str, ...] = ("",)
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """Something the status line says; the longest of its `forms` that there is room for."""
+
+    name: str
+    forms: tuple[str, ...]
+
+
+class Header(Widget):
+    """What is reduced, and how far it is."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self._shown: tuple = ()
-        self._snapshot = Snapshot()
-        self.scene = ""
-        self.asked = ""
+        self._heading = Heading()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """The run as it is now."""
+        now = heading(snapshot.state)
+        if now != self._heading:
+            self._heading = now
+            self.refresh()
+
+    def render(self) -> Text:
+        name, width = "ddenv", self.size.width
+        shortest = len(min(self._heading.lefts, key=len, default=""))
+        rights = self._heading.rights
+        right = next((each for each in rights if len(name) + shortest + len(each) + 6 <= width), rights[-1])
+        room = max(0, width - 2 - len(name) - len(right) - 4)
+        left = next((each for each in self._heading.lefts if len(each) <= room), "")
+        left = left or shorten(next(reversed(self._heading.lefts), ""), room)
+        space = max(1, width - 4 - len(name) - len(left) - len(right))
+        text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
+        return text.append(f"  {left}", "bold").append(" " * space).append(right)
+
+
+class Status(Widget):
+    """State, tests by outcome, time, engine and scene."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._facts: tuple[Fact, ...] = ()
+        self._snapshot: Snapshot | None = None
+        self._besides = ("", "")
+        self._tests: PersistentTuple[Test] = PersistentTuple()
+        self._cut = 0
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
-        self._snapshot, self.scene, self.asked = snapshot, scene, asked
-        facts = self.facts(200)
-        if facts != self._shown:
-            self._shown = facts
+        if (scene, asked) == self._besides and snapshot is self._snapshot:
+            return
+        tests = snapshot.state.tests
+        self._cut = cut_tests(tests, self._tests, self._cut)
+        self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
+        now = facts(snapshot, scene, asked, self._cut)
+        if now != self._facts:
+            self._facts = now
             self.refresh()
 
-    def facts(self, width: int) -> tuple:
-        raise NotImplementedError
-
-
-class Header(Line):
-    """Scenario and method on the left, how far the reduction is on the right."""
-
-    def facts(self, width: int) -> tuple[str, str, str]:
-        """The program's name, the left and the right text; the method in the longest words that fit."""
-        options = settings(self._snapshot.state)
-        name, right = "ddenv", self._progress()
-        room = max(0, width - 2 - len(name) - len(right) - 4)
-        lefts = [f"{options.name} · {label}" for label in labels(options.algorithm, options.pair)]
-        left = next((left for left in lefts if len(left) <= room), lefts[-1])
-        return name, shorten(left, room), right
-
-    def _progress(self) -> str:
-        state = self._snapshot.state
-        total, kept = len(state.elements), len(state.environment)
-        progress = [f"{kept} of {count(total, 'model')}"]
-        if state.round is not None:
-            n = "" if settings(state).algorithm in GROUPS else f" · n {state.round.n_partitions}"
-            progress.insert(0, f"round {state.round.number}{n}")
-        if kept < total:
-            progress.append(f"{round(100 * (1 - kept / total))} % smaller")
-        return " · ".join(progress)
-
     def render(self) -> Text:
-        name, left, right = self.facts(self.size.width)
-        space = max(1, self.size.width - 4 - len(name) - len(left) - len(right))
-        primary = self.app.theme_variables["primary"]
-        text = Text(" ", no_wrap=True).append(name, f"bold {primary}").append(f"  {left}", "bold")
-        return text.append(" " * space).append(right)
-
-
-class Status(Line):
-    """State, tests by outcome, time, engine and scene; what does not fit is left out from the least important on."""
-
-    def facts(self, width: int) -> tuple[tuple[str, str], ...]:
-        """(name, text) in the order of the screen."""
-        snapshot = self._snapshot
-        status = "confirming" if snapshot.status == "running" and snapshot.state.confirming else snapshot.status
-        sign, word = STATUS.get(status, ("·", status))
-        mode = "accept: ask" if snapshot.state.accept_mode == "ask" else ""
-        facts = (
-            ("state", f"{sign} {word}"),
-            ("asked", f"… {self.asked}" if self.asked else ""),
-            ("tests", _tests(snapshot)),
-            ("time", duration(snapshot.spent) if snapshot.spent else ""),
-            ("left", time_left(snapshot)),
-            ("mode", "" if snapshot.state.ended else mode),
-            ("engine", _engine(snapshot)),
-            ("scene", f"scene {self.scene}" if self.scene else ""),
-        )
-        return tuple((name, text) for name, text in facts if text)
-
-    def render(self) -> Text:
-        facts = list(self.facts(self.size.width))
-        for name in ("mode", "left", "time", "engine", "scene"):
-            if sum(len(text) + 3 for _, text in facts) <= self.size.width:
-                break
-            facts = [fact for fact in facts if fact[0] != name]
         text = Text(" ", no_wrap=True, overflow="ellipsis")
-        for name, words in facts:
+        for name, words in fitted(self._facts, self.size.width):
             text.append(words, self._style(name)).append("   ")
         return text
 
     def _style(self, name: str) -> Style:
         if name == "state":
-            colors = {"waiting": "warning", "lost": "error", "failed": "error", "paused": "warning"}
-            variable = colors.get(self._snapshot.status, "success")
-            return Style.parse(f"bold {self.app.theme_variables[variable]}")
+            colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
+            variable = colors.get(self._snapshot.status if self._snapshot else "", "text-success")
+            return ink(self.app.theme_variables, variable, bold=True)
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
-            return Style(link=self.scene, underline=True)
-        return Style(dim=name in ("time", "left", "mode"))
+            return Style(link=self._besides[0], underline=True)
+        return Style(dim=name in ("time", "left", "mode", "cut"))
 
 
-def time_left(snapshot: Snapshot) -> str:
-    """The most that this round can still take; more cannot be known before the next one is made."""
-    state, current = snapshot.state, snapshot.state.round
-    if snapshot.engine != "alive" or state.paused or current is None or current.done or current.winner is not None:
-        return ""
-    times = [test.wall_seconds for test in state.finished_tests]
-    seconds = [each for each in times if isinstance(each, (int, float)) and each > 0]
-    if not seconds or state.waiting_candidate is not None:
-        return ""
-    full = 1 + settings(state).iterations
-    running = {test.id for test in snapshot.running}
-    tests = sum(full - len(set(each.tests) - running) for each in current.candidates if not each.verdict)
-    return f"round: ≤ {duration(tests * sum(seconds) / len(seconds) / max(1, state.jobs))} left"
+def heading(state: RunState) -> Heading:
+    """The words of the header, from the longest ones on."""
+    options = settings(state)
+    lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
+    total, kept = len(state.elements), len(state.environment)
+    size = f"{kept} of {count(total, 'model')}"
+    more = [f"{round(100 * (1 - kept / total))} % smaller"] if kept < total else []
+    pinned = [f"{len(state.pinned)} pinned"] if state.pinned else []
+    branch = [f"branch {number}"] if (number := branch_of(state)) else []
+    step = []
+    if state.round is not None:
+        n = "" if options.algorithm in GROUPS else f" · n {state.round.n_partitions}"
+        step = [f"round {state.round.number}{n}"]
+    rights = ([*branch, *step, size, *pinned, *more], [*branch, *step, size, *pinned], [*branch, size], [size])
+    # Without branches and pins there is one way to say it.
+    return Heading(lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1])))
 
 
-def _tests(snapshot: Snapshot) -> str:
-    counts = snapshot.state.outcomes()
-    total = sum(counts.values())
+def branch_of(state: RunState) -> int | None:
+    """Which branch of the tree of reductions the current node is on, from 1, in the order in which the branches began.
+
+    None on the newest one: that is where a run usually is.
+    """
+    nodes = state.nodes
+    if not 0 <= state.node < len(nodes) or state.node in path(nodes, len(nodes) - 1):
+        return None
+    above = {node.parent for node in nodes if not node.rejected}
+    leaves = [node.number for node in nodes if node.number not in above and not node.rejected]
+    return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
+
+
+def facts(snapshot: Snapshot, scene: str = "", asked: str = "", cut: int = 0) -> tuple[Fact, ...]:
+    """What there is to say, in the order of the screen."""
+    state = snapshot.state
+    status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
+    sign, word = STATUS.get(status, ("·", status))
+    if snapshot.gone:
+        sign, word = "✗", "the run file is gone"
+    elif status == "lost":
+        word = f"{word}: r resumes"
+    mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
+    said = (
+        Fact("state", (f"{sign} {word}",)),
+        Fact("asked", (f"… {asked}" if asked else "", "…" if asked else "")),
+        Fact("tests", tests_said(state)),
+        Fact("cut", (f"{cut} ended early" if cut else "", "")),
+        Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
+        Fact("left", left_said(remaining(snapshot))),
+        Fact("mode", (mode, "")),
+        Fact("engine", engine_said(snapshot)),
+        Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
+    )
+    return tuple(fact for fact in said if fact.forms[0])
+
+
+def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:
+    """(name, words) of what fits into so many cells."""
+    forms = {fact.name: list(fact.forms) for fact in said}
+    for name in SHRINK:
+        if sum(len(each[0]) + 3 for each in forms.values() if each[0]) <= width:
+            break
+        if len(forms.get(name, ())) > 1:
+            del forms[name][0]
+    return [(name, each[0]) for name, each in forms.items() if each[0]]
+
+
+def cut_tests(tests: PersistentTuple[Test], before: PersistentTuple[Test], cut: int) -> int:
+    """How many of `tests` were ended early, if `cut` of those of `before` were: only what changed is looked at."""
+    if len(tests) < len(before):
+        before, cut = PersistentTuple(), 0
+    for test in tests.changed_since(before):
+        cut += test.cut - (test.id <= len(before) and before[test.id - 1].cut)
+    return cut
+
+
+def tests_said(state: RunState) -> tuple[str, ...]:
+    """The tests by outcome."""
+    counts = state.outcomes()
+    total = state.tests_done
+    said = count(total, "test") if state.budget is None else f"{total} of {count(state.budget, 'test')}"
     parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
-    return f"{count(total, 'test')}: {parts}" if parts else count(total, "test")
+    return (f"{said}: {parts}" if parts else said, f"{said}: {counts['similar']} similar", said, "")
 
 
-def _engine(snapshot: Snapshot) -> str:
-    if snapshot.engine == "alive":
-        return "engine ●"
+def left_said(left: Remaining | None) -> tuple[str, ...]:
+    """What is left, with its interval, then without."""
+    if left is None:
+        return ("",)
+    low, middle, high = left.tests
+    if left.seconds is None:
+        return (f"about {middle} tests left ({low} to {high})", f"about {middle} tests left", "")
+    words = about(*left.seconds)
+    time, _, interval = words.partition(" (")
+    return (f"about {time} left{f' ({interval}' if interval else ''}", f"about {time} left", "")
+
+
+def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
+    """Whether the engine works, and whether it is of another version than this program."""
+    state = snapshot.state
     if snapshot.engine == "starting":
-        return "engine ◌"
-    return "" if snapshot.state.status == "finished" else "engine ○ off, r resumes"
+        return ("engine ◌", "")
+    if snapshot.engine != "alive":
+        silent = state.status == "finished" or snapshot.status == "lost" or snapshot.gone
+        return ("",) if silent else ("engine ○ off: r resumes", "")
+    version = plain(state.engine_version)
+    if version in ("", __version__):
+        return ("engine ●", "")
+    age = "older" if _numbers(version) < _numbers(__version__) else "newer"
+    return (f"engine ● {shorten(version, 12)}, {age}", f"engine {age}")
+
+
+def _numbers(version: str) -> list[int]:
+    return [int("".join(filter(str.isdigit, part)) or 0) for part in version.split(".")]

@@ -1,0 +1,203 @@
+"""The table of candidates: what it lists, where its cursor is, and that only what is seen is made into text."""
+
+from dataclasses import replace
+
+import fake_run
+import pytest
+from textual.app import App
+
+from ddenv.runfile import state as runs_state
+from ddenv.runfile.fold import fold
+from ddenv.runfile.guiding import Trial
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import Candidate, Round, RunState, Split
+from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.widgets import candidates as module
+from ddenv.workbench.widgets.candidates import Candidates
+from ddenv.workbench.widgets.rows import COLUMNS, fitting, listed, words
+
+
+def snapshot(run, engine="alive") -> Snapshot:
+    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+
+
+def rows_of(shown: Snapshot) -> list[dict[str, str]]:
+    listing = listed(shown)
+    return [words(shown, listing, row) for row in range(len(listing))]
+
+
+def large(number: int, judged: int = 0) -> Snapshot:
+    """A round of so many candidates of which some are judged, each with one test."""
+    names = tuple(f"m{place}" for place in range(number // 2))
+    split = Split(names, tuple((name,) for name in names))
+    kinds = ("partition", "complement")
+    candidates = PersistentTuple.of(
+        Candidate(
+            index,
+            kinds[index % 2],
+            index // 2,
+            split,
+            0.5,
+            "dissimilar" * (index < judged),
+            (index + 1,) * (index < judged),
+        )
+        for index in range(number)
+    )
+    tests = PersistentTuple.of(
+        runs_state.Test(id, "round", 1, id - 1, 0, 0, "pass", distance=1.0) for id in range(1, judged + 1)
+    )
+    state = RunState(status="running", elements=names, environment=names, tests=tests)
+    return Snapshot(state.changed(round=Round(1, len(names), split, candidates)), (), "alive")
+
+
+class Table(App):
+    def compose(self):
+        yield Candidates()
+
+    @property
+    def table(self) -> Candidates:
+        return self.query_one(Candidates)
+
+    def lines(self) -> list[str]:
+        return [self.table.render_line(y).text.rstrip() for y in range(self.table.size.height)]
+
+
+def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
+    rows = rows_of(snapshot(fake_run.mid_round(run)))
+    assert [rows[0][name] for name in ("tests", "evidence", "to f", "time", "verdict")] == [
+        "4/4",
+        "2◇ 2○",
+        "2.3 m",
+        "8.0 s",
+        "○ dissimilar",
+    ]
+    assert rows[1]["tests"] == "1/4"
+    assert rows[1]["verdict"].startswith("▶ 2")
+    assert (rows[3]["tests"], rows[3]["evidence"], rows[3]["time"]) == ("", "", "")
+
+
+def test_what_waits_says_which_keys_decide(run):
+    assert rows_of(snapshot(fake_run.waiting(run)))[0]["verdict"] == "? a or x"
+
+
+def test_full_runs_of_what_is_left_have_rows(run):
+    rows = rows_of(snapshot(fake_run.confirming(run)))
+    told = [(row["#"], row["candidate"], row["models"], row["tests"], row["verdict"]) for row in rows]
+    assert told == [
+        ("1", "all left", "2", "run 1", "● stuck"),
+        ("2", "- crate_00", "1", "run 1", "◇ tipped over"),
+        ("3", "- crate_00", "1", "run 2", "▶ 26.8 s"),
+        ("4", "- crate_01", "1", "run 1", "▶ 10.8 s"),
+    ]
+
+
+def test_models_left_out_are_told_apart_by_the_ends_of_their_names(run):
+    state = snapshot(fake_run.confirming(run)).state
+    tests = [replace(test, without=f"construction_barrel_{test.id:02}") for test in state.confirm_tests]
+    rows = rows_of(Snapshot(state.changed(tests=PersistentTuple.of(tests))))
+    assert [row["candidate"] for row in rows] == [f"- cons…_{test.id:02}" for test in tests]
+
+
+def test_tests_of_a_dead_engine_do_not_run(run):
+    assert rows_of(snapshot(fake_run.mid_round(run), "absent"))[1]["verdict"] == ""
+
+
+def test_trials_of_this_place_stand_above_the_candidates(run):
+    state = snapshot(fake_run.mid_round(run)).state
+    judged = [Trial(number, ("crate_00",), state.node, "dissimilar", (1,)) for number in range(1, 6)]
+    similar = Trial(6, ("crate_00", "crate_01"), state.node, "similar", (1,))
+    trials = (*judged, similar, Trial(7, (), state.node), Trial(8, (), state.node + 1))
+    rows = rows_of(Snapshot(state.changed(trials=trials), (), "alive"))
+    assert [row["candidate"] for row in rows[:5]] == ["try 4", "try 5", "try 6", "try 7", "part A"]
+    assert [row["verdict"] for row in rows[:4]] == ["○ dissimilar", "○ dissimilar", "● a adopts it", ""]
+
+
+def test_what_matters_least_has_no_column_where_there_is_little_room(run):
+    listing = listed(snapshot(fake_run.mid_round(run)))
+    widths = {width: [column.name for column in fitting(listing, width)] for width in (20, 41, 54, 58, 80)}
+    assert widths[20] == widths[41] == ["#", "candidate", "models", "tests", "verdict"]
+    assert widths[54] == ["#", "candidate", "models", "tests", "evidence", "verdict"]
+    assert "time" in widths[58]
+    assert widths[80] == [column.name for column in COLUMNS]
+    assert sum(column.width for column in fitting(listing, 80)) == 80
+    assert len(fitting(listing, 80, narrow=True)) == 5
+
+
+@pytest.mark.parametrize("size", [(20, 5), (60, 12), (150, 20)])
+async def test_lines_are_as_wide_as_the_table_and_columns_stand_in_line(run, size):
+    async with (app := Table()).run_test(size=size) as pilot:
+        app.table.show(snapshot(fake_run.mid_round(run)))
+        await pilot.pause()
+        strips = [app.table.render_line(y) for y in range(app.table.size.height)]
+        assert {strip.cell_length for strip in strips} == {app.table.size.width}
+        header, first = (strip.text for strip in strips[:2])
+        if size[0] >= 60:
+            assert header.index("models") + len("models") == first.index(" 2 ") + 2
+
+
+async def test_keys_and_mouse_move_the_cursor_and_escape_gives_it_back():
+    async with (app := Table()).run_test(size=(60, 11)) as pilot:
+        table = app.table
+        table.show(large(100))
+        table.focus()
+        await pilot.pause()
+        for key, row in (("end", 99), ("pageup", 89), ("up", 88), ("home", 0), ("pagedown", 10), ("down", 11)):
+            await pilot.press(key)
+            assert table.cursor_row == row
+            assert table.under_cursor.index == row
+        assert app.lines()[-1].startswith("12  without F")
+        assert table.chosen is table.under_cursor
+        table.follow()
+        assert table.chosen is None
+        await pilot.click(Candidates, offset=(4, 3))
+        assert (table.cursor_row, table.following) == (table.scroll_offset.y + 2, False)
+        await pilot.click(Candidates, offset=(4, 0))
+        assert table.cursor_row == table.scroll_offset.y + 2
+
+
+async def test_what_is_looked_at_stays_where_it_is():
+    async with (app := Table()).run_test(size=(60, 11)) as pilot:
+        table = app.table
+        table.show(large(10_000))
+        table.focus()
+        await pilot.press("end")
+        table.scroll_to(y=500, animate=False)
+        table.show(large(10_000, judged=700))
+        await pilot.pause()
+        assert (table.scroll_offset.y, table.cursor_row) == (500, 9_999)
+        assert app.lines()[1].startswith("501")
+        assert app.lines()[1].endswith("○ dissimilar")
+        # A trial more moves everything down by a row.
+        shown = large(10_000, judged=700)
+        table.show(replace(shown, state=shown.state.changed(trials=(Trial(1, (), 0),))))
+        await pilot.pause()
+        assert app.lines()[1].startswith("501")
+        assert table.under_cursor.index == 9_999
+
+
+async def test_of_many_rows_only_those_in_sight_are_made_into_text(monkeypatch):
+    made = []
+    monkeypatch.setattr(module, "words", lambda *args: made.append(args[2]) or words(*args))
+    async with (app := Table()).run_test(size=(60, 11)) as pilot:
+        app.table.show(large(10_000))
+        await pilot.pause()
+        assert set(made) == set(range(10))
+        refreshed = []
+        monkeypatch.setattr(app.table, "refresh", lambda *regions, **_: refreshed.extend(regions))
+        app.table.show(large(10_000))
+        assert refreshed == []
+        app.table.show(large(10_000, judged=1))
+        assert [region.y for region in refreshed] == [1]
+
+
+async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):
+    monkeypatch.setenv("NO_COLOR", "1")
+    fake_run.mid_round(run).write("vetoed", candidate=3, verdict="vetoed")
+    async with (app := Table()).run_test(size=(60, 11)) as pilot:
+        app.table.show(snapshot(run))
+        await pilot.press("down")
+        assert app.lines()[4].endswith("⊘ vetoed")
+        reversed_rows = [
+            y for y in range(1, 7) if all(each.style.reverse for each in app.table.render_line(y) if each.text.strip())
+        ]
+        assert reversed_rows == [1 + app.table.cursor_row]

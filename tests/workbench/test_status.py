@@ -1,0 +1,112 @@
+"""The lines above and below the panels."""
+
+from dataclasses import replace
+
+import fake_run
+import pytest
+from textual.app import App
+
+from ddenv import __version__
+from ddenv.runfile.fold import fold
+from ddenv.runfile.guiding import Node
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.widgets.status import Header, Status, branch_of, cut_tests, facts, fitted, heading
+
+
+def snapshot(run, engine="alive", **changes) -> Snapshot:
+    return Snapshot(fold(run.file.events()).changed(**changes), tuple(run.file.live()), engine, spent=83)
+
+
+def said(shown, width=200, **more):
+    return dict(fitted(facts(shown, **more), width))
+
+
+def test_everything_is_said_where_there_is_room(run):
+    shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
+    told = said(shown, scene="http://127.0.0.1:7000/static/", asked="pause", cut=3)
+    assert list(told) == ["state", "asked", "tests", "cut", "time", "left", "mode", "engine", "scene"]
+    assert told["state"] == "▶ running"
+    assert told["tests"] == "10 tests: 4 similar 4 pass 2 other"
+    assert (told["cut"], told["time"], told["engine"]) == ("3 ended early", "1 min 23 s", "engine ●")
+    assert told["left"].startswith("about ")
+    assert " (" in told["left"]
+
+
+@pytest.mark.parametrize("width", [120, 100, 80, 64, 40])
+def test_the_least_important_goes_first(run, width):
+    shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
+    told = said(shown, width, asked="pause", cut=3)
+    assert sum(len(words) + 3 for words in told.values()) <= width
+    assert told["state"] == "▶ running"
+    assert ("cut" in told) <= ("time" in told) <= ("left" in told) <= ("tests" in told)
+
+
+def test_of_a_paused_run_the_tests_are_told_that_are_left(run):
+    fake_run.mid_round(run).write("paused")
+    assert said(snapshot(run))["left"].split(" (")[0].endswith("tests left")
+    assert "left" not in said(snapshot(fake_run.finished(fake_run.FakeRun(run.path.with_name("b.ddenv")))))
+
+
+def test_a_budget_is_told_with_the_tests(run):
+    state = snapshot(fake_run.mid_round(run)).state
+    scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": 12}}
+    told = said(snapshot(run, scenario=scenario))
+    assert told["tests"].startswith("10 of 12 tests")
+
+
+def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
+    fake_run.mid_round(run)
+    assert said(snapshot(run, "absent"))["state"] == "✗ engine is gone: r resumes"
+    assert said(snapshot(run, engine_version=__version__))["engine"] == "engine ●"
+    assert said(snapshot(run, engine_version="0.0.9"))["engine"] == "engine ● 0.0.9, older"
+    assert said(snapshot(run, engine_version="99.0"))["engine"] == "engine ● 99.0, newer"
+    assert said(snapshot(run, "absent", status="stopped"))["engine"] == "engine ○ off: r resumes"
+    assert said(replace(snapshot(run, "absent"), gone=True))["state"] == "✗ the run file is gone"
+
+
+def test_tests_that_were_ended_early_are_counted_as_they_come(run):
+    tests = snapshot(fake_run.mid_round(run)).state.tests
+    cut = PersistentTuple.of(replace(test, cut=test.id % 3 == 0) for test in tests)
+    once = cut_tests(cut, tests, 0)
+    assert once == 4
+    changed = cut.changed(0, replace(cut[0], distance=1.0)).added(replace(cut[0], id=len(cut) + 1, cut=True))
+    assert cut_tests(changed, cut, once) == 5
+    assert cut_tests(tests, changed, 5) == 0
+
+
+def nodes(*parents, rejected=()):
+    return tuple(Node(number, parent, "", "", (), rejected=number in rejected) for number, parent in enumerate(parents))
+
+
+def test_a_branch_is_told_unless_it_is_the_newest(run):
+    # 0 - 1 - 2, and from 1 later 3 - 4.
+    tree = nodes(None, 0, 1, 1, 3)
+    state = snapshot(fake_run.mid_round(run)).state
+    assert [branch_of(state.changed(nodes=tree, node=node)) for node in range(5)] == [None, None, 1, None, None]
+    undone = nodes(None, 0, 1, rejected={2})
+    assert branch_of(state.changed(nodes=undone, node=1)) is None
+    assert heading(state.changed(nodes=tree, node=2)).rights[0].startswith("branch 1 · round 2")
+    assert "2 pinned" in heading(state.changed(pinned=frozenset(state.elements[:2]))).rights[0]
+
+
+class Lines(App):
+    def compose(self):
+        yield Header()
+        yield Status()
+
+
+@pytest.mark.parametrize("width", [20, 64, 80, 120])
+async def test_lines_fit_and_are_drawn_only_when_they_changed(run, width, monkeypatch):
+    shown = snapshot(fake_run.mid_round(run), pinned=frozenset({"crate_00"}), nodes=nodes(None, 0, 0), node=1)
+    async with (app := Lines()).run_test(size=(width, 4)) as pilot:
+        header, status = app.query_one(Header), app.query_one(Status)
+        header.show(shown)
+        status.show(shown)
+        await pilot.pause()
+        assert header.render().cell_len <= max(width, 25)
+        drawn = []
+        for widget in (header, status):
+            monkeypatch.setattr(widget, "refresh", lambda *_, **__: drawn.append(1))
+            widget.show(replace(shown, live=()))
+        assert drawn == []
