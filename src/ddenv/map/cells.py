@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ddenv.map.paint import RGB, Canvas, blend, packed, readable
+from ddenv.map.paint import PLAIN, RGB, Canvas, blend, packed, readable
 from ddenv.map.plan import Drawn
 from ddenv.map.raster import EMPTY, View, label_cells, masks, owners
 
 # One for each model, the largest first: no S and G, which mark start and goal, and none that looks like another one.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
-# Packed colour that stands for the terminal's own.
-PLAIN = -1
 NO_SIGN, FLOORS = "+", ".:"
 HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
 GREY: RGB = (120, 120, 124)
@@ -43,18 +41,11 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool) -> Canvas:
         _blocks(canvas, grid, fills)
     else:
         _letters(canvas, grid, models, letters)
-    for cell, sign, fill in zip(_cells(models, grid, view), letters, fills, strict=True):
-        if cell and sign:
-            canvas.put(cell, sign, readable(fill) if color else PLAIN, fill if color else None)
-    return canvas
-
-
-def _cells(models: Sequence[Drawn], grid: np.ndarray, view: View) -> Iterator[tuple[int, int] | None]:
-    """Where each model's sign stands; one that is only seen in the lower half of cells takes those."""
     centers = view.pixels(np.array([each.outline.center for each in models]).reshape(-1, 2))
-    for index, cell in enumerate(label_cells(grid, centers)):
-        lower = np.argwhere(grid[1::2] == index) if cell is None else ()
-        yield (int(lower[0][0]), int(lower[0][1])) if len(lower) else cell
+    for (row, column), sign, fill in zip(label_cells(grid, centers).tolist(), letters, fills, strict=True):
+        if row >= 0 and sign:
+            canvas.put((row, column), sign, readable(fill) if color else PLAIN, fill if color else None)
+    return canvas
 
 
 def _fill(each: Drawn, index: int) -> int:

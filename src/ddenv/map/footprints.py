@@ -47,6 +47,21 @@ class Footprint:
         """Of the rectangle around it, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
+    def distance(self, point: tuple[float, float]) -> float:
+        """From a point to the nearest polygon, m; 0 inside of one. Without polygons, to where the model is."""
+        if not self.polygons:
+            return math.dist(self.center, point)
+        return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
+
+
+def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
+    sides, away = np.roll(polygon, -1, axis=0) - polygon, point - polygon
+    if len(polygon) > 2 and (sides[:, 0] * away[:, 1] >= sides[:, 1] * away[:, 0]).all():
+        return 0.0
+    lengths = np.einsum("ij,ij->i", sides, sides)
+    along = np.einsum("ij,ij->i", sides, away) / np.where(lengths > 0, lengths, 1.0)
+    return float(np.linalg.norm(away - np.clip(along, 0.0, 1.0)[:, None] * sides, axis=1).min())
+
 
 def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
     """Footprints of all models but the ground, the largest first, so that small ones can be drawn on top."""

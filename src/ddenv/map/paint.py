@@ -20,6 +20,14 @@ HUES: tuple[RGB, ...] = (
     (140, 140, 250),
     (150, 200, 90),
 )
+# Packed colour that stands for the terminal's own, and what is added to the number of one of its sixteen.
+PLAIN, NUMBERED = -1, 1 << 24
+BLACK, WHITE = 0x000000, 0xFFFFFF
+# So much brighter or darker than its ground a dot must be, of 255.
+LEAST_APART = 70
+# Blocks that fill their cells, whatever is behind them: what is put over them stands on their own colour.
+FILLED = np.array([ord(char) for char in "█▉▇"], dtype=np.uint32)
+_BRIGHT = frozenset({2, 3, 6, 7, 10, 11, 13, 14, 15})
 
 
 def blend(back: RGB, front: RGB, amount: float) -> RGB:
@@ -34,9 +42,29 @@ def packed(color: RGB) -> int:
 
 
 def readable(back: int) -> int:
-    """Black or white, whichever reads better on a packed colour."""
-    luminance = 0.3 * (back >> 16) + 0.59 * (back >> 8 & 255) + 0.11 * (back & 255)
-    return 0x000000 if luminance > 110 else 0xFFFFFF
+    """Black or white, whichever reads better on a packed colour; on the terminal's own, its own."""
+    if back < 0:
+        return PLAIN
+    if back >= NUMBERED:
+        return NUMBERED | (0 if back - NUMBERED in _BRIGHT else 15)
+    return BLACK if luminance(back) > 110 else WHITE
+
+
+def _apart(backs: np.ndarray, color: int) -> np.ndarray:
+    """`color` on each of the packed colours, or black or white on those that are too near to it."""
+    colors = np.full(len(backs), color, dtype=np.int32)
+    if not 0 <= color < NUMBERED:
+        return colors
+    mixed = (backs >= 0) & (backs < NUMBERED)
+    bright = luminance(backs)
+    near = mixed & (abs(bright - luminance(color)) < LEAST_APART)
+    colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
+    return colors
+
+
+def luminance(color: int | np.ndarray) -> float | np.ndarray:
+    """How bright a packed colour is, or each of many, 0..255."""
+    return 0.3 * (color >> 16) + 0.59 * (color >> 8 & 255) + 0.11 * (color & 255)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +78,13 @@ class Run:
 
 
 class Canvas:
-    """`chars` are code points, `fore` and `back` packed colours, all of shape (rows, columns)."""
+    """`chars` are code points, `fore` and `back` packed colours (or PLAIN, or NUMBERED), all of shape (rows, columns)."""
 
-    def __init__(self, rows: int, columns: int, back: RGB) -> None:
+    def __init__(self, rows: int, columns: int, back: RGB | int) -> None:
+        color = back if isinstance(back, int) else packed(back)
         self.chars = np.full((rows, columns), ord(" "), dtype="<u4")
-        self.fore = np.full((rows, columns), packed(back), dtype=np.int32)
-        self.back = np.full((rows, columns), packed(back), dtype=np.int32)
+        self.fore = np.full((rows, columns), color, dtype=np.int32)
+        self.back = np.full((rows, columns), color, dtype=np.int32)
         self.bold = np.zeros((rows, columns), dtype=bool)
 
     def copy(self) -> Canvas:
@@ -73,29 +102,32 @@ class Canvas:
             place = row, column + offset
             if back is not None:
                 self.back[place] = back
+            elif self.chars[place] in FILLED:
+                self.back[place] = self.fore[place]
             self.chars[place] = ord(char)
             self.fore[place] = readable(int(self.back[place])) if color is None else color
             self.bold[place] = True
 
     def dots(self, bits: np.ndarray, color: int) -> None:
-        """Braille dots over whatever fills their cells."""
+        """Braille dots over whatever fills their cells, in black or white where their colour could not be told from it."""
         touched = bits > 0
+        filled = touched & np.isin(self.chars, FILLED)
+        self.back[filled] = self.fore[filled]
         self.chars[touched] = 0x2800 + bits[touched].astype(np.uint32)
-        self.fore[touched] = color
+        self.fore[touched] = _apart(self.back[touched], color)
         self.bold[touched] = False
 
     def changed_rows(self, other: Canvas | None) -> list[int]:
         """The rows in which this differs from `other`."""
-        rows = range(self.chars.shape[0])
         if other is None or other.chars.shape != self.chars.shape:
-            return list(rows)
+            return list(range(self.chars.shape[0]))
         same = (
             (self.chars == other.chars)
             & (self.fore == other.fore)
             & (self.back == other.back)
             & (self.bold == other.bold)
         )
-        return [row for row in rows if not same[row].all()]
+        return np.flatnonzero(~same.all(axis=1)).tolist()
 
     def text(self, row: int) -> str:
         """A row without its colours."""

@@ -9,17 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ddenv.map.footprints import Footprint
+from ddenv.map.spans import Outlines, Spans, pack, rows_of
 
 EMPTY = -1
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
 DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
 ARROWS = "→↗↑↖←↙↓↘"
-# No closer than this, whatever is asked for, m for one pixel.
-FINEST = 0.002
+# No closer and no farther than this, whatever is asked for, m for one pixel.
+FINEST, COARSEST = 0.002, 1e6
+MOST_PIXELS = 2_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +48,28 @@ class View:
             return None
         return int(half // 2), int(column)
 
-    def zoomed(self, factor: float) -> View:
-        """The same centre, `factor` times closer."""
-        return View(self.x, self.y, max(FINEST, self.scale / factor), self.columns, self.rows)
+    def point(self, cell: tuple[int, int]) -> tuple[float, float]:
+        """The middle of a cell (row, column), m."""
+        row, column = cell
+        return (
+            self.x + (column + 0.5 - self.columns / 2) * self.scale,
+            self.y + (self.rows - 2 * row - 1) * self.scale,
+        )
+
+    def zoomed(self, factor: float, about: tuple[float, float] | None = None) -> View:
+        """`factor` times closer; the point `about` (m) stays where it is seen, else the centre does."""
+        scale = min(COARSEST, max(FINEST, self.scale / factor))
+        x, y = about or (self.x, self.y)
+        part = scale / self.scale
+        return View(x + (self.x - x) * part, y + (self.y - y) * part, scale, self.columns, self.rows)
+
+    def around(self, x: float, y: float) -> View:
+        """As close, with (x, y) m in the middle."""
+        return View(x, y, self.scale, self.columns, self.rows)
+
+    def panned(self, columns: float, rows: float) -> View:
+        """So many cells to the right and upwards."""
+        return self.around(self.x + columns * self.scale, self.y + 2 * rows * self.scale)
 
 
 def fit(
@@ -69,88 +91,102 @@ def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -
 
     Huge is a model several times larger than the area that the points and the other models span.
     """
-    low, high = np.array([math.inf] * 2), np.array([-math.inf] * 2)
-    for point in points:
-        low, high = np.minimum(low, point), np.maximum(high, point)
+    corners = np.array([point for point in points if len(point)], dtype=float).reshape(-1, 2)
+    boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(-1, 5)
     # Small models first: each one decides with those before it whether the next is huge.
-    for each in sorted(prints, key=lambda each: each.area):
-        spans = np.maximum(high - low, 4.0)
-        if np.isfinite(low).all() and each.area > 4 * spans[0] * spans[1]:
-            break
-        low, high = np.minimum(low, each.low), np.maximum(high, each.high)
+    boxes = boxes[np.argsort(boxes[:, 4], kind="stable")]
+    least, most = corners.min(axis=0, initial=math.inf), corners.max(axis=0, initial=-math.inf)
+    lows = np.minimum.accumulate(np.vstack([least, boxes[:, :2]]))
+    highs = np.maximum.accumulate(np.vstack([most, boxes[:, 2:4]]))
+    with np.errstate(invalid="ignore"):
+        spread = np.maximum(highs - lows, 4.0)[:-1]
+    huge = np.flatnonzero(np.isfinite(lows[:-1]).all(axis=1) & (boxes[:, 4] > 4 * spread[:, 0] * spread[:, 1]))
+    last = huge[0] if len(huge) else -1
+    low, high = lows[last], highs[last]
     if not np.isfinite(low).all():
         return np.array([-5.0, -5.0]), np.array([5.0, 5.0])
     return low, high
 
 
-def masks(prints: Sequence[Footprint], view: View) -> list[np.ndarray]:
-    """For each model the pixels it fills, as flat indices into a grid of (2 rows, columns)."""
-    grid = np.zeros((2 * view.rows, view.columns), dtype=bool)
-    filled = []
-    for each in prints:
-        grid[:] = False
-        for polygon in each.polygons:
-            _fill(grid, view.pixels(polygon))
-        # A model smaller than a pixel still shows.
-        column, half = view.pixels(np.array([each.center]))[0]
-        seen = 0 <= column < view.columns and 0 <= half < 2 * view.rows
-        if seen and (each.area < 4 * view.scale**2 or not each.polygons):
-            grid[int(half), int(column)] = True
-        filled.append(np.flatnonzero(grid))
-    return filled
+def masks(prints: Sequence[Footprint], view: View) -> Spans:
+    """The pixels that each model fills, in a grid of (2 rows, columns)."""
+    return spans(pack(prints), view)
 
 
-def owners(filled: Sequence[np.ndarray], view: View, drawn: Iterable[int] | None = None) -> np.ndarray:
-    """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (all, in order), else EMPTY."""
+def spans(outlines: Outlines, view: View) -> Spans:
+    """The same of models that are packed already."""
+    width, height = view.columns, 2 * view.rows
+    polygon, row, left, right = rows_of(view.pixels(outlines.corners), outlines, width, height)
+    # A model smaller than a pixel still shows.
+    tiny = np.flatnonzero((outlines.areas < 4 * view.scale**2) | outlines.bare)
+    middle = view.pixels(outlines.centers[tiny])
+    seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
+    tiny, dots = tiny[seen], middle[seen].astype(np.intp)
+    models = np.concatenate([outlines.models[polygon], tiny])
+    starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
+    lengths = np.concatenate([right - left + 1, np.ones(len(tiny), dtype=np.intp)])
+    order = np.argsort(models, kind="stable")
+    return Spans(models[order], starts[order], lengths[order], len(outlines.areas))
+
+
+def owners(filled: Spans, view: View, drawn: Iterable[int] | None = None) -> np.ndarray:
+    """The model on each pixel, shape (2 rows, columns): of the `drawn` ones (or all) that fill it the last, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
-    for index in range(len(filled)) if drawn is None else drawn:
-        grid[filled[index]] = index
+    models, starts, lengths = filled.models, filled.starts, filled.lengths
+    if drawn is not None:
+        wanted = np.zeros(filled.count, dtype=bool)
+        wanted[list(drawn) if not isinstance(drawn, np.ndarray) else drawn] = True
+        some = wanted[models]
+        models, starts, lengths = models[some], starts[some], lengths[some]
+    ends = np.cumsum(lengths)
+    # Large models on top of each other are many pixels: a part of them at a time.
+    cuts = np.searchsorted(ends, np.arange(0, ends[-1] if len(ends) else 0, MOST_PIXELS))
+    for start, stop in pairwise([*np.unique(cuts).tolist(), len(ends)]):
+        part = slice(start, stop)
+        first = ends[part] - lengths[part]
+        pixels = np.arange(first[0], ends[stop - 1]) + np.repeat(starts[part] - first, lengths[part])
+        # Of several values for one pixel the last one stays.
+        grid[pixels] = np.repeat(models[part], lengths[part])
     return grid.reshape(2 * view.rows, view.columns)
 
 
-def label_cells(grid: np.ndarray, centers: np.ndarray) -> list[tuple[int, int] | None]:
-    """The cell for each model's letter: of those it fills, the one nearest to its centre (pixels); None if none is free."""
-    owned = np.where(grid[0::2] == grid[1::2], grid[0::2], EMPTY)
-    loose = grid[0::2]
-    cells: list[tuple[int, int] | None] = []
-    for index in range(len(centers)):
-        rows, columns = np.nonzero(owned == index)
-        if not len(rows):
-            rows, columns = np.nonzero(loose == index)
-        if not len(rows):
-            cells.append(None)
-            continue
-        away = (columns + 0.5 - centers[index, 0]) ** 2 + (2 * rows + 1 - centers[index, 1]) ** 2
-        best = int(np.argmin(away))
-        cells.append((int(rows[best]), int(columns[best])))
+def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
+    """The cell (row, column) for each model's letter, shape (N, 2): of those it fills, the one nearest to its centre (pixels).
+
+    One that fills no cell takes an upper half, or else a lower one; -1 where it is not seen.
+    """
+    upper, lower = grid[0::2], grid[1::2]
+    cells = _nearest(np.where(upper == lower, upper, EMPTY), centers)
+    for halves in (upper, lower):
+        missing = cells[:, 0] < 0
+        if missing.any():
+            cells[missing] = _nearest(halves, centers)[missing]
     return cells
 
 
-def _fill(grid: np.ndarray, corners: np.ndarray) -> None:
-    """Sets the pixels whose centres lie in a convex polygon of pixel coordinates."""
-    height, width = grid.shape
-    if not np.isfinite(corners).all() or len(corners) < 3:
-        return
-    low = np.clip(np.floor(corners.min(axis=0)), 0, (width, height)).astype(int)
-    high = np.clip(np.ceil(corners.max(axis=0)), 0, (width, height)).astype(int)
-    if (low >= high).any():
-        return
-    xs = np.arange(low[0], high[0]) + 0.5
-    ys = np.arange(low[1], high[1])[:, None] + 0.5
-    inside = np.ones((high[1] - low[1], high[0] - low[0]), dtype=bool)
-    # Anticlockwise in the world is clockwise in pixels, whose y points down.
-    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        inside &= (bx - ax) * (ys - ay) - (by - ay) * (xs - ax) <= 1e-9
-    grid[low[1] : high[1], low[0] : high[0]] |= inside
+def _nearest(owned: np.ndarray, centers: np.ndarray) -> np.ndarray:
+    cells = np.full((len(centers), 2), -1, dtype=np.intp)
+    rows, columns = np.nonzero(owned != EMPTY)
+    who = owned[rows, columns]
+    away = (columns + 0.5 - centers[who, 0]) ** 2 + (2 * rows + 1 - centers[who, 1]) ** 2
+    # The last of several values stays: that is the nearest, and of equally near ones the first.
+    order = np.argsort(away, kind="stable")[::-1]
+    cells[who[order]] = np.column_stack([rows[order], columns[order]])
+    return cells
 
 
-def braille(points: np.ndarray, view: View) -> np.ndarray:
-    """The braille bits of each cell that the polyline through (N, 2) points in m touches, shape (rows, columns), uint8."""
+def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
+    """The braille bits of each cell that the polyline through (N, 2) points in m touches, shape (rows, columns), uint8.
+
+    With `dash` so many dots are left out after as many.
+    """
     cells = np.zeros((view.rows, view.columns), dtype=np.uint8)
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return cells
     dots = _dense(view.pixels(points) * 2)
+    if dash:
+        dots = dots[np.arange(len(dots)) // dash % 2 == 0]
     x, y = dots[:, 0], dots[:, 1]
     seen = (x >= 0) & (y >= 0) & (x < 2 * view.columns) & (y < 4 * view.rows)
     x, y = x[seen], y[seen]

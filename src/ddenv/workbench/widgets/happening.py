@@ -16,10 +16,14 @@ class Happening(Widget):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._explanation = Explanation(None, ())
+        self._snapshot: Snapshot | None = None
         self.trouble = ""
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
+        if snapshot is self._snapshot and trouble == self.trouble:
+            return
+        self._snapshot = snapshot
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
             self._explanation, self.trouble = explanation, trouble

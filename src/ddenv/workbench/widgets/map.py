@@ -1,286 +1,217 @@
-"""The world from above, with the run drawn over it: parts, paths, start, goal, f and the robots that drive now."""
+"""The map of a run: the world from above, where a crosshair, keys and the mouse point at models and places."""
 
 from __future__ import annotations
 
-from array import array
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from rich.segment import Segment
 from rich.text import Text
-from textual import events
 from textual.binding import Binding
-from textual.geometry import Region
-from textual.strip import Strip
+from textual.message import Message
 from textual.widget import Widget
 
-from ddenv.map.footprints import Footprint
-from ddenv.map.paint import RGB, Canvas, blend, packed
-from ddenv.map.raster import View, arrow, braille, fit, heading, label_cells, masks, owners
+from ddenv.map.letters import Cell
+from ddenv.map.raster import EMPTY, View
 from ddenv.runfile.state import Candidate
-from ddenv.runfile.store import COLUMNS
 from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.widgets.looks import REMOVED, Kept, fill, ghosts, kept, looks
-from ddenv.workbench.widgets.strips import strip
+from ddenv.workbench.widgets.described import describe
+from ddenv.workbench.widgets.overview import LAYERS, Overview, Place
+from ddenv.workbench.wording import plain
 
-Point = tuple[float, float]
-LEGEND = (
-    ("S", "start"),
-    ("G", "goal"),
-    ("×", "f"),
-    ("⠒", "path"),
-    ("↗", "robot"),
-    ("·", "removed"),
-    ("#", "protected"),
-)
+if TYPE_CHECKING:
+    from ddenv.runfile.guiding import Trial
+
+__all__ = ["LAYERS", "Place", "WorldMap"]
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
-
-    `elements` are the names of the models that may be removed.
-    """
-
-    prints: tuple[Footprint, ...] = ()
-    spawn: tuple[float, float, float] | None = None
-    goal: Point | None = None
-    elements: frozenset[str] = frozenset()
-
-
-@dataclass(slots=True)
-class _Still:
-    """What changes only with the view or the environment, kept between frames."""
-
-    view: View | None = None
-    filled: list[np.ndarray] = field(default_factory=list)
-    centers: np.ndarray | None = None
-    who: Kept | None = None
-    canvas: Canvas | None = None
-    labels: list[tuple[tuple[int, int], str]] = field(default_factory=list)
-
-
-class WorldMap(Widget, can_focus=True):
-    """Top-down map. Give it a `Place`, then snapshots; arrow keys pan it."""
+class WorldMap(Overview, can_focus=True):
+    """Top-down map. Give it a `Place`, then snapshots. While it is `picking`, enter and clicks choose places, not models."""
 
     BINDINGS: ClassVar = [
-        Binding("left", "pan(-1, 0)", "pan", show=False, id="map.left", tooltip="move the map to the left"),
-        Binding("right", "pan(1, 0)", "pan", show=False, id="map.right", tooltip="move the map to the right"),
-        Binding("up", "pan(0, 1)", "pan", show=False, id="map.up", tooltip="move the map up"),
-        Binding("down", "pan(0, -1)", "pan", show=False, id="map.down", tooltip="move the map down"),
+        Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
+        Binding("right", "move(1, 0)", "move", show=False, id="map.right", tooltip="crosshair to the right"),
+        Binding("up", "move(0, 1)", "move", show=False, id="map.up", tooltip="crosshair up"),
+        Binding("down", "move(0, -1)", "move", show=False, id="map.down", tooltip="crosshair down"),
+        Binding("shift+left", "pan(-1, 0)", "pan", show=False, id="map.pan_left", tooltip="move the map to the left"),
+        Binding("shift+right", "pan(1, 0)", "pan", show=False, id="map.pan_right", tooltip="move the map to the right"),
+        Binding("shift+up", "pan(0, 1)", "pan", show=False, id="map.pan_up", tooltip="move the map up"),
+        Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
+        Binding("enter", "pick", "select", id="map.pick", tooltip="select the model under the crosshair, or no longer"),
+        Binding(
+            "left_square_bracket",
+            "neighbour(-1)",
+            "previous model",
+            show=False,
+            id="map.previous",
+            key_display="[",
+            tooltip="crosshair to the previous model",
+        ),
+        Binding(
+            "right_square_bracket",
+            "neighbour(1)",
+            "next model",
+            show=False,
+            id="map.next",
+            key_display="]",
+            tooltip="crosshair to the next model",
+        ),
     ]
+
+    @dataclass
+    class Pointed(Message):
+        """The crosshair is on another model, or on none."""
+
+        model: str | None
+
+    @dataclass
+    class SelectionChanged(Message):
+        """Other models are selected by hand."""
+
+        models: frozenset[str]
+
+    @dataclass
+    class PlacePicked(Message):
+        """A place was chosen, m."""
+
+        x: float
+        y: float
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
-        self.place = Place()
-        self.snapshot = Snapshot()
-        self.candidate: Candidate | None = None
-        self.notice = "reading the world ..."
-        self._view: View | None = None
-        self._fitted = True
-        self._still = _Still()
-        self._canvas: Canvas | None = None
-        self._path: tuple[array | None, np.ndarray] = (None, np.zeros((0, 2)))
-        self._trails: dict[int, list[Point]] = {}
+        self._picking = False
+        self._numbers: dict[str, int] = {}
+        # The model that the crosshair was sent to, with where it was then: it may be hidden by another one.
+        self._aim: tuple[str, Cell, View] | None = None
+        self._pointed: str | None = None
+        self._told: tuple = ()
 
-    # What is shown.
+    @property
+    def picking(self) -> bool:
+        """Whether enter and clicks choose places."""
+        return self._picking
+
+    @picking.setter
+    def picking(self, picking: bool) -> None:
+        self._picking = picking
+        self.draw()
+
+    @property
+    def aims(self) -> bool:
+        return self.has_focus or self._picking
 
     def set_place(self, place: Place, notice: str = "") -> None:
-        """Another world. `notice` is shown instead of a map when there is none."""
-        self.place, self.notice = place, notice
-        self._fitted = True
-        self._still, self._canvas = _Still(), None
-        self._refit()
-        self.refresh()
+        self._numbers = {each.name: number for number, each in enumerate(place.prints)}
+        self._aim = None
+        super().set_place(place, notice)
 
-    def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
-        """Other start (x, y, yaw) and goal in the same world."""
-        self.place = replace(self.place, spawn=spawn, goal=goal)
-        self._refit()
+    def show(self, snapshot: Snapshot, candidate: Candidate | Trial | None) -> None:
+        if self.selection and snapshot.state.environment is not self.snapshot.state.environment:
+            self.select(self.selection.intersection(snapshot.state.environment))
+        super().show(snapshot, candidate)
 
-    def show(self, snapshot: Snapshot, candidate: Candidate | None) -> None:
-        """The run as it is now; `candidate` is the one whose models stand out."""
-        new_path = snapshot.evidence is not self.snapshot.evidence
-        self.snapshot, self.candidate = snapshot, candidate
-        self._follow(snapshot)
-        if new_path:
-            rows = np.array(snapshot.evidence if snapshot.evidence is not None else [], dtype=float)
-            self._path = (snapshot.evidence, rows.reshape(-1, COLUMNS)[:, 1:3])
-            self._refit()
-        self._redraw()
+    # Models.
 
-    def _follow(self, snapshot: Snapshot) -> None:
-        trails: dict[int, list[Point]] = {}
-        for live in snapshot.live:
-            trail = self._trails.get(live.test, [])
-            point = (live.pose[0], live.pose[1])
-            if not trail or trail[-1] != point:
-                trail.append(point)
-            trails[live.test] = trail
-        self._trails = trails
+    @property
+    def model_at_cursor(self) -> str | None:
+        """The name of the model under the crosshair."""
+        if self._aim is not None and self._aim[1:] == (self.cursor, self._view):
+            return self._aim[0]
+        drawn = self._picture
+        if drawn is None or not drawn.holds(self.cursor):
+            return None
+        owner = drawn.owner(self.cursor)
+        return None if owner == EMPTY else self.place.prints[owner].name
 
-    # Which part of the world.
+    def describe(self, name: str, columns: int = 0) -> Text:
+        """What is known of a model, on one line of at most so many `columns`; empty for one that is not there."""
+        number = self._numbers.get(name)
+        return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
-    def zoom(self, factor: float) -> None:
-        """Closer by `factor`, about the middle of the map."""
-        if self._view is not None:
+    def go_to(self, name: str) -> bool:
+        """The crosshair to a model, and the map to where it is; False if there is no such model."""
+        number, view = self._numbers.get(name), self._view
+        if number is None or view is None:
+            return False
+        center = self.place.prints[number].center
+        current = self._picture is not None and self._seen is not None and self._seen.view == view
+        cell = (self._picture.cells.get(number) if current else None) or view.cell(*center)
+        if cell is None:
             self._fitted = False
-            self._view = self._view.zoomed(factor)
-            self._redraw()
+            self._view = view.around(*center)
+            cell = self._view.cell(*center)
+        self.cursor = cell or self.cursor
+        self._aim = (name, self.cursor, self._view)
+        self.draw()
+        return True
 
-    def fit(self) -> None:
-        """Shows all that matters again."""
-        self._fitted = True
-        self._refit()
-        self._redraw()
+    def select(self, names: Iterable[str]) -> None:
+        """These models instead of those selected so far."""
+        selection = frozenset(names)
+        if selection != self.selection:
+            self.selection = selection
+            self.post_message(self.SelectionChanged(selection))
+            self.draw()
 
-    def action_pan(self, right: int, up: int) -> None:
-        view = self._view
-        if view is not None:
-            self._fitted = False
-            dx, dy = right * view.scale * view.columns / 8, up * view.scale * view.rows / 4
-            self._view = View(view.x + dx, view.y + dy, view.scale, view.columns, view.rows)
-            self._redraw()
+    def clear_selection(self) -> None:
+        """No model is selected any more."""
+        self.select(())
 
-    def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
-        event.stop()
-        self.zoom(1.25)
+    def action_neighbour(self, step: int) -> None:
+        """The model before or after the one under the crosshair, in the order of the world."""
+        state = self.snapshot.state
+        left = frozenset(state.environment)
+        names = [name for name in state.elements if name in left] or list(self._numbers)
+        here = self.model_at_cursor
+        if here in names:
+            self.go_to(names[(names.index(here) + step) % len(names)])
+        elif names:
+            self.go_to(names[0 if step > 0 else -1])
 
-    def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
-        event.stop()
-        self.zoom(0.8)
+    def clicked(self) -> None:
+        self._aim = None
+        self.action_pick()
 
-    def on_resize(self) -> None:
-        self._refit()
-        self._redraw()
-
-    def _refit(self) -> None:
-        columns, rows = self.size
-        if not columns or not rows:
+    def action_pick(self) -> None:
+        """Chooses the place under the crosshair, or else its model."""
+        name, state = self.model_at_cursor, self.snapshot.state
+        if self._picking and self._view is not None:
+            self.post_message(self.PlacePicked(*(round(value, 3) for value in self._view.point(self.cursor))))
+        elif name is None or not state.elements:
             return
-        if self._fitted or self._view is None:
-            points = [(float(x), float(y)) for x, y in self._path[1] if np.isfinite((x, y)).all()]
-            points += [point for point in (self._start(), self.place.goal, self._failure()) if point]
-            self._view = fit(self.place.prints, points, columns, rows, margin=0.4)
+        elif name in state.environment:
+            self.select(self.selection ^ {name})
         else:
-            self._view = View(self._view.x, self._view.y, self._view.scale, columns, rows)
-        self._redraw()
+            why = "removed already" if name in state.elements else "protected: it always stays"
+            self.notify(f"{plain(name)} is {why}", severity="warning", markup=False)
 
-    def _start(self) -> Point | None:
-        spawn = self.place.spawn
-        return None if spawn is None else (spawn[0], spawn[1])
+    # What is told of them.
 
-    def _failure(self) -> Point | None:
-        base = self.snapshot.state.baseline
-        return None if base is None else (base.position[0], base.position[1])
+    def draw(self) -> None:
+        super().draw()
+        if self._view is not None and self.is_attached:
+            self._tell_pointed()
 
-    # Drawing.
+    def _tell_pointed(self) -> None:
+        """The model under the crosshair in the panel's lower border, else how wide the map is."""
+        model = self.model_at_cursor if self.aims else None
+        if model != self._pointed:
+            self._pointed = model
+            self.post_message(self.Pointed(model))
+        # Words take their time: only when something of what they tell changed.
+        place = self.cursor if self._picking else self.snapshot.state.evidence_test
+        told = (model, self._who[1], self._view, place, self.notice)
+        if told != self._told:
+            self._told = told
+            if isinstance(self.parent, Widget):
+                self.parent.border_subtitle = self._words(model)
 
-    def notify_style_update(self) -> None:
-        """Another theme: every colour is mixed with its background."""
-        super().notify_style_update()
-        self._still = _Still()
-        self._canvas = None
-        if self.is_attached:
-            self._redraw()
-
-    def _redraw(self) -> None:
-        """Draws a new frame, and has only the lines refreshed that changed."""
-        if self._view is None or not self.is_attached:
-            return
-        canvas = self._draw(self._view)
-        changed = canvas.changed_rows(self._canvas)
-        self._canvas = canvas
-        if changed:
-            self.refresh(*(Region(0, row, self.size.width, 1) for row in changed))
-        self._tell_scale()
-
-    def _draw(self, view: View) -> Canvas:
-        still, (back, fore) = self._models(view), self._colors()
-        canvas = still.canvas.copy()
-        focus = {test.id for test in self.snapshot.running if self._in_focus(test.candidate)}
-        canvas.dots(braille(self._path[1], view), packed(blend(back, fore, 0.75)))
-        for test, trail in self._trails.items():
-            color = (255, 215, 80) if test in focus or not focus else blend(back, fore, 0.5)
-            canvas.dots(braille(np.array(trail), view), packed(color))
-        for cell, label in still.labels:
-            canvas.put(cell, label)
-        self._marks(canvas, view)
-        for live in self.snapshot.live:
-            cell = view.cell(live.pose[0], live.pose[1])
-            bright = live.test in focus or not focus
-            shade = packed((255, 215, 80) if bright else blend(back, fore, 0.5))
-            canvas.put(cell, arrow(heading(live.pose[3:])), 0x000000, shade)
-        return canvas
-
-    def _in_focus(self, candidate: int | None) -> bool:
-        focus = self.snapshot.focus
-        return focus is not None and focus.index == candidate
-
-    def _models(self, view: View) -> _Still:
-        """The models as they stand, with the places of their letters."""
-        still, who, prints = self._still, kept(self.snapshot.state, self.candidate), self.place.prints
-        if not who.elements:
-            who = Kept(self.place.elements, self.place.elements)
-        if view != still.view:
-            centers = view.pixels(np.array([each.center for each in prints]).reshape(-1, 2))
-            still = self._still = _Still(view, masks(prints, view), centers)
-        if who == still.who:
-            return still
-        back, fore = self._colors()
-        canvas, how = Canvas(view.rows, view.columns, back), looks(prints, who, back, fore)
-        grid = owners(still.filled, view, np.flatnonzero(how.kinds != REMOVED))
-        fill(canvas, grid, how)
-        ghosts(
-            canvas,
-            owners(still.filled, view, np.flatnonzero(how.kinds == REMOVED)),
-            grid,
-            how,
-            packed(blend(back, fore, 0.35)),
-        )
-        cells = label_cells(grid, still.centers)
-        still.labels = [(cell, label) for cell, label in zip(cells, how.labels, strict=True) if cell and label]
-        still.who, still.canvas = who, canvas
-        return still
-
-    def _colors(self) -> tuple[RGB, RGB]:
-        """Background and text."""
-        return self.background_colors[1].rgb, self.colors[3].rgb
-
-    def _marks(self, canvas: Canvas, view: View) -> None:
-        """S, G and × on grounds of their own, so that they are found at once."""
-        marks = ((self._start(), "S", 0x1F6FEB), (self.place.goal, "G", 0x1A7F37), (self._failure(), "×", 0xCF222E))
-        for point, sign, ground in marks:
-            if point is not None and np.isfinite(point).all():
-                canvas.put(view.cell(*point), sign, 0xFFFFFF, ground)
-
-    def _tell_scale(self) -> None:
-        view = self._view
-        parent = self.parent
-        if view is not None and isinstance(parent, Widget) and self.place.prints:
-            parent.border_subtitle = Text(f"{view.columns * view.scale:.3g} m wide")
-
-    def render_line(self, y: int) -> Strip:
-        if self.notice:
-            return self._tell(y)
-        if self._canvas is None or y >= self._canvas.chars.shape[0]:
-            return Strip.blank(self.size.width, self.rich_style)
-        return strip(self._canvas, y)
-
-    def _tell(self, y: int) -> Strip:
-        lines = Text(self.notice, justify="center").wrap(self.app.console, max(1, self.size.width))
-        index = y - max(0, (self.size.height - len(lines)) // 2)
-        text = lines[index].plain if 0 <= index < len(lines) else ""
-        return Strip([Segment(text.center(self.size.width)[: self.size.width], self.rich_style)])
-
-
-def legend(width: int, *, parts: bool = True) -> Text:
-    """One line that says what the signs mean, as many as fit in `width`."""
-    text = Text(no_wrap=True, overflow="ellipsis")
-    entries = (("A B", "parts"), *LEGEND) if parts else LEGEND[:2]
-    for sign, meaning in entries:
-        if text.cell_len + len(sign) + len(meaning) + 3 > width:
-            break
-        text.append(f"{sign}", "bold").append(f" {meaning}  ", "dim")
-    return text
+    def _words(self, model: str | None) -> Text:
+        if self._picking:
+            x, y = self._view.point(self.cursor)
+            return Text(f"x {x:.2f}, y {y:.2f} m")
+        if model is not None:
+            return self.describe(model, self.size.width - 4)
+        if not self.place.prints:
+            return Text("" if self.notice else "this world has no models")
+        return Text(f"{self._view.columns * self._view.scale:.3g} m wide")

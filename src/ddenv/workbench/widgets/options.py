@@ -1,192 +1,281 @@
-"""The setup screen's form: the options of a run, with the place for complaints below them."""
+"""The setup screen's form: every setting of a run, with its meaning, and what it comes to."""
 
 from __future__ import annotations
 
-import math
 import os
 from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
-from textual import on
+from textual import events, on
 from textual.app import ComposeResult
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
+from textual.content import Content
 from textual.message import Message
+from textual.widget import Widget
 from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
 from ddenv.schemas import Kind
 from ddenv.workbench import form
-from ddenv.workbench.methods import chosen, uses
-from ddenv.workbench.widgets.schema import SchemaSelect
+from ddenv.workbench.meanings import Circumstances, cost, meaning, not_used
+from ddenv.workbench.methods import chosen, note, paragraph, uses
+from ddenv.workbench.widgets.schema import Explained, SchemaSelect
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
-    from ddenv.world.scenario import Reduction, Scenario
+    from ddenv.world.scenario import Scenario
 
-MODES = ("automatic", "ask")
-EARLY_STOP = "on: a test ends when the robot is stuck for good; full runs confirm what is left"
 MARK = "✗ "
 METHOD: dict[Kind, str] = {
     "algorithm": "how the environment is searched",
     "partitioning": "how the environment is split",
     "prioritization": "in which order the parts are tried",
 }
+MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
+FIELDS = {field.id: field for field in form.ALL}
 
 
 class OptionsForm(Vertical):
-    """Text fields by the ids of `ddenv.workbench.form`, the method, the accept mode, and Start."""
+    """Fields by the ids of `ddenv.workbench.form`, the method, the cost, the equivalent command, and Start."""
 
-    class PlaceEdited(Message):
-        """Spawn or goal were edited."""
+    class Edited(Message):
+        """A setting changed; `place` says that spawn or goal did."""
 
-    class Explain(Message):
-        """A name is looked at; `here` is what the scenario has set for it, a sentence or ""."""
-
-        def __init__(self, kind: Kind, name: str, here: str) -> None:
+        def __init__(self, place: bool = False) -> None:
             super().__init__()
-            self.kind, self.name, self.here = kind, name, here
+            self.place = place
+
+        def can_replace(self, message: Message) -> bool:
+            return isinstance(message, OptionsForm.Edited) and self.place >= message.place
 
     def __init__(self, *, id: str, classes: str) -> None:
         super().__init__(id=id, classes=classes)
         self._name_given = False
-        self._here: dict[str, str] = {}
-        self.border_title = "Options"
+        self._suggested = ""
+        # What stands in fields that were not opened yet: most never are, and the screen is up sooner without them.
+        self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
+        self.seconds: float | None = None
+        self.border_title = "Settings"
 
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="fields", can_focus=False):
-            for kind, tooltip in METHOD.items():
-                with Horizontal(classes="row"):
+            with Grid(id="method"):
+                for kind, tooltip in METHOD.items():
                     yield Label(kind, markup=False)
                     yield SchemaSelect(kind, tooltip)
-            with Grid(classes="grid"):
-                for field in form.OPTIONS:
-                    yield from _field(field)
-                yield Label("early stop", markup=False)
-                yield _select("early-stop", tuple(form.EARLY_STOP), EARLY_STOP)
-            with Grid(id="places", classes="grid"):
-                for field in form.PLACES:
-                    yield from _field(field)
-            with Horizontal(classes="row"):
-                yield from _field(form.NAME)
-        with Horizontal(classes="row", id="last"):
-            yield Label("accept", markup=False)
-            yield _select("accept", MODES, "take each reduction automatically, or ask before it")
-            yield Static("", id="gap")
+            yield _grid("basic", form.BASIC)
+            yield _grid("places", form.PLACES)
+            yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
+        yield Explained(id="explained")
+        with Horizontal(id="last"):
+            yield from _widgets((form.NAME, form.ACCEPT), {})
             yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
+        yield Static("", id="cost", markup=False)
+        yield Static("", id="command", markup=False)
         yield Static("", id="wrong", markup=False)
 
     def on_mount(self) -> None:
         self.query_one("#jobs", Input).value = _default_jobs()
-        self.ask_for_places(False)
+        self.tell("")
+
+    # What stands in it.
 
     @property
-    def method(self) -> dict[str, Any]:
-        """The chosen algorithm and pair, and whether tests may end early, by the scenario's keys."""
+    def method(self) -> tuple[str, str]:
+        """The chosen pair and algorithm."""
         names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
-        pair = f"{names['partitioning']}/{names['prioritization']}"
-        early = form.EARLY_STOP[str(self.query_one("#early-stop", Select).value)]
-        return {"algorithm": names["algorithm"], "pair": pair, "early_stop": early}
-
-    @property
-    def accept_mode(self) -> str:
-        return str(self.query_one("#accept", Select).value)
+        return f"{names['partitioning']}/{names['prioritization']}", names["algorithm"]
 
     @property
     def texts(self) -> dict[str, str]:
         """What stands in the fields, by id."""
-        return {field.id or "": field.value for field in self.query(Input)}
+        shown = {id: _text(self.query_one(f"#{id}")) for id in FIELDS if id not in self._unopened}
+        return self._unopened | shown
 
-    def place(self, what: str) -> tuple[float, ...]:
-        """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m). Raises FieldError."""
-        fields = tuple(field for field in form.PLACES if field.id.startswith(what))
-        numbers = tuple(form.values(fields, self.texts).values())
-        if not all(math.isfinite(number) for number in numbers):
-            raise form.FieldError(fields[0].id, f"{what}: expected finite numbers")
-        return numbers
+    @property
+    def accept_mode(self) -> str:
+        return self.texts["accept"]
 
-    def ask_for_places(self, ask: bool) -> None:
-        """Spawn and goal are asked for where no scenario says them."""
-        self.query_one("#places").display = ask
+    @property
+    def own_name(self) -> str:
+        """The run's name if the user gave one, else ""."""
+        name = self.texts["name"].strip()
+        return name if self._name_given and name != self._suggested else ""
 
-    def show_settings(self, scenario: Scenario) -> None:
-        """Fills in what the scenario says, in place of what another one said or was mistyped."""
+    def show_settings(self, scenario: Scenario, placed: bool, keep_places: bool = False) -> None:
+        """Fills in what the scenario says, in place of what another one said or was mistyped.
+
+        Where it is not `placed`, spawn and goal are left empty, or as they are.
+        """
         texts = form.texts_of(scenario)
+        if not placed:
+            old = self.texts
+            texts |= {field.id: old[field.id] if keep_places else "" for field in form.PLACES}
         if not form.are_jobs(self.texts["jobs"]):
             texts["jobs"] = _default_jobs()
-        for id, text in texts.items():
-            field = self.query_one(f"#{id}", Input)
-            field.value = text
-            field.remove_class("-wrong")
-        early = scenario.failure.early_stop
-        self.query_one("#early-stop", Select).value = next(word for word, on in form.EARLY_STOP.items() if on is early)
-        self._show_method(scenario.reduction)
-
-    def _show_method(self, reduction: Reduction) -> None:
-        self._here = form.settings_of(reduction)
-        names = chosen(reduction.algorithm, reduction.pair)
+        self.set_texts(texts)
+        names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
         for kind, name in names.items():
             select = self.query_one(f"#{kind}", SchemaSelect)
             with select.prevent(Select.Changed):
                 select.value = name
-        looked = next((each for each in self.query(SchemaSelect) if each.has_focus), None)
-        kind = looked.kind if looked else "algorithm"
-        self._dim(reduction.algorithm)
-        self._look(kind, names[kind])
+        self._dim()
+        self._explain(self.app.focused)
+        self.post_message(self.Edited(place=True))
 
-    @on(SchemaSelect.Looked)
-    def _looked(self, event: SchemaSelect.Looked) -> None:
-        event.stop()
-        self._dim(event.name if event.kind == "algorithm" else self.method["algorithm"])
-        self._look(event.kind, event.name)
+    def set_texts(self, texts: dict[str, str]) -> None:
+        """Fills in some of the fields."""
+        self._unopened |= {id: text for id, text in texts.items() if id in self._unopened}
+        for id, text in texts.items():
+            if id in self._unopened:
+                continue
+            field = self.query_one(f"#{id}")
+            field.remove_class("-wrong")
+            if _text(field) != text:
+                field.value = text
 
-    def _look(self, kind: Kind, name: str) -> None:
-        self.post_message(self.Explain(kind, name, self._here.get(name, "")))
-
-    def _dim(self, algorithm: str) -> None:
-        """What the algorithm does not use stays a choice, for the next algorithm."""
-        used = uses(algorithm)
-        for select in self.query(SchemaSelect):
-            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
+    def show_fields(self, show: bool) -> None:
+        """All of it, or without the settings only their outcome, the name and Start."""
+        self.query_one("#fields").display = self.query_one("#explained").display = show
 
     def suggest_name(self, name: str) -> None:
         """Fills in a run name, unless the user gave one."""
+        self._suggested = name
         if not self._name_given:
             field = self.query_one("#name", Input)
             with field.prevent(Input.Changed):
                 field.value = name
 
-    @on(Input.Changed)
-    def _edited(self, event: Input.Changed) -> None:
+    # What it says.
+
+    def circumstances(self) -> Circumstances:
+        pair, algorithm = self.method
+        return Circumstances(algorithm, pair, self.seconds, os.cpu_count() or 1)
+
+    @on(SchemaSelect.Looked)
+    def _looked(self, event: SchemaSelect.Looked) -> None:
         event.stop()
-        event.input.remove_class("-wrong")
-        if event.input.id == "name":
-            self._name_given = bool(event.value.strip())
-        elif event.input.id and event.input.id.startswith(("spawn", "goal")):
-            self.post_message(self.PlaceEdited())
+        algorithm = event.name if event.kind == "algorithm" else self.method[1]
+        self._dim(algorithm)
+        self._explain_name(event.kind, event.name, algorithm)
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        self._explain(event.widget)
+
+    def _explain(self, widget: Widget | None) -> None:
+        """The field that has the focus, or else the algorithm, which most depends on."""
+        id = next((each.id for each in (widget, widget and widget.parent) if each and each.id in FIELDS), None)
+        if id is not None:
+            self._explain_field(FIELDS[id])
+        elif isinstance(widget, SchemaSelect):
+            self._explain_name(widget.kind, widget.chosen, self.method[1])
+        else:
+            self._explain_name("algorithm", self.method[1], self.method[1])
+
+    def _explain_name(self, kind: Kind, name: str, algorithm: str) -> None:
+        unused = note(kind, name if kind == "algorithm" else algorithm)
+        self.query_one(Explained).show(f"{kind} {plain(name)}", paragraph(kind, name), unused)
+
+    def _explain_field(self, field: form.Field) -> None:
+        now = self.circumstances()
+        words = f"{meaning(field)} {cost(field, self.texts, now)}".strip()
+        self.query_one(Explained).show(field.label, words, not_used(field, now))
+
+    def _dim(self, algorithm: str = "") -> None:
+        """What the algorithm does not use stays a choice, for the next algorithm."""
+        algorithm = algorithm or self.method[1]
+        used, now = uses(algorithm), Circumstances(algorithm, self.method[0])
+        for select in self.query(SchemaSelect):
+            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
+        for field in form.ADVANCED:
+            if field.id not in self._unopened:
+                self.query_one(f"#{field.id}").set_class(bool(not_used(field, now)), "-unused")
+
+    def tell_cost(self, words: str) -> None:
+        """Tests and time that the settings come to."""
+        self.query_one("#cost", Static).update(Text(words, no_wrap=True, overflow="ellipsis"))
+
+    def tell_command(self, words: str, typed: bool = True) -> None:
+        """The command that does the same, or where it is not to be `typed`, why there is none."""
+        line = Text("$ " if typed and words else "", "bold", no_wrap=True, overflow="ellipsis")
+        self.query_one("#command", Static).update(line.append(plain(words), "not bold"))
 
     def complain(self, error: UserError) -> None:
         """One line below the fields; the wrong field is marked and gets the cursor."""
         self.tell(f"{MARK}{error}")
-        field = form.field_of(error)
-        if field is not None:
-            wrong = self.query_one(f"#{field}", Input)
+        id = form.field_of(error)
+        if id is None:
+            return
+        if FIELDS[id] in form.ADVANCED:
+            self._open_more(True)
+        self.call_after_refresh(self._point_at, id)
+
+    def _point_at(self, id: str) -> None:
+        for wrong in self.query(f"#{id}"):
             wrong.add_class("-wrong")
             wrong.focus()
 
     def tell(self, words: str) -> None:
-        self.query_one("#wrong", Static).update(Text(plain(words)))
+        line = self.query_one("#wrong", Static)
+        line.display = bool(words)
+        line.update(Text(plain(words)))
+
+    # What is done in it.
+
+    @on(Button.Pressed, "#more")
+    def toggle_more(self) -> None:
+        """Shows or hides the rarely used settings."""
+        self._open_more(not any(grid.display for grid in self.query("#advanced")))
+
+    def _open_more(self, show: bool) -> None:
+        if self._unopened:
+            texts, self._unopened = self._unopened, {}
+            self.query_one("#fields").mount(Grid(*_widgets(form.ADVANCED, texts), id="advanced", classes="grid"))
+            self.call_after_refresh(self._dim)
+        else:
+            self.query_one("#advanced").display = show
+        self.query_one("#more", Button).label = Content("▾ fewer settings (f9)" if show else MORE)
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        event.stop()
+        event.input.remove_class("-wrong")
+        if event.input.id == "name":
+            self._name_given = bool(event.value.strip())
+        self._edited(event.input)
+
+    @on(Select.Changed)
+    def _picked(self, event: Select.Changed) -> None:
+        event.stop()
+        self._dim()
+        self._edited(event.select)
+
+    def _edited(self, widget: Widget) -> None:
+        if widget.has_focus and widget.id in FIELDS:
+            self._explain_field(FIELDS[widget.id])
+        self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
 
 
 def _default_jobs() -> str:
     return str(os.cpu_count() or 1)
 
 
-def _field(field: form.Field) -> ComposeResult:
-    yield Label(field.label, markup=False)
-    yield Input(id=field.id, compact=True, tooltip=field.tooltip)
+def _text(widget: Any) -> str:
+    return str(widget.value)
 
 
-def _select(id: str, choices: tuple[str, ...], tooltip: str) -> Select:
-    select = Select([(choice, choice) for choice in choices], id=id, allow_blank=False, compact=True)
-    select.tooltip = tooltip
-    return select
+def _grid(id: str, fields: tuple[form.Field, ...]) -> Grid:
+    return Grid(*_widgets(fields, {}), id=id, classes="grid")
+
+
+def _widgets(fields: tuple[form.Field, ...], texts: dict[str, str]) -> list[Widget]:
+    """A label and a field for each, with its text."""
+    return [each for field in fields for each in (Label(field.label, markup=False), _entry(field, texts))]
+
+
+def _entry(field: form.Field, texts: dict[str, str]) -> Widget:
+    if not field.choices:
+        return Input(texts.get(field.id, ""), id=field.id, compact=True, placeholder=field.empty)
+    choices = [(choice, choice) for choice in field.choices]
+    value = texts.get(field.id, field.choices[0])
+    return Select(choices, value=value, id=field.id, allow_blank=False, compact=True)

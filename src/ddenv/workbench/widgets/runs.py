@@ -1,4 +1,4 @@
-"""The list of recent runs on the setup screen."""
+"""The list of recent runs on the setup screen, and what is told of one run beside a list."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from textual import work
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.workbench.recent import Recent, recent_runs
-from ddenv.workbench.wording import plain
+from ddenv.map.names import shortened
+from ddenv.workbench.recent import SHOWN, Recent, RunsFolder
+from ddenv.workbench.wording import count, plain
+
+# Of the models that are left so many are named.
+MOST_NAMES = 40
 
 
 class RunList(OptionList):
@@ -17,6 +21,7 @@ class RunList(OptionList):
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)
         self._runs: dict[str, Recent] = {}
+        self._folder: RunsFolder | None = None
 
     def run_of(self, option_id: str | None) -> Recent:
         """The run that an option stands for."""
@@ -25,9 +30,10 @@ class RunList(OptionList):
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
         """Lists what is in the folder now."""
-        from ddenv.launch.runs import runs_folder
+        from ddenv.launch.folder import runs_folder
 
-        runs = recent_runs(runs_folder())
+        self._folder = self._folder or RunsFolder(runs_folder())
+        runs = self._folder.look(most=SHOWN)
         self.app.call_from_thread(self._show, runs)
 
     def _show(self, runs: list[Recent]) -> None:
@@ -40,3 +46,27 @@ class RunList(OptionList):
             self.add_option(Option(text.append(f"  {run.words}", "dim"), id=str(run.path)))
         if not runs:
             self.add_option(Option(Text("none yet", "dim"), disabled=True))
+
+
+def about(run: Recent, width: int) -> Text:
+    """All that is known of a run, for a column so wide."""
+    text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
+    if run.trouble:
+        return text.append(f"\n{plain(run.trouble)}", "not bold")
+    text.append(f"{run.sign} {run.state_words}\n", "not bold")
+    if run.reason:
+        text.append(f"{plain(run.reason)}\n", "not bold dim")
+    facts = [
+        ("scenario", shortened(run.scenario, max(8, width - 10))),
+        ("algorithm", run.algorithm),
+        ("pair", run.pair if len(run.pair) + 10 <= width else run.pair.replace("/", f"/\n{'':10}")),
+        ("tests", str(run.tests)),
+        ("decisions", f"{run.decisions} by hand" if run.decisions else "none by hand"),
+    ]
+    for name, words in facts:
+        text.append(f"\n{name:<10}", "not bold dim").append(words, "not bold")
+    text.append(f"\n\n{len(run.kept)} of {count(run.total, 'model')} left\n", "bold")
+    for name in run.kept[:MOST_NAMES]:
+        text.append(f"  {shortened(plain(name), max(8, width - 2))}\n", "not bold")
+    more = len(run.kept) - MOST_NAMES
+    return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")

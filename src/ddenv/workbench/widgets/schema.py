@@ -1,4 +1,4 @@
-"""A choice among the partitionings, prioritizations or algorithms, and the place where the one looked at is explained."""
+"""A choice among the partitionings, prioritizations or algorithms, and the place where what is looked at is explained."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from textual.message import Message
 from textual.widgets import OptionList, Select, Static
 
 from ddenv.schemas import Kind, names
-from ddenv.workbench.methods import note, paragraph
-from ddenv.workbench.wording import plain
 
 
 class SchemaSelect(Select[str]):
@@ -58,17 +56,20 @@ class SchemaSelect(Select[str]):
 
 
 class Explained(VerticalScroll):
-    """The explanation of one name, under its kind and name."""
+    """What the field means that has the focus, in a few lines that scroll."""
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, can_focus=False)
+        self.title = ""
 
     def compose(self) -> ComposeResult:
         yield Static("", markup=False)
 
-    def show(self, kind: Kind, name: str, algorithm: str, here: str = "") -> None:
-        """`algorithm` is the chosen one, which may not use this kind; `here` is a sentence on the scenario's own settings."""
-        self.border_title = Text(f"{kind} {plain(name)}")
-        words = Text()
-        unused = note(kind, name if kind == "algorithm" else algorithm)
-        if unused:
-            words.append(unused, f"bold {self.app.theme_variables['text-warning']}").append(" ")
-        words.append(paragraph(kind, name))
-        self.query_one(Static).update(words.append(f" {here}" if here else ""))
+    def show(self, title: str, words: str, warning: str = "") -> None:
+        """`title` is the name of what is explained, `warning` a sentence that comes first and stands out."""
+        self.title = title
+        text = Text(title, "bold").append("  ")
+        if warning:
+            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
+        self.query_one(Static).update(text.append(words, "not bold"))
+        self.scroll_home(animate=False)

@@ -9,7 +9,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from ddenv.map.paint import Canvas
+from ddenv.map.paint import NUMBERED, Canvas
 
 
 def strip(canvas: Canvas, row: int) -> Strip:
@@ -24,4 +24,8 @@ def _style(fore: int, back: int, bold: bool) -> Style:
 
 
 def _color(value: int) -> Color:
+    if value < 0:
+        return Color.default()
+    if value >= NUMBERED:
+        return Color.from_ansi(value - NUMBERED)
     return Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)

@@ -1,0 +1,73 @@
+"""Many lines of text, of which only those in sight are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rich.segment import Segment
+from rich.text import Text
+from textual import events
+from textual.geometry import Size
+from textual.message import Message
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+
+class Lines(ScrollView, can_focus=True):
+    """One line an item, made by `line(item, width)` when it comes in sight. With `tail` the last ones are shown."""
+
+    class Clicked(Message):
+        """A line was clicked; `item` is what it shows."""
+
+        def __init__(self, lines: Lines, item: Any) -> None:
+            super().__init__()
+            self.lines, self.item = lines, item
+
+        @property
+        def control(self) -> Lines:
+            return self.lines
+
+    def __init__(
+        self, line: Callable[[Any, int], Text], *, nothing: str = "", tail: bool = False, id: str | None = None
+    ) -> None:
+        """`nothing` is shown when there are no items."""
+        super().__init__(id=id)
+        self._line, self._nothing, self._tail = line, nothing, tail
+        self._items: Sequence[Any] = ()
+
+    @property
+    def items(self) -> Sequence[Any]:
+        return self._items
+
+    def show(self, items: Sequence[Any]) -> None:
+        """Other items."""
+        at_end = self.scroll_offset.y >= self.max_scroll_y
+        self._items = items
+        self.virtual_size = Size(0, len(items))
+        if self._tail and at_end and self.is_attached:
+            self.scroll_end(animate=False, immediate=True)
+        self.refresh()
+
+    def on_resize(self) -> None:
+        if self._tail:
+            self.scroll_end(animate=False)
+
+    def on_click(self, event: events.Click) -> None:
+        place = int(event.y + self.scroll_offset.y)
+        if 0 <= place < len(self._items):
+            self.post_message(self.Clicked(self, self._items[place]))
+
+    def render_line(self, y: int) -> Strip:
+        width, base = self.scrollable_content_region.width, self.rich_style
+        place = y + self.scroll_offset.y
+        if 0 <= place < len(self._items):
+            text = self._line(self._items[place], width)
+        elif place == 0:
+            text = Text(self._nothing, "dim")
+        else:
+            return Strip.blank(width, base)
+        text.truncate(width, overflow="ellipsis")
+        segments = list(text.render(self.app.console))
+        strip = Strip(Segment.apply_style(segments, base))
+        return strip.adjust_cell_length(width, base)

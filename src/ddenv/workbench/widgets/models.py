@@ -1,0 +1,73 @@
+"""The models that are left: in which part each is, how far from f, and when the robot first sensed it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.text import Text
+
+from ddenv.map.footprints import Footprint
+from ddenv.map.names import padded, shortened
+from ddenv.runfile.state import RunState, partition_letter
+
+# Columns behind the name: part, distance, first sensed.
+REST = 3 + 9 + 9
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """`part` is its letter, "+" if it is pinned, "" in no part; `stands` is where, `f` the end of f, m; `sensed` simulated s."""
+
+    name: str
+    part: str
+    stands: Footprint | None
+    f: tuple[float, float] | None
+    sensed: float | None
+
+
+def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
+    """The models of the environment, those nearest to f first."""
+    parts = {name: place for place, part in enumerate(_partitions(state)) for name in part}
+    sensed = _sensed(state)
+    places = {each.name: each for each in prints}
+    f = None if state.baseline is None else (state.baseline.position[0], state.baseline.position[1])
+    found = []
+    for name in state.environment:
+        part = "+" if name in state.pinned else partition_letter(parts[name]) if name in parts else ""
+        found.append(Row(name, part, places.get(name), f, sensed.get(name)))
+    return tuple(sorted(found, key=_nearly))
+
+
+def _nearly(row: Row) -> float:
+    """How far from f the rectangle around a model is, m: of thousands only those in sight are measured exactly."""
+    if row.stands is None or row.f is None:
+        return math.inf
+    sides = zip(row.stands.low, row.f, row.stands.high, strict=True)
+    return math.hypot(*(max(low - at, at - high, 0.0) for low, at, high in sides))
+
+
+def line(row: Row, width: int) -> Text:
+    """A row as text, with the name cut to the room there is."""
+    room = max(4, width - REST)
+    away = "" if row.stands is None or row.f is None else f"{row.stands.distance(row.f):.1f} m"
+    sensed = "never" if row.sensed is None else f"{row.sensed:.1f} s"
+    text = Text(padded(shortened(row.name, room), room), no_wrap=True)
+    return text.append(f"{row.part:>3}", "bold").append(f"{away:>9}").append(f"{sensed:>9}", "dim")
+
+
+def heading(width: int) -> str:
+    """What the columns are."""
+    return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
+
+
+def _partitions(state: RunState) -> tuple[tuple[str, ...], ...]:
+    return state.round.partitions if state.round is not None and not state.round.done else ()
+
+
+def _sensed(state: RunState) -> dict[str, float]:
+    test = state.evidence_test
+    if test is None or not 0 < test <= len(state.tests):
+        return {}
+    return dict(state.tests[test - 1].first_sensed)

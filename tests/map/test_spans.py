@@ -1,0 +1,118 @@
+"""Thousands of models at once are drawn as each one would be by itself."""
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ddenv.map.footprints import Footprint
+from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners
+from ddenv.world.outline import convex_hull
+
+VIEW = View(0.3, -0.2, 0.5, 12, 6)
+coordinates = st.floats(-6, 6).map(lambda value: round(value, 3))
+clouds = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=7)
+models = st.lists(st.lists(clouds, max_size=2), max_size=6)
+
+
+def prints_of(shapes) -> list[Footprint]:
+    prints = []
+    for number, parts in enumerate(shapes):
+        polygons = tuple(convex_hull(np.array(points)) for points in parts)
+        corners = np.vstack(polygons) if polygons else np.array([[number - 3.0, 0.5]])
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        prints.append(Footprint(f"m{number}", polygons, tuple(low), tuple(high)))
+    return prints
+
+
+def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels that a model fills, and those of which rounding may decide."""
+    shape = (2 * view.rows, view.columns)
+    inside, unsure = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    for row, column in np.ndindex(shape):
+        for polygon in each.polygons:
+            corners = view.pixels(polygon)
+            sides = np.roll(corners, -1, axis=0) - corners
+            away = np.array([column + 0.5, row + 0.5]) - corners
+            turns = sides[:, 0] * away[:, 1] - sides[:, 1] * away[:, 0]
+            inside[row, column] |= len(corners) > 2 and bool((turns <= 0).all())
+            unsure[row, column] |= bool((abs(turns) < 1e-6).any())
+    x, y = view.pixels(np.array([each.center]))[0]
+    if (each.area < 4 * view.scale**2 or not each.polygons) and 0 <= x < view.columns and 0 <= y < 2 * view.rows:
+        inside[int(y), int(x)], unsure[int(y), int(x)] = True, False
+    return inside, unsure
+
+
+@settings(max_examples=30, deadline=None)
+@given(models)
+def test_all_models_fill_the_pixels_that_each_one_fills(shapes):
+    prints = prints_of(shapes)
+    expected, unsure = (
+        np.full((2 * VIEW.rows, VIEW.columns), EMPTY),
+        np.zeros((2 * VIEW.rows, VIEW.columns), dtype=bool),
+    )
+    for index, each in enumerate(prints):
+        inside, doubtful = slowly(each, VIEW)
+        expected[inside] = index
+        unsure |= doubtful
+    grid = owners(masks(prints, VIEW), VIEW)
+    assert (grid == expected)[~unsure].all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(models, st.lists(st.integers(0, 5), max_size=4, unique=True))
+def test_of_the_drawn_models_the_last_one_is_on_top(shapes, wanted):
+    prints = prints_of(shapes)
+    drawn = [index for index in sorted(wanted) if index < len(prints)]
+    expected = np.full((2 * VIEW.rows, VIEW.columns), EMPTY)
+    for index in drawn:
+        alone = owners(masks(prints[index : index + 1], VIEW), VIEW)
+        expected[alone == 0] = index
+    assert (owners(masks(prints, VIEW), VIEW, drawn) == expected).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(-1, 3), min_size=24, max_size=24), st.integers(0, 100))
+def test_a_letter_stands_on_the_cell_nearest_to_the_centre(values, seed):
+    grid = np.array(values).reshape(6, 4)
+    centers = np.random.default_rng(seed).uniform(-1, 6, (4, 2))
+    for index, (row, column) in enumerate(label_cells(grid, centers).tolist()):
+        upper, lower = grid[0::2] == index, grid[1::2] == index
+        own = next((cells for cells in (upper & lower, upper, lower) if cells.any()), None)
+        if own is None:
+            assert (row, column) == (-1, -1)
+            continue
+        assert own[row, column]
+        away = {
+            (r, c): math.hypot(c + 0.5 - centers[index, 0], 2 * r + 1 - centers[index, 1])
+            for r, c in np.argwhere(own).tolist()
+        }
+        assert away[row, column] == min(away.values())
+
+
+@settings(max_examples=60, deadline=None)
+@given(models, st.lists(st.tuples(coordinates, coordinates), max_size=3))
+def test_huge_models_do_not_widen_the_map(shapes, points):
+    prints = prints_of(shapes)
+    low, high = np.array([math.inf] * 2), np.array([-math.inf] * 2)
+    for point in points:
+        low, high = np.minimum(low, point), np.maximum(high, point)
+    for each in sorted(prints, key=lambda each: each.area):
+        spread = np.maximum(high - low, 4.0)
+        if np.isfinite(low).all() and each.area > 4 * spread[0] * spread[1]:
+            break
+        low, high = np.minimum(low, each.low), np.maximum(high, each.high)
+    found = extent(prints, points)
+    if not np.isfinite(low).all():
+        low, high = np.array([-5.0, -5.0]), np.array([5.0, 5.0])
+    assert (found[0] == low).all()
+    assert (found[1] == high).all()
+
+
+def test_many_large_models_on_top_of_each_other_are_drawn_in_parts(monkeypatch):
+    monkeypatch.setattr("ddenv.map.raster.MOST_PIXELS", 100)
+    square = np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]])
+    prints = [Footprint(f"m{number}", (square,), (-9.0, -9.0), (9.0, 9.0)) for number in range(9)]
+    grid = owners(masks(prints, VIEW), VIEW)
+    assert set(np.unique(grid)) == {8}

@@ -1,0 +1,329 @@
+"""The map with its keys and the mouse, on a screen of its own."""
+
+from dataclasses import replace
+
+import fake_run
+import numpy as np
+import pytest
+from textual import on
+from textual.app import App
+from textual.containers import Vertical
+from textual.events import MouseScrollUp
+
+from ddenv.map.footprints import Footprint
+from ddenv.runfile.fold import fold
+from ddenv.runfile.guiding import Trial
+from ddenv.runfile.store import Live
+from ddenv.workbench.place import place_of_run
+from ddenv.workbench.poll import Poll, Snapshot
+from ddenv.workbench.widgets import overview
+from ddenv.workbench.widgets.map import LAYERS, Place, WorldMap
+
+
+class Screen(App):
+    """A map in a panel, and what it posts."""
+
+    CSS = "WorldMap { height: 1fr; } Vertical { border: round white; }"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.pointed, self.selections, self.places = [], [], []
+
+    def compose(self):
+        with Vertical():
+            yield WorldMap(id="map")
+
+    @on(WorldMap.Pointed)
+    def keep_pointed(self, event):
+        self.pointed.append(event.model)
+
+    @on(WorldMap.SelectionChanged)
+    def keep_selection(self, event):
+        self.selections.append(set(event.models))
+
+    @on(WorldMap.PlacePicked)
+    def keep_place(self, event):
+        self.places.append((event.x, event.y))
+
+
+class Shown:
+    """A map of a run on a screen of 62 x 22: `async with Shown(run) as (pilot, world)`."""
+
+    def __init__(self, run=None, size=(62, 22)) -> None:
+        self.run, self.size = run, size
+
+    async def __aenter__(self):
+        self._test = Screen().run_test(size=self.size)
+        pilot = await self._test.__aenter__()
+        world = pilot.app.query_one(WorldMap)
+        world.focus()
+        if self.run is not None:
+            self.poll = Poll(self.run.path)
+            world.set_place(place_of_run(self.run.path))
+            world.show(self.poll.look(), None)
+        await pilot.pause()
+        return pilot, world
+
+    async def __aexit__(self, *error):
+        if self.run is not None:
+            self.poll.close()
+        await self._test.__aexit__(*error)
+
+
+def text_of(world) -> str:
+    return "\n".join(world.render_line(row).text for row in range(world.size.height))
+
+
+def subtitle(world) -> str:
+    return str(world.parent.border_subtitle)
+
+
+@pytest.fixture
+def busy(run):
+    fake_run.mid_round(run).hold()
+    return run
+
+
+async def test_brackets_go_through_the_models_that_are_kept(busy):
+    async with Shown(busy) as (pilot, world):
+        world.go_to("crate_05")
+        await pilot.press("]")
+        assert world.model_at_cursor == "crate_00"
+        await pilot.press("]", "]", "[")
+        await pilot.pause()
+        assert world.model_at_cursor == "crate_01"
+        assert pilot.app.pointed[-1] == "crate_01"
+        assert "part A" in subtitle(world)
+
+
+async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(busy):
+    async with Shown(busy) as (pilot, world):
+        world.go_to("crate_03")
+        await pilot.press("enter")
+        world.go_to("crate_02")
+        await pilot.press("enter")
+        assert world.selection == {"crate_02", "crate_03"}
+        assert "*B" in text_of(world)
+        assert "* selected" in world.legend(80).plain
+        await pilot.press("enter")
+        assert pilot.app.selections[-1] == {"crate_03"}
+        world.clear_selection()
+        assert world.selection == frozenset()
+
+
+@pytest.mark.parametrize("name", ["floor", "crate_10"])
+async def test_what_cannot_be_left_out_is_not_selected(busy, name):
+    async with Shown(busy) as (pilot, world):
+        assert world.go_to(name)
+        await pilot.press("enter")
+        await pilot.pause()
+        assert world.selection == frozenset()
+        assert len(pilot.app._notifications) == 1
+
+
+async def test_removed_models_are_selected_no_longer(busy):
+    async with Shown(busy) as (pilot, world):
+        world.select(["crate_00", "crate_04"])
+        state = world.snapshot.state
+        left = tuple(name for name in state.environment if name != "crate_04")
+        world.show(Snapshot(state.changed(environment=left)), None)
+        await pilot.pause()
+        assert world.selection == {"crate_00"}
+        assert pilot.app.selections[-1] == {"crate_00"}
+
+
+async def test_the_crosshair_moves_by_cells_and_pans_at_the_border(busy):
+    async with Shown(busy) as (pilot, world):
+        view, (row, column) = world._view, world.cursor
+        await pilot.press("left", "up")
+        assert world.cursor == (row - 1, column - 1)
+        assert world._view == view
+        await pilot.press(*["up"] * (row + 2))
+        assert world.cursor[0] == 0
+        assert world._view.y == pytest.approx(view.y + 3 * 2 * view.scale)
+        await pilot.press("shift+right")
+        assert world._view.x > view.x
+        assert world.cursor == (0, column - 1)
+        assert "┼" in text_of(world)
+
+
+async def test_the_crosshair_finds_removed_models_on_a_floor(busy):
+    async with Shown(busy) as (pilot, world):
+        world.go_to("crate_10")
+        await pilot.press("right")
+        assert world.model_at_cursor == "crate_10"
+        world.toggle_layer("removed")
+        assert world.model_at_cursor == "floor"
+
+
+async def test_a_model_outside_the_view_comes_into_it(busy):
+    async with Shown(busy) as (pilot, world):
+        world.zoom(8)
+        world.pan(500, 0)
+        await pilot.pause()
+        assert world.go_to("crate_02")
+        assert world.model_at_cursor == "crate_02"
+        assert world._view.cell(*world.place.prints[world._numbers["crate_02"]].center) == world.cursor
+        assert not world.go_to("nothing")
+
+
+async def test_the_wheel_keeps_the_place_under_the_pointer(busy):
+    async with Shown(busy) as (pilot, world):
+        before = world._view.point((3, 10))
+        scroll = MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4)
+        world.post_message(scroll)
+        await pilot.pause()
+        assert world._view.point((3, 10)) == pytest.approx(before)
+
+
+async def test_a_click_selects_and_a_drag_pans(busy):
+    async with Shown(busy) as (pilot, world):
+        index = world._numbers["crate_01"]
+        row, column = world._picture.cells[index]
+        await pilot.click(world, offset=(column, row))
+        assert world.selection == {"crate_01"}
+        view = world._view
+        await pilot.mouse_down(world, offset=(10, 5))
+        await pilot.hover(world, offset=(14, 7))
+        await pilot.mouse_up(world, offset=(14, 7))
+        assert world.selection == {"crate_01"}
+        assert world._view.x == pytest.approx(view.x - 4 * view.scale)
+        assert world._view.y == pytest.approx(view.y + 2 * 2 * view.scale)
+
+
+async def test_a_place_is_picked_by_enter_or_click(busy):
+    async with Shown(busy) as (pilot, world):
+        world.picking = True
+        await pilot.press("right", "enter")
+        x, y = world._view.point(world.cursor)
+        assert subtitle(world) == f"x {x:.2f}, y {y:.2f} m"
+        await pilot.click(world, offset=(10, 5))
+        assert pilot.app.places == [
+            pytest.approx((x, y), abs=1e-3),
+            pytest.approx(world._view.point((5, 10)), abs=1e-3),
+        ]
+        assert world.selection == frozenset()
+
+
+SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3"}
+
+
+@pytest.mark.parametrize("layer", SIGNS)
+async def test_layers_are_shown_or_not(run, layer):
+    fake_run.mid_round(run).write("pinned", models=[1])
+    test = fold(run.file.events()).evidence_test
+    async with Shown(run) as (pilot, world):
+        state = world.snapshot.state
+        sensed = tuple((f"crate_{number:02}", 5.0 - number) for number in range(3))
+        tests = [each if each.id != test else fake_sensed(each, sensed) for each in state.tests]
+        world.show(
+            Snapshot(state.changed(tests=type(state.tests).of(tests)), (), "absent", world.snapshot.evidence), None
+        )
+        pilot.app.set_focus(None)
+        await pilot.pause()
+        seen = []
+        for _ in range(2):
+            text = text_of(world)
+            seen.append(SIGNS[layer] in text or (layer == "path" and any("⠀" < char <= "⣿" for char in text)))
+            world.toggle_layer(layer)
+        assert seen == [layer != "sensed", layer == "sensed"]
+        assert layer in LAYERS
+
+
+def fake_sensed(test, sensed):
+    return replace(test, first_sensed=sensed)
+
+
+async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
+    async with Shown(busy) as (_, world):
+        before = world._picture.canvas.chars.copy()
+        moved = type(world.snapshot.evidence)("d", world.snapshot.evidence)
+        for index in range(2, len(moved), 8):
+            moved[index] -= 2.0
+        world.show(Snapshot(world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
+        new = world._picture.canvas.chars[(world._picture.canvas.chars != before)]
+        assert (new > 0x2800).any()
+        assert "path of f" in world.legend(100).plain
+        world.toggle_layer("original")
+        assert (world._picture.canvas.chars == before).all()
+
+
+async def test_only_the_robot_is_drawn_again_when_only_it_moves(busy, monkeypatch):
+    async with Shown(busy) as (_, world):
+        for name in ("picture", "looks", "seen", "kept"):
+            monkeypatch.setattr(overview, name, lambda *_, **__: pytest.fail("drawn again"))
+        regions = []
+        monkeypatch.setattr(world, "refresh", lambda *changed, **_: regions.extend(changed))
+        snapshot = world.snapshot
+        first, second = snapshot.live
+        x, y, *rest = first.pose
+        moved = Live(first.slot, first.test, first.time + 0.1, (x + 0.3, y, *rest))
+        world.show(replace(snapshot, live=(moved, second)), None)
+        assert 1 <= len(regions) <= 2
+
+
+async def test_every_part_that_is_seen_has_a_letter_at_any_size(busy):
+    for size in ((36, 9), (20, 7), (80, 24)):
+        async with Shown(busy, size) as (pilot, world):
+            pilot.app.set_focus(None)
+            await pilot.pause()
+            assert set("ABC") <= set(text_of(world))
+
+
+async def test_what_a_trial_leaves_out_has_small_letters(busy):
+    async with Shown(busy, (80, 24)) as (pilot, world):
+        pilot.app.set_focus(None)
+        world.show(replace(world.snapshot, live=()), Trial(1, ("crate_00", "crate_01", "crate_02"), 0))
+        await pilot.pause()
+        text = text_of(world)
+        assert {"A", "B", "b", "c"} <= set(text)
+        assert "C" not in text
+
+
+async def test_words_about_a_model(busy):
+    async with Shown(busy) as (_, world):
+        assert world.describe("crate_00").plain == "crate_00 · part A · 1.2 x 0.8 m · 5.9 m from f"
+        assert world.describe("crate_00", 24).plain == "crate_00 · part A"
+        assert "removed" in world.describe("crate_10").plain
+        assert "protected" in world.describe("floor").plain
+        assert world.describe("nothing").plain == ""
+
+
+async def test_strange_names_are_one_harmless_line(runs):
+    name = "[red]\u202e\u05d0\u05d1" + "x" * 300
+    run = fake_run.FakeRun(runs / "x.ddenv", world=fake_run.world_text([name, "other"])).created().baseline()
+    async with Shown(run) as (pilot, world):
+        world.go_to(run.elements[0])
+        await pilot.pause()
+        assert len(world.describe(run.elements[0]).plain) < 90
+        assert len(world.describe(run.elements[0], 20).plain) == 20
+        assert "\u202e" not in subtitle(world)
+        assert "[red]" in world.describe(run.elements[0]).plain
+    run.close()
+
+
+@pytest.mark.parametrize("count", [0, 1])
+async def test_worlds_of_few_models(count):
+    prints = tuple(Footprint(f"m{number}", (), (1.0, 1.0), (1.0, 1.0)) for number in range(count))
+    async with Shown() as (pilot, world):
+        world.set_place(Place(prints, (0.0, 0.0, 0.0), (3.0, 0.0), frozenset(each.name for each in prints)))
+        await pilot.press("]", "enter", "up", "plus")
+        text = text_of(world)
+        assert "S" in text
+        assert "G" in text
+        assert world.selection == frozenset()
+        if not count:
+            assert subtitle(world) == "this world has no models"
+
+
+@pytest.mark.parametrize("theme", ["textual-light", "solarized-light", "textual-dark", "ansi-dark", "ansi-light"])
+async def test_in_every_theme_models_stand_out_from_the_background(busy, theme):
+    async with Shown(busy) as (pilot, world):
+        pilot.app.theme = theme
+        await pilot.pause()
+        canvas, index = world._picture.canvas, world._numbers["crate_00"]
+        back = world._palette.back
+        shown = np.argwhere(world._picture.grid[0::2] == index)
+        colors = {int(canvas.fore[tuple(cell)]) for cell in shown} | {int(canvas.back[tuple(cell)]) for cell in shown}
+        assert colors - {back}
+        assert (back == -1) == theme.startswith("ansi")
