@@ -53,3 +53,16 @@ def scenarios(tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr("ddenv.world.bundled.SCENARIOS", folder)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     return folder
+
+
+@pytest.fixture
+def started(monkeypatch) -> list[tuple]:
+    """What engines were started with, instead of starting them: the run's file name, jobs and options."""
+    calls = []
+
+    def start_engine(path, jobs, **options):
+        calls.append((path.name, jobs, options))
+        return SimpleNamespace(poll=lambda: None)
+
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
+    return calls

@@ -1,89 +1,17 @@
 """The setup screen: what it accepts, what it refuses, and that it writes nothing before all fits."""
 
-from types import SimpleNamespace
-
 import fake_run
 import pytest
 import yaml
+from setup_session import Opened
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import explanation
-from ddenv.workbench.app import Workbench
 from ddenv.workbench.methods import KINDS
 from ddenv.workbench.screens.dialogs import Help, OpenFile
 from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.screens.setup import SetupScreen
 from ddenv.workbench.widgets.map import WorldMap
 from ddenv.workbench.widgets.schema import Explained
-
-
-class Session:
-    def __init__(self, app, pilot):
-        self.app, self.pilot = app, pilot
-
-    @property
-    def screen(self) -> SetupScreen:
-        return next(screen for screen in self.app.screen_stack if isinstance(screen, SetupScreen))
-
-    async def settle(self):
-        # Not every worker: the file tree keeps one for as long as it lives.
-        for group in ("world", "runs", "start"):
-            workers = [worker for worker in self.app.workers if worker.group == group]
-            if workers:
-                await self.app.workers.wait_for_complete(workers)
-        await self.pilot.pause()
-
-    async def press(self, *keys):
-        await self.pilot.press(*keys)
-        await self.settle()
-
-    def fill(self, **texts):
-        for id, text in texts.items():
-            self.screen.query_one(f"#{id}", Input).value = text
-
-    def wrong(self):
-        return self.screen.query_one("#wrong", Static).render().plain
-
-    def method(self):
-        return [self.screen.query_one(f"#{kind}", Select).value for kind in KINDS]
-
-    def explained(self):
-        """The title and the words of the explanation."""
-        panel = self.screen.query_one(Explained)
-        return str(panel.border_title), panel.query_one(Static).render().plain
-
-    def value(self, id):
-        return self.screen.query_one(f"#{id}", Input).value
-
-
-class Opened:
-    def __init__(self, size=(120, 36), reading=None):
-        self.size, self.reading = size, reading
-
-    async def __aenter__(self):
-        app = Workbench(reading=self.reading)
-        self._context = app.run_test(size=self.size)
-        pilot = await self._context.__aenter__()
-        await pilot.pause()
-        session = Session(app, pilot)
-        await session.settle()
-        return session
-
-    async def __aexit__(self, *error):
-        await self._context.__aexit__(*error)
-
-
-@pytest.fixture
-def started(monkeypatch):
-    """What engines were started with, instead of starting them."""
-    calls = []
-
-    def start_engine(path, jobs, **options):
-        calls.append((path.name, jobs, options))
-        return SimpleNamespace(poll=lambda: None)
-
-    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
-    return calls
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
@@ -99,22 +27,17 @@ async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
         ]
         assert session.value("name") == "crates-1"
         assert session.method() == ["ddenv", "model2model", "failure-proximal"]
-        assert session.screen.query_one("#early-stop", Select).value == "off"
-        assert not session.screen.query_one("#places").display
 
 
-@pytest.mark.parametrize("key", ["ctrl+s", "f5"])
-async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started, key):
+async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started):
     async with Opened() as session:
         session.fill(iterations="5", seed="7", jobs="3")
         session.screen.query_one("#accept", Select).value = "ask"
-        await session.press(key)
+        await session.press("f5")
         assert started == [("crates-1.ddenv", 3, {"accept_mode": "ask"})]
         assert isinstance(session.app.screen, RunScreen)
         assert (runs / "crates-1.ddenv").is_file()
-        from ddenv.launch.runs import read_parts
-
-        scenario = read_parts(session.app.screen._poll.file)[0]
+        scenario = session.made()
         assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
 
 
@@ -124,16 +47,14 @@ async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios
             session.screen.query_one(f"#{kind}", Select).value = name
         await session.press("ctrl+s")
         assert len(started) == 1
-        from ddenv.launch.runs import read_parts
-
-        reduction = read_parts(session.app.screen._poll.file)[0].reduction
+        reduction = session.made().reduction
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
 
 
 async def test_a_description_that_does_not_fit_says_so(scenarios):
     own = fake_run.scenario() | {"description": "far " * 60 + "end"}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
-    for size, whole in (((80, 24), False), ((120, 36), True)):
+    for size, whole in (((80, 24), False), ((200, 60), True)):
         async with Opened(size) as session:
             told = session.screen.query_one("#about", Static).render().plain
             assert told.endswith("far end" if whole else " far …")
@@ -144,13 +65,11 @@ async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios,
     own = fake_run.scenario() | {"failure": {"early_stop": True}}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
     async with Opened() as session:
-        choice = session.screen.query_one("#early-stop", Select)
-        assert choice.value == "on"
-        choice.value = "off"
+        await session.press("f9")
+        assert session.value("early_stop") == "on"
+        session.fill(early_stop="off")
         await session.press("ctrl+s")
-        from ddenv.launch.runs import read_parts
-
-        assert not read_parts(session.app.screen._poll.file)[0].failure.early_stop
+        assert not session.made().failure.early_stop
 
 
 async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
@@ -175,16 +94,41 @@ async def test_another_scenario_brings_its_own_explanation(scenarios):
     (scenarios / "other.yaml").write_text(yaml.safe_dump(other))
     async with Opened() as session:
         await session.press("down")
-        title, words = session.explained()
-        assert title == "algorithm probdd"
-        assert words.endswith("Here the prior is uniform (reduction.prior).")
+        assert session.explained()[0] == "algorithm probdd"
+        assert session.screen.form.texts["prior"] == "uniform"
 
 
-async def test_where_delta_comes_from_is_told(scenarios):
+async def test_each_field_says_what_it_means_and_costs(scenarios):
     async with Opened() as session:
-        session.screen.query_one("#partitioning", Select).value = "trajectoryseg"
+        await session.press("f9")
+        for id, label in (("growth", "growth"), ("goal_x", "goal x m"), ("accept", "accept")):
+            session.screen.query_one(f"#{id}").focus()
+            await session.pilot.pause()
+            title, words = session.explained()
+            assert title == label
+            assert words.endswith(".")
+        session.screen.query_one("#iterations").focus()
+        session.fill(iterations="7")
         await session.pilot.pause()
-        assert session.explained()[1].endswith("Here delta is 0.5 rad/s (reduction.delta).")
+        assert session.explained()[1].endswith("A candidate without f costs 8 tests.")
+
+
+async def test_rarely_used_settings_are_opened_and_closed(scenarios):
+    async with Opened() as session:
+        more = session.screen.query_one("#more")
+        assert "baseline runs" in str(more.label)
+        more.focus()
+        await session.press("enter")
+        advanced = session.screen.query_one("#advanced")
+        assert advanced.display
+        assert session.value("growth") == "paper"
+        await session.press("f9")
+        assert not advanced.display
+        session.fill(delta="0")
+        await session.press("ctrl+s")
+        assert "reduction.delta" in session.wrong()
+        assert advanced.display
+        assert session.app.focused.id == "delta"
 
 
 UNUSED = {
@@ -195,42 +139,61 @@ UNUSED = {
 }
 
 
-@pytest.mark.parametrize(("algorithm", "unused", "words", "beside"), [(name, *what) for name, what in UNUSED.items()])
-async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios, algorithm, unused, words, beside):
+async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
     async with Opened() as session:
-        session.screen.query_one("#algorithm", Select).value = algorithm
-        await session.pilot.pause()
-        assert words in session.explained()[1]
-        assert [kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")] == unused
-        session.screen.query_one("#partitioning").focus()
-        await session.pilot.pause()
-        assert session.explained()[1].startswith(beside or explanation("partitioning", "model2model"))
+        for algorithm, (unused, words, beside) in UNUSED.items():
+            session.screen.query_one("#algorithm", Select).focus()
+            session.screen.query_one("#algorithm", Select).value = algorithm
+            await session.pilot.pause()
+            assert words in session.explained()[1]
+            assert [kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")] == unused
+            session.screen.query_one("#partitioning").focus()
+            await session.pilot.pause()
+            assert session.explained()[1].startswith(beside or explanation("partitioning", "model2model"))
 
 
-@pytest.mark.parametrize("size", [(64, 18), (80, 24), (109, 33)], ids=str)
-async def test_small_terminals_explain_in_place_of_the_world_while_it_is_asked_for(scenarios, size):
+PANES = {"f2": ("#choice", "#preview"), "f3": ("#preview",), "f4": ("#fields", "#explained")}
+
+
+@pytest.mark.parametrize("size", [(64, 18), (109, 40), (120, 30)], ids=str)
+async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
     async with Opened(size) as session:
-        shown = [session.screen.query_one(id).display for id in ("#preview", "#explained")]
-        assert shown == [True, False]
-        await session.press("enter", "enter", "down")
-        shown = [session.screen.query_one(id).display for id in ("#preview", "#explained")]
-        assert shown == [False, True]
-        await session.press("escape", "escape")
+        for key, shown in PANES.items():
+            await session.press(key)
+            for id in ("#choice", "#preview", "#fields", "#explained"):
+                assert bool(session.screen.query_one(id).region) == (id in shown), (key, id)
+            assert session.told("cost")
+        await session.press("escape")
         assert session.app.focused.id == "scenario-list"
-        assert session.screen.query_one("#preview").display
+        await session.pilot.click("#to-map")
+        await session.pilot.pause()
+        assert session.app.focused.id == "map"
+        session.fill(epsilon="0")
+        await session.press("ctrl+s")
+        assert session.app.focused.id == "epsilon"
+
+
+@pytest.mark.parametrize("size", [(120, 36), (200, 60)], ids=str)
+async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
+    async with Opened(size) as session:
+        for id in ("#choice", "#preview", "#fields", "#explained"):
+            assert session.screen.query_one(id).region
+        assert session.screen.query_one(WorldMap).size.height >= size[1] * 4 // 10
 
 
 @pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36), (200, 60)], ids=str)
 async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
     async with Opened(size) as session:
-        select = session.screen.query_one("#prioritization", Select)
-        assert select.query_one("#label").size.width >= len("avg-trajectory-proximal")
-        for keys in ((), ("enter",)):
-            await session.press(*keys)
+        for key in ("f2", "f4", "f9"):
+            if key != "f9" or not session.screen.query("#advanced"):
+                await session.press(key)
             start = session.screen.query_one("#start")
             assert start.region.width == 11
             assert session.screen.region.contains_region(start.region)
             assert session.screen.query_one("#options").content_region.contains_region(start.region)
+        for select in session.screen.query(Select):
+            widest = max(len(str(prompt)) for prompt, _ in select._options)
+            assert select.query_one("#label").size.width >= widest, select.id
 
 
 async def test_an_open_list_shows_all_its_names(scenarios):
@@ -265,7 +228,6 @@ WRONG = (
     ("iterations", "-1", "iterations"),
     ("timeout", "", "timeout s: is missing"),
     ("timeout", "nan", "timeout"),
-    ("n_partitions", "1", "n_partitions"),
     ("epsilon", "0", "epsilon"),
     ("seed", "99999999999", "seed"),
     ("jobs", "0", "jobs: expected 1 to 256, found 0"),
@@ -317,7 +279,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         await session.pilot.press("enter")
         await session.pilot.pause()
         await session.settle()
-        assert session.screen.query_one("#places").display
+        assert session.value("spawn_x") == ""
         assert "12 models" in session.screen.query_one("#about", Static).render().plain
         await session.press("ctrl+s")
         assert "spawn x m: is missing" in session.wrong()
@@ -349,8 +311,7 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         session.fill(timeout="soon", jobs="many", seed="6")
         await session.press("ctrl+s")
         assert session.screen.query_one("#timeout", Input).has_class("-wrong")
-        session.screen._opened(scenarios / "crates.sdf")
-        await session.settle()
+        await session.open(scenarios / "crates.sdf")
         assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.33", "3", "2", "0", "4"]
         assert session.method() == ["ddenv", "model2model", "avg-trajectory-proximal"]
         assert not session.screen.query(".-wrong")
@@ -366,12 +327,10 @@ async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path
     other = tmp_path / "other.sdf"
     other.write_bytes((scenarios / "crates.sdf").read_bytes())
     async with Opened() as session:
-        session.screen._opened(scenarios / "crates.sdf")
-        await session.settle()
+        await session.open(scenarios / "crates.sdf")
         session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
         await session.pilot.pause()
-        session.screen._opened(other)
-        await session.settle()
+        await session.open(other)
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
 
 
@@ -434,6 +393,7 @@ async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
 async def test_too_small(scenarios):
     async with Opened((40, 10)) as session:
         assert session.screen.query_one("#small").display
+        assert session.told("small") == "ddenv needs 64 x 18, this is 40 x 10"
 
 
 LOST = (
@@ -446,14 +406,12 @@ async def test_what_cannot_be_found_is_told_with_the_remedy_that_the_workbench_t
     path = tmp_path / "depot.world"
     path.write_text(f"<sdf version='1.6'><world name='w'>{LOST}</world></sdf>")
     async with Opened() as session:
-        session.screen._opened(path)
-        await session.settle()
+        await session.open(path)
         assert "--stand-in 'model://barrel=cylinder:0.3,1.0'" in session.screen.query_one(WorldMap).notice
         assert str(session.screen.query_one("#preview").border_title) == "depot.world"
     async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",)}) as session:
-        session.screen._opened(path)
-        await session.settle()
-        assert "1 model. 1 part replaced or ignored" in session.screen.query_one("#about", Static).render().plain
+        await session.open(path)
+        assert "1 part replaced" in session.screen.query_one("#about", Static).render().plain
         session.fill(spawn_x="0", spawn_y="0", spawn_z="0.2", spawn_yaw="0", goal_x="6", goal_y="0")
         await session.press("ctrl+s")
         assert len(started) == 1

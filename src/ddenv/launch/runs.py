@@ -9,7 +9,7 @@ from pathlib import Path
 import platformdirs
 
 from ddenv.errors import UserError
-from ddenv.launch.scenarios import load_parts
+from ddenv.launch.scenarios import check_parts, load_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.world.files.resources import Stored
@@ -19,6 +19,8 @@ from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
 
 SUFFIX = ".ddenv"
+# Bytes of a run's name, which leaves room for a number and for the names of the files beside it.
+LONGEST_STEM = 180
 # How the names of documents begin that were read of other files.
 RESOURCE = "resource "
 
@@ -44,6 +46,8 @@ def free_run_path(scenario_name: str) -> Path:
 
 def _free(folder: Path, scenario_name: str) -> Path:
     stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
+    # A name of 80 letters can have four bytes for each, which no file system takes.
+    stem = stem.encode()[:LONGEST_STEM].decode(errors="ignore")
     number = 1
     while (path := folder / f"{stem}-{number}{SUFFIX}").exists():
         number += 1
@@ -83,6 +87,22 @@ def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | Non
     return world
 
 
+def create_like(run: Path, scenario: Scenario, path: Path) -> None:
+    """Writes a new run file at `path` for the world and the robot that `run` holds, with another `scenario` for them.
+
+    Nothing else is read: neither the world's own file nor the robot's need be there any more. Raises UserError, with nothing
+    written.
+    """
+    with RunFile(run) as file:
+        _, world, robot = read_parts(file)
+        documents = {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
+        documents |= {name: file.document(name) for name in ("world", "robot")}
+    check_parts(scenario, world, robot)
+    documents["scenario"] = scenario.model_dump_json().encode()
+    elements = world.elements(frozenset(scenario.protected))
+    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+
+
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     """What a run file was made from: its scenario, its world and its robot."""
     try:
@@ -93,6 +113,6 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     stored = Stored(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
     robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
-    if fold(run.events()[:1]).elements != world.elements(frozenset(scenario.protected)):
+    if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot

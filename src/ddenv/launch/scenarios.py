@@ -55,6 +55,8 @@ def with_options(
     timeout: float | None = None,
     epsilon: float | None = None,
     early_stop: bool | None = None,
+    similarity: str | None = None,
+    budget: int | None = None,
     spawn: Sequence[float] | None = None,
     goal: Sequence[float] | None = None,
     world: Path | None = None,
@@ -63,13 +65,16 @@ def with_options(
 ) -> Scenario:
     """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
-    `timeout` is in simulated s, `epsilon` in m, `early_stop` as in the section `failure`, `spawn` x, y, z m and yaw rad (0 if
+    `timeout` is in simulated s, `epsilon` in m, `early_stop` and `similarity` as in the section `failure`, `budget` the
+    most tests in all, 0 for any number, `spawn` x, y, z m and yaw rad (0 if
     left out), `goal` x, y m. All others are keys of the scenario's section `reduction`.
     """
     data = scenario.model_dump(mode="json")
-    failure = {"timeout": timeout, "epsilon": epsilon, "early_stop": early_stop}
+    failure = {"timeout": timeout, "epsilon": epsilon, "early_stop": early_stop, "similarity": similarity}
     data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
     data["failure"].update({key: value for key, value in failure.items() if value is not None})
+    if budget is not None:
+        data["reduction"]["budget"] = budget or None
     if spawn is not None:
         data["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
     if goal is not None:
@@ -93,6 +98,12 @@ def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) ->
     around_robot = disk_of(robot_file, reading, tell)
     robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
     world = replace(world, resources={**world.resources, **around_robot.taken})
+    check_parts(scenario, world, robot)
+    return world, robot
+
+
+def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
+    """Whether a scenario fits its world and its robot. Raises UserError."""
     known = {model.name for model in world.models}
     for name in scenario.protected:
         if name not in known:
@@ -100,4 +111,3 @@ def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) ->
     if not world.elements(frozenset(scenario.protected)):
         raise UserError(f"{scenario.world}: has no model that could be removed")
     check_spawn(world, robot, scenario.robot.spawn)
-    return world, robot

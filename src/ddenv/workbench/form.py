@@ -1,45 +1,67 @@
-"""What the setup screen asks for, as text fields to numbers, with complaints that name the field. Pure."""
+"""What the setup screen asks for, as texts to values, with complaints that name the field. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 
 if TYPE_CHECKING:
-    from ddenv.world.scenario import Reduction, Scenario
+    from ddenv.world.scenario import Scenario
+
+Value = int | float | str | bool | None
+ON, OFF = "on", "off"
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """`id` is the field's name on the screen, `label` what stands before it; `kind` is int, float or str."""
+    """`id` is the field's name on the screen, `label` what stands before it, `kind` int, float, str or bool.
+
+    `key` is the scenario's key for it, "" where a scenario has none. `choices` are the words it may be, if these are few. A field
+    may be empty where `empty` says so: it is shown in its place.
+    """
 
     id: str
     label: str
     kind: type
-    tooltip: str
+    key: str = ""
+    choices: tuple[str, ...] = ()
+    empty: str = ""
 
 
-OPTIONS = (
-    Field("iterations", "iterations", int, "re-runs of a candidate that did not show the failure"),
-    Field("timeout", "timeout s", float, "simulated time the robot has to reach its goal, s"),
-    Field("n_partitions", "n_partitions", int, "partitions in the first round"),
-    Field("epsilon", "epsilon m", float, "how far from f's end a run may end and still be similar, m"),
-    Field("seed", "seed", int, "run i of every candidate uses seed + i"),
-    Field("jobs", "jobs", int, "tests that run at the same time"),
+BASIC = (
+    Field("iterations", "iterations", int, "reduction.iterations"),
+    Field("budget", "budget", int, "reduction.budget", empty="none"),
+    Field("timeout", "timeout s", float, "failure.timeout"),
+    Field("epsilon", "epsilon m", float, "failure.epsilon"),
+    Field("seed", "seed", int, "reduction.seed"),
+    Field("jobs", "jobs", int),
 )
 PLACES = (
-    Field("spawn_x", "spawn x m", float, "where the robot starts, m"),
-    Field("spawn_y", "spawn y m", float, "where the robot starts, m"),
-    Field("spawn_z", "spawn z m", float, "height of the robot's frame at the start, m"),
-    Field("spawn_yaw", "yaw rad", float, "heading at the start, rad"),
-    Field("goal_x", "goal x m", float, "where the robot has to go, m"),
-    Field("goal_y", "goal y m", float, "where the robot has to go, m"),
+    Field("spawn_x", "spawn x m", float, "robot.spawn.x"),
+    Field("spawn_y", "spawn y m", float, "robot.spawn.y"),
+    Field("spawn_z", "spawn z m", float, "robot.spawn.z"),
+    Field("spawn_yaw", "yaw rad", float, "robot.spawn.yaw"),
+    Field("goal_x", "goal x m", float, "goal.x"),
+    Field("goal_y", "goal y m", float, "goal.y"),
 )
-EARLY_STOP = {"off": False, "on": True}
-NAME = Field("name", "run name", str, "what the run is called: a file in the runs folder")
+ADVANCED = (
+    Field("baseline_runs", "baseline runs", int, "reduction.baseline_runs"),
+    Field("n_partitions", "n_partitions", int, "reduction.n_partitions"),
+    Field("delta", "delta rad/s", float, "reduction.delta"),
+    Field("early_stop", "early stop", bool, "failure.early_stop", (OFF, ON)),
+    Field("similarity", "similarity", str, "failure.similarity", ("end-pose", "trajectory")),
+    Field("candidates", "candidates", str, "reduction.candidates", ("both", "partitions", "complements")),
+    Field("complement_order", "complement order", str, "reduction.complement_order", ("paper", "far-first")),
+    Field("growth", "growth", str, "reduction.growth", ("paper", "steady")),
+    Field("skip", "skip", str, "reduction.skip", ("known", "implied")),
+    Field("prior", "prior", str, "reduction.prior", ("spatial", "uniform")),
+)
+NAME = Field("name", "run name", str)
+ACCEPT = Field("accept", "accept", str, "", ("automatic", "ask"))
+ALL = (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)
 
 
 class FieldError(UserError):
@@ -50,9 +72,13 @@ class FieldError(UserError):
         self.field = field
 
 
-def value(field: Field, text: str) -> int | float | str:
+def value(field: Field, text: str) -> Value:
     """What `text` stands for. Raises FieldError."""
     text = text.strip()
+    if field.kind is bool:
+        return text == ON
+    if not text and field.empty:
+        return None
     if not text:
         raise FieldError(field.id, f"{field.label}: is missing")
     try:
@@ -62,13 +88,14 @@ def value(field: Field, text: str) -> int | float | str:
         raise FieldError(field.id, f"{field.label}: expected {wanted}, found '{text[:40]}'") from None
 
 
-def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, int | float | str]:
-    """The values of all `fields`. Raises FieldError for the first wrong one."""
+def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Value]:
+    """The values of all `fields` by id. Raises FieldError for the first wrong one."""
     return {field.id: value(field, texts.get(field.id, "")) for field in fields}
 
 
-def jobs(number: int) -> int:
+def jobs(text: str) -> int:
     """At least one test at a time, and no more than a large machine can do. Raises FieldError."""
+    number = value(BASIC[-1], text)
     if not 1 <= number <= 256:
         raise FieldError("jobs", f"jobs: expected 1 to 256, found {number}")
     return number
@@ -77,32 +104,57 @@ def jobs(number: int) -> int:
 def are_jobs(text: str) -> bool:
     """Whether `text` can stand in the field for jobs."""
     try:
-        jobs(int(text))
-    except (ValueError, FieldError):
+        jobs(text)
+    except FieldError:
         return False
     return True
 
 
+def text_of(value: Value) -> str:
+    """How a value is written in a field."""
+    if isinstance(value, bool):
+        return ON if value else OFF
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return "" if value is None else str(value)
+
+
+def read_key(data: Mapping[str, Any], key: str) -> Any:
+    """The value of a scenario's key such as `robot.spawn.x`; None where it is not there."""
+    for part in key.split("."):
+        data = data.get(part) if isinstance(data, Mapping) else None
+    return data
+
+
 def texts_of(scenario: Scenario) -> dict[str, str]:
     """What a scenario's own settings are, as texts for the fields."""
-    reduction, failure = scenario.reduction, scenario.failure
-    return {
-        "iterations": str(reduction.iterations),
-        "timeout": f"{failure.timeout:g}",
-        "n_partitions": str(reduction.n_partitions),
-        "epsilon": f"{failure.epsilon:g}",
-        "seed": str(reduction.seed),
-    }
+    data = scenario.model_dump(mode="json")
+    return {field.id: text_of(read_key(data, field.key)) for field in ALL if field.key}
 
 
-def settings_of(reduction: Reduction) -> dict[str, str]:
-    """A sentence for each name that has a setting without a field: what it is here, and the scenario's key for it."""
-    prior = f"Here the prior is {reduction.prior} (reduction.prior)."
-    return {
-        "trajectoryseg": f"Here delta is {reduction.delta:g} rad/s (reduction.delta).",
-        "probdd": prior,
-        "splitting": prior,
-    }
+def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
+    """`base` with what stands in the fields. Raises UserError, a FieldError where a text is no number."""
+    from ddenv.world.load import validate
+
+    data = base.model_dump(mode="json")
+    fields = tuple(field for field in (*BASIC, *PLACES, *ADVANCED) if field.key)
+    asked = values(fields, texts)
+    for field in fields:
+        section, _, key = field.key.rpartition(".")
+        # A field that is left empty, or that this scenario does not know, changes nothing that is not there.
+        if asked[field.id] is not None or read_key(data, field.key) is not None:
+            read_key(data, section)[key] = asked[field.id]
+    data["reduction"] |= {"pair": pair, "algorithm": algorithm}
+    return validate(data, "options")
+
+
+def place(what: str, texts: Mapping[str, str]) -> tuple[float, ...] | None:
+    """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m); None while any of them is no number."""
+    try:
+        return tuple(values(tuple(field for field in PLACES if field.id.startswith(what)), texts).values())
+    except FieldError:
+        return None
 
 
 def field_of(error: UserError) -> str | None:
@@ -110,10 +162,8 @@ def field_of(error: UserError) -> str | None:
     if isinstance(error, FieldError):
         return error.field
     message = str(error)
-    for field in (*OPTIONS, *PLACES):
-        section, _, key = field.id.partition("_")
-        names = (f".{field.id}:", f"robot.spawn.{key}:" if section == "spawn" else f"{section}.{key}:")
-        if any(name in message for name in names):
+    for field in ALL:
+        if field.key and f" {field.key}:" in f" {message}":
             return field.id
     if "robot.spawn" in message:
         return "spawn_x"

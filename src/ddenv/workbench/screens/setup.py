@@ -1,116 +1,165 @@
-"""The setup screen: choose a scenario or a world, see it, set the options, start; or open an earlier run."""
+"""The setup screen: choose a scenario or a world, see it, set all that is to be set, start; or open an earlier run."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.text import Text
-from textual import on, work
+from textual import events, on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.screen import Screen
-from textual.widgets import Footer, Input, OptionList, Static
-from textual.widgets.option_list import Option
+from textual.widgets import Footer, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench import form
-from ddenv.workbench.chosen import Chosen, read_choice
+from ddenv.workbench.chosen import Chosen, read_choice, read_run
+from ddenv.workbench.costs import Past, past_of
 from ddenv.workbench.place import place_of
-from ddenv.workbench.processes import Engine
 from ddenv.workbench.screens.dialogs import Help, OpenFile
+from ddenv.workbench.screens.starting import Starting
 from ddenv.workbench.widgets.about import About
+from ddenv.workbench.widgets.files import FileList
 from ddenv.workbench.widgets.map import Place, WorldMap
 from ddenv.workbench.widgets.options import OptionsForm
 from ddenv.workbench.widgets.runs import RunList
 from ddenv.workbench.widgets.schema import Explained, SchemaSelect
+from ddenv.workbench.widgets.setup_panes import SetupPanes
 from ddenv.workbench.wording import plain, shorten
 
-if TYPE_CHECKING:
-    from ddenv.world.scenario import Scenario
+LEAST = (64, 18)
+# From this size on everything is seen at once.
+ROOMY = (110, 32)
+# From this size on the rarely used settings are seen, too.
+VAST = (160, 48)
+PANES = {"F2": "choose", "F3": "map", "F4": "settings"}
+HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
-class SetupScreen(Screen[None]):
-    """Nothing is written before Start, and then only if everything fits."""
+class SetupScreen(Starting):
+    """Small terminals show one of three panes at a time: what to choose from, the map, or the settings."""
 
     CSS_PATH = "setup.tcss"
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (64, "-slim"), (80, "-narrow"), (110, "-wide")]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (18, "-low"), (24, "-short"), (34, "-tall")]
+    HORIZONTAL_BREAKPOINTS: ClassVar = [
+        (0, "-thin"),
+        (LEAST[0], "-slim"),
+        (80, "-narrow"),
+        (ROOMY[0], "-wide"),
+        (VAST[0], "-vast"),
+    ]
+    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (LEAST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
     BINDINGS: ClassVar = [
-        Binding("ctrl+s,f5", "start", "start", id="setup.start", tooltip="start the reduction", key_display="ctrl+s"),
-        Binding("ctrl+o", "open", "open a file", id="setup.open", tooltip="choose a scenario or world file"),
+        Binding("ctrl+s,f5", "start", "start", id="setup.start", tooltip="start the reduction", key_display="^s"),
+        Binding(
+            "f6,ctrl+b",
+            "baseline",
+            "baseline",
+            id="setup.baseline",
+            tooltip="start, and pause after the baseline: it shows how often the whole world fails",
+            key_display="f6",
+        ),
+        Binding("f7,ctrl+g", "save", "save", id="setup.save", tooltip="save as a scenario file", key_display="f7"),
+        Binding(
+            "f8,ctrl+y",
+            "copy",
+            "copy",
+            id="setup.copy",
+            tooltip="copy the ddenv run command that does the same",
+            key_display="f8",
+        ),
+        Binding("f9", "more", "more", id="setup.more", tooltip="show or hide the rarely used settings", show=False),
+        Binding("ctrl+o", "open", "open", id="setup.open", tooltip="choose a scenario or world file"),
+        Binding("s", "pick('start')", "start", id="setup.pick_start", tooltip="set the start on the map", show=False),
+        Binding(
+            "h", "pick('heading')", "heading", id="setup.pick_heading", tooltip="set the heading on the map", show=False
+        ),
+        Binding("g", "pick('goal')", "goal", id="setup.pick_goal", tooltip="set the goal on the map", show=False),
+        Binding("plus,equals_sign", "zoom(1.25)", "closer", id="setup.closer", tooltip="map: closer", show=False),
+        Binding("minus", "zoom(0.8)", "farther", id="setup.farther", tooltip="map: farther away", show=False),
+        Binding("0", "fit", "fit", id="setup.fit", tooltip="map: show all that matters", show=False),
+        Binding("f2", "pane('choose')", "choose", id="setup.choose", tooltip="to what there is to choose", show=False),
+        Binding("f3", "pane('map')", "map", id="setup.map", tooltip="to the map", show=False),
+        Binding("f4", "pane('settings')", "settings", id="setup.settings", tooltip="to the settings", show=False),
         Binding("f1,question_mark", "help", "help", id="setup.help", tooltip="show every key", key_display="?"),
         Binding(
-            "escape", "home", "back to the list", id="setup.home", tooltip="back to the list of scenarios", show=False
+            "escape", "home", "back", id="setup.home", tooltip="leave picking; back to the list of files", show=False
         ),
         Binding("ctrl+q,q", "app.leave", "quit", id="setup.quit", tooltip="leave", key_display="q"),
     ]
 
-    def __init__(self, reading: Mapping[str, Any] | None = None) -> None:
-        """`reading` holds the command line's options on how to read worlds."""
+    def __init__(self, reading: Mapping[str, Any] | None = None, like: Path | None = None) -> None:
+        """`reading` holds the command line's options on how to read worlds; `like` is a run to begin with the settings of."""
         super().__init__()
         self._reading = reading or {}
-        self._chosen: Chosen | None = None
-        self._files: dict[str, Path] = {}
-        self._starting = False
+        self._like = like
+        self._opened_now: Path | None = None
+        self._keep_places = False
+        self._pane = "choose"
 
     def compose(self) -> ComposeResult:
-        yield Static(self._title(), id="header", markup=False)
+        with Horizontal(id="header"):
+            yield Static(_title(), id="title", markup=False)
+            yield SetupPanes(PANES, id="panes")
         with Horizontal(id="body"):
             with Vertical(id="choice"):
                 with Vertical(id="scenarios", classes="panel") as panel:
-                    panel.border_title = "Scenarios"
-                    panel.border_subtitle = "^o opens"
-                    yield OptionList(id="scenario-list", compact=True, markup=False)
+                    panel.border_title = "Scenarios and worlds"
+                    panel.border_subtitle = "^o opens a file"
+                    yield FileList(id="scenario-list")
                 with Vertical(id="runs", classes="panel") as panel:
                     panel.border_title = "Recent runs"
                     panel.border_subtitle = "enter opens"
                     yield RunList(id="run-list")
-            with Vertical(id="right"):
-                with Vertical(id="preview", classes="panel") as panel:
-                    panel.border_title = "World"
-                    yield WorldMap(id="map")
-                    yield About(id="about")
-                yield Explained(id="explained", classes="panel", can_focus=False)
-                yield OptionsForm(id="options", classes="panel")
+            with Vertical(id="preview", classes="panel") as panel:
+                panel.border_title = "World"
+                yield WorldMap(id="map")
+                yield Static("", id="picking", markup=False)
+                yield About(id="about")
+        yield OptionsForm(id="options", classes="panel")
         yield Footer(compact=True, show_command_palette=False)
-        yield Static("Please make the terminal larger: at least 64 x 18.", id="small", markup=False)
-
-    @staticmethod
-    def _title() -> Text:
-        return Text(" ddenv", "bold", no_wrap=True).append(
-            "  find the few models that make a robot fail", "not bold dim"
-        )
+        yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
-        self._list_scenarios()
-        self.query_one("#scenario-list").focus()
+        self._list_files()
+        self.query_one(FileList).focus()
+        if self.size.width >= VAST[0] and self.size.height >= VAST[1]:
+            self.call_after_refresh(self.form.toggle_more)
 
     def on_screen_resume(self) -> None:
         self.query_one(RunList).read()
 
-    # Left: what there is to choose from.
+    def on_resize(self, event: events.Resize) -> None:
+        width, height = event.size
+        self._arrange()
+        self.query_one("#small", Static).update(f"ddenv needs {LEAST[0]} x {LEAST[1]}, this is {width} x {height}")
 
-    def _list_scenarios(self) -> None:
+    # What there is to choose from.
+
+    @work(thread=True, group="recent", exclusive=True)
+    def _list_files(self) -> None:
+        from ddenv.workbench.recent_files import recent_files
         from ddenv.world.bundled import SCENARIOS, bundled_names
 
-        for name in bundled_names():
-            self._offer(SCENARIOS / f"{name}.yaml")
-        if self._files:
-            self.query_one("#scenario-list", OptionList).highlighted = 0
-        else:
+        bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
+        self.app.call_from_thread(self._offer, bundled, recent_files())
+
+    def _offer(self, bundled: list[Path], recent: list[Path]) -> None:
+        if not self.is_attached:
+            return
+        files = self.query_one(FileList)
+        files.offer(bundled, recent, self._like)
+        if not files.option_count:
             self.query_one(WorldMap).set_place(Place(), "no bundled scenarios were found; ctrl+o opens a file")
 
-    def _offer(self, path: Path) -> str:
-        """Puts a file on the list, once."""
-        key = str(path)
-        if key not in self._files:
-            self._files[key] = path
-            words = path.stem if path.suffix == ".yaml" else path.name
-            self.query_one("#scenario-list", OptionList).add_option(Option(Text(plain(words), no_wrap=True), id=key))
-        return key
+    @on(FileList.Looked)
+    def _looked_at(self, event: FileList.Looked) -> None:
+        self._choose(event.path)
+
+    @on(OptionList.OptionSelected, "#scenario-list")
+    def _selected(self) -> None:
+        self.action_pane("settings")
 
     @on(OptionList.OptionSelected, "#run-list")
     def _open_run(self, event: OptionList.OptionSelected) -> None:
@@ -120,176 +169,163 @@ class SetupScreen(Screen[None]):
         try:
             screen = RunScreen(recent.path)
         except UserError as error:
-            self._complain(error)
+            self.complain(error)
             return
         self.app.switch_screen(screen)
 
-    @on(OptionList.OptionHighlighted, "#scenario-list")
-    def _highlighted(self, event: OptionList.OptionHighlighted) -> None:
-        if event.option_id in self._files:
-            self._choose(self._files[event.option_id])
-
-    @on(OptionList.OptionSelected, "#scenario-list")
-    def _selected(self) -> None:
-        self.query_one("#algorithm").focus()
-
-    # Right: the chosen one, read beside the screen.
+    # The chosen one, read beside the screen.
 
     def _choose(self, path: Path) -> None:
-        self._chosen = None
-        self._form.tell("")
-        self.query_one("#preview").border_title = Text(shorten(plain(path.name), 40))
+        self._keep_places = self.chosen is not None and self.chosen.scenario is None
+        self.chosen, self.past = None, Past()
+        self.pick("")
+        self.form.tell("")
+        self.tell_outcome()
+        self._title_preview(path.name)
         self.query_one("#preview").border_subtitle = ""
         self.query_one(About).tell("")
         self.query_one(WorldMap).set_place(Place(), "reading the world ...")
         self._read(path)
 
+    def _title_preview(self, name: str) -> None:
+        self.query_one("#preview").border_title = Text(shorten(plain(name), 40))
+
     @work(thread=True, group="world", exclusive=True)
     def _read(self, path: Path) -> None:
         from textual.worker import get_current_worker
 
+        from ddenv.launch.runs import runs_folder
+
         worker = get_current_worker()
         try:
-            chosen = read_choice(path, self._reading)
-            answer = chosen, place_of(chosen.world, chosen.scenario), ""
+            chosen = read_run(path) if path.suffix == ".ddenv" else read_choice(path, self._reading)
+            answer = chosen, place_of(chosen.world, chosen.scenario), _free_name(chosen.settings.name), ""
         except UserError as error:
-            answer = None, Place(), str(error)
+            answer = None, Place(), "", str(error)
+        if worker.is_cancelled:
+            return
+        self.app.call_from_thread(self._preview, *answer)
+        if answer[0] is None:
+            return
+        if path == self._opened_now:
+            self._remember(path)
+        past = past_of(answer[0].settings, runs_folder())
         if not worker.is_cancelled:
-            self.app.call_from_thread(self._preview, *answer)
+            self.app.call_from_thread(self._know, answer[0], past)
 
-    def _preview(self, chosen: Chosen | None, place: Place, wrong: str) -> None:
+    def _preview(self, chosen: Chosen | None, place: Place, name: str, wrong: str) -> None:
         if not self.is_attached:
             return
-        from ddenv.launch.runs import free_run_path
-
-        self._chosen = chosen
+        self.chosen = chosen
         self.query_one(WorldMap).set_place(place, wrong)
         if chosen is None:
             return
-        scenario = chosen.scenario
-        self._form.ask_for_places(scenario is None)
-        self.query_one("#preview").border_title = Text(shorten(plain(chosen.name), 40))
+        self._title_preview(chosen.name)
         self.query_one(About).tell(chosen.about)
-        self._form.show_settings(chosen.settings)
-        self._form.suggest_name(free_run_path(chosen.settings.name).stem)
-        self._mark_places()
+        self.form.suggest_name(name)
+        placed = chosen.scenario is not None
+        self.form.show_settings(chosen.settings, placed, self._keep_places)
+        self.mark_places()
+        if not placed and self._place("spawn") is None:
+            self.pick("start")
 
-    @on(OptionsForm.PlaceEdited)
-    def _mark_places(self) -> None:
-        """Shows spawn and goal on the map while they are typed."""
-        if self._chosen is None or self._chosen.scenario is not None:
-            return
-        spawn, goal = self._typed("spawn"), self._typed("goal")
-        self.query_one(WorldMap).set_marks(spawn and (spawn[0], spawn[1], spawn[3]), goal and (goal[0], goal[1]))
+    def _know(self, chosen: Chosen, past: Past) -> None:
+        if self.is_attached and chosen is self.chosen:
+            self.past, self.form.seconds = past, past.seconds
+            self.tell_outcome()
 
-    def _typed(self, what: str) -> tuple[float, ...] | None:
-        try:
-            return self._form.place(what)
-        except UserError:
-            return None
+    # Panes.
 
-    # Between: what the algorithm, the partitioning or the prioritization does.
+    @property
+    def _roomy(self) -> bool:
+        return self.size.width >= ROOMY[0] and self.size.height >= ROOMY[1]
 
-    @on(OptionsForm.Explain)
-    def _explain(self, event: OptionsForm.Explain) -> None:
-        self.query_one(Explained).show(event.kind, event.name, self._form.method["algorithm"], event.here)
+    def _show_pane(self, pane: str) -> None:
+        self._pane = pane
+        self._arrange()
 
-    def on_descendant_focus(self) -> None:
-        """Small terminals show the explanation in place of the world, while it is asked for."""
-        looking = isinstance(self.focused, SchemaSelect) or isinstance(self.focused.parent, SchemaSelect)
-        self.set_class(looking, "-looking")
+    def _arrange(self) -> None:
+        # Not by classes of the screen, which would have all styles worked out again.
+        all, pane = self._roomy, self._pane
+        fits = self.size.width >= LEAST[0] and self.size.height >= LEAST[1]
+        self.form.display = fits
+        self.query_one("#body").display = fits and (all or pane != "settings")
+        self.query_one("#choice").display = all or pane == "choose"
+        self.form.show_fields(all or pane == "settings")
+        self.form.set_class(not all and pane == "settings", "-alone")
+        self.form.set_class(not all, "-frameless")
+        panes = self.query_one(SetupPanes)
+        panes.display = not all
+        panes.mark(pane)
+
+    @on(SetupPanes.Asked)
+    def _pane_asked(self, event: SetupPanes.Asked) -> None:
+        self.action_pane(event.pane)
+
+    def action_pane(self, pane: str) -> None:
+        """Shows one of the panes where there is no room for all, and goes there."""
+        self._show_pane(pane)
+        self.query_one(HEADS[pane]).focus()
+
+    def show_map(self) -> None:
+        self.action_pane("map")
+
+    def complain(self, error: UserError) -> None:
+        if form.field_of(error) not in (None, form.NAME.id):
+            self._show_pane("settings")
+        super().complain(error)
+
+    # Other keys.
 
     def action_scroll(self, pages: int) -> None:
         explained = self.query_one(Explained)
         explained.scroll_relative(y=pages * max(1, explained.size.height - 1), animate=False)
 
-    @property
-    def _form(self) -> OptionsForm:
-        return self.query_one(OptionsForm)
+    def action_more(self) -> None:
+        self._show_pane("settings")
+        self.form.toggle_more()
 
-    # Start.
+    def action_zoom(self, factor: float) -> None:
+        self.query_one(WorldMap).zoom(factor)
 
-    def on_button_pressed(self) -> None:
-        self.action_start()
-
-    @on(Input.Submitted)
-    def _submitted(self) -> None:
-        self.action_start()
-
-    def action_start(self) -> None:
-        if self._starting:
-            return
-        try:
-            scenario, jobs, path = self._asked_for()
-        except UserError as error:
-            self._complain(error)
-            return
-        self._starting = True
-        self._form.tell("checking ...")
-        self._create(scenario, jobs, path, self._form.accept_mode)
-
-    def _asked_for(self) -> tuple[Scenario, int, Path]:
-        """What the form says. Raises UserError."""
-        from ddenv.launch.runs import find_run
-        from ddenv.launch.scenarios import scenario_for_world, with_options
-
-        if self._chosen is None:
-            raise UserError("choose a scenario or a world that can be read first")
-        texts = self._form.texts
-        options = form.values(form.OPTIONS, texts)
-        name = str(form.value(form.NAME, texts["name"]))
-        jobs = form.jobs(options.pop("jobs"))
-        scenario = self._chosen.scenario
-        if scenario is None:
-            scenario = scenario_for_world(self._chosen.path, self._form.place("spawn"), self._form.place("goal"))
-        path = find_run(name)
-        if path.exists():
-            raise form.FieldError("name", f"run name: {path} exists already; choose another name")
-        options |= self._form.method
-        return with_options(scenario, reading=self._chosen.reading, **options), jobs, path
-
-    @work(thread=True, group="start", exclusive=True)
-    def _create(self, scenario: Scenario, jobs: int, path: Path, mode: str) -> None:
-        from ddenv.launch.runs import create_run
-
-        engine = Engine(path)
-        try:
-            create_run(scenario, path)
-            engine.start(jobs, mode)
-        except UserError as error:
-            self.app.call_from_thread(self._complain, error)
-            return
-        self.app.call_from_thread(self._started, path, engine)
-
-    def _started(self, path: Path, engine: Engine) -> None:
-        from ddenv.workbench.screens.run import RunScreen
-
-        self.app.switch_screen(RunScreen(path, engine))
-
-    def _complain(self, error: UserError) -> None:
-        self._starting = False
-        self._form.complain(error)
-
-    # Other keys.
+    def action_fit(self) -> None:
+        self.query_one(WorldMap).fit()
 
     def action_open(self) -> None:
         self.app.push_screen(OpenFile(Path.cwd()), self._opened)
 
     def _opened(self, path: Path | None) -> None:
         if path is not None:
-            options = self.query_one("#scenario-list", OptionList)
-            options.highlighted = options.get_option_index(self._offer(path))
-            options.focus()
+            self._opened_now = path
+            self._show_pane("choose")
+            self.query_one(FileList).add(path)
 
     def action_home(self) -> None:
-        self.query_one("#scenario-list").focus()
+        if self.picked_next:
+            self.pick("")
+        else:
+            self.action_pane("choose")
 
     def action_help(self) -> None:
         bindings = (*self.BINDINGS, *SchemaSelect.BINDINGS)
-        keys = [(binding.key_display or binding.key, binding.tooltip) for binding in bindings]
+        keys = [(binding.key_display or binding.key.replace(",", " "), binding.tooltip) for binding in bindings]
         more = [
             ("tab", "next field"),
             ("enter", "in a list: take it; in a field: start"),
             ("ctrl+p", "commands: themes, screenshot"),
         ]
         self.app.push_screen(Help(keys + more))
+
+
+def _title() -> Text:
+    return Text(" ddenv", "bold", no_wrap=True).append("  find the few models that make a robot fail", "not bold dim")
+
+
+def _free_name(name: str) -> str:
+    """The name that the next run of a scenario gets."""
+    from ddenv.launch.runs import free_run_path
+
+    try:
+        return free_run_path(name).stem
+    except OSError:
+        return "run"

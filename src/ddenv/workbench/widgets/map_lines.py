@@ -39,10 +39,9 @@ class MapLines(Widget):
     def _about(self, world: WorldMap, width: int) -> Text:
         text = Text(no_wrap=True)
         if world.selection:
-            text.append(f"{len(world.selection)} selected", "bold").append(
-                ": p pins, w tries without, o only   ", "dim"
-            )
-        if self._shown is not None:
+            keys = ": p pin, w try without, o try only" if width > 44 else ": p, w or o"
+            text.append(f"{len(world.selection)} selected", "bold").append(keys, "dim")
+        elif self._shown is not None:
             text.append(f"{self._shown.label}: {count(self._shown.size, 'model')}", "bold")
-            text.append("  others in small letters" if width > 44 and not world.selection else "", "dim")
+            text.append("  others in small letters" if width > 44 else "", "dim")
         return text

@@ -1,0 +1,100 @@
+"""The setup screen in a test: what it shows, and what is typed into it."""
+
+from contextlib import suppress
+
+from textual.widgets import Select, Static
+from textual.worker import WorkerCancelled
+
+from ddenv.launch.runs import read_parts
+from ddenv.runfile.store import RunFile
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.methods import KINDS
+from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.screens.setup import SetupScreen
+from ddenv.workbench.widgets.map import WorldMap
+from ddenv.workbench.widgets.schema import Explained
+
+
+class Session:
+    def __init__(self, app, pilot):
+        self.app, self.pilot = app, pilot
+
+    @property
+    def screen(self) -> SetupScreen:
+        return next(screen for screen in self.app.screen_stack if isinstance(screen, SetupScreen))
+
+    async def settle(self):
+        # Not every worker: the file tree keeps one for as long as it lives.
+        for group in ("recent", "world", "runs", "start", "save", "recent", "cost"):
+            workers = [worker for worker in self.app.workers if worker.group == group]
+            for worker in workers:
+                with suppress(WorkerCancelled):
+                    await worker.wait()
+        while not self.app.screen.is_mounted:
+            await self.pilot.pause()
+        await self.pilot.pause()
+
+    async def press(self, *keys):
+        await self.pilot.press(*keys)
+        await self.settle()
+
+    def fill(self, **texts):
+        for id, text in texts.items():
+            self.screen.query_one(f"#{id}").value = text
+
+    def wrong(self):
+        return self.screen.query_one("#wrong", Static).render().plain
+
+    def method(self):
+        return [self.screen.query_one(f"#{kind}", Select).value for kind in KINDS]
+
+    def explained(self):
+        """The title and the words of the explanation."""
+        panel = self.screen.query_one(Explained)
+        return panel.title, panel.query_one(Static).render().plain.removeprefix(f"{panel.title}  ")
+
+    def value(self, id):
+        return self.screen.form.texts[id]
+
+    def told(self, id):
+        """The words of a line of the screen."""
+        return self.screen.query_one(f"#{id}", Static).render().plain
+
+    def wrong_or_run(self):
+        """What Start complained about, or the name of the run that it made."""
+        screen = self.app.screen
+        return screen.run.stem if isinstance(screen, RunScreen) else self.wrong()
+
+    def made(self):
+        """The scenario of the run that was started."""
+        with RunFile(self.app.screen.run) as run:
+            return read_parts(run)[0]
+
+    def notice(self):
+        """What stands in the place of the map."""
+        return self.screen.query_one(WorldMap).notice
+
+    async def open(self, path):
+        """As the dialog would."""
+        self.screen._opened(path)
+        await self.pilot.pause()
+        await self.settle()
+
+
+class Opened:
+    def __init__(self, size=(120, 36), reading=None, screen=None):
+        self.size, self.reading, self.screen = size, reading, screen
+
+    async def __aenter__(self):
+        app = Workbench(reading=self.reading)
+        self._context = app.run_test(size=self.size)
+        pilot = await self._context.__aenter__()
+        await pilot.pause()
+        if self.screen is not None:
+            await app.switch_screen(self.screen())
+        session = Session(app, pilot)
+        await session.settle()
+        return session
+
+    async def __aexit__(self, *error):
+        await self._context.__aexit__(*error)

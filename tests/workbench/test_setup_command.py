@@ -1,0 +1,138 @@
+"""The command that the setup screen shows does what its Start does."""
+
+import shlex
+
+import fake_run
+import pytest
+import yaml
+from setup_session import Opened
+
+from ddenv.cli.app import app as command_line
+from ddenv.workbench import form
+from ddenv.workbench.command_line import command, source_of
+
+
+@pytest.fixture
+def asked_by(scenarios, monkeypatch):
+    """The scenario, the run's path and the jobs that a command line would start with."""
+
+    class Caught(Exception):
+        pass
+
+    def asked_by(words):
+        caught = []
+        with monkeypatch.context() as patch:
+
+            def create_run(scenario, path, *_):
+                caught.extend((scenario, path))
+                raise Caught
+
+            patch.setattr("ddenv.launch.runs.create_run", create_run)
+            patch.setattr("ddenv.world.load.SCENARIOS", scenarios)
+            with pytest.raises(Caught):
+                command_line(words[1:], standalone_mode=False)
+        return caught
+
+    return asked_by
+
+
+# Another value for each option; texts as they are typed.
+OTHER = {
+    "iterations": "7",
+    "budget": "90",
+    "timeout": "12.5",
+    "epsilon": "0.125",
+    "seed": "4",
+    "baseline_runs": "6",
+    "n_partitions": "3",
+    "delta": "0.75",
+    "early_stop": "on",
+    "similarity": "trajectory",
+    "candidates": "complements",
+    "complement_order": "far-first",
+    "growth": "steady",
+    "skip": "implied",
+    "prior": "uniform",
+    "spawn_x": "-5.5",
+    "spawn_y": "-0.25",
+    "spawn_z": "0.3",
+    "spawn_yaw": "-1e-05",
+    "goal_x": "-6.125",
+    "goal_y": "2",
+}
+
+
+def test_every_setting_has_an_option(scenarios, asked_by):
+    from ddenv.world.load import load_scenario
+
+    own = load_scenario(scenarios / "crates.yaml")
+    assert set(OTHER) == {field.id for field in form.ALL if field.key}
+    asked = form.asked_of(own, OTHER, "timeseg/random", "ddmin")
+    words = command("crates", own, asked, standard=own, jobs=3, reading={}, name="it's <mine>")
+    assert words[:3] == ["ddenv", "run", "crates"]
+    scenario, path = asked_by(shlex.split(shlex.join(words)))
+    assert scenario == asked
+    assert path.name == "it's <mine>.ddenv"
+
+
+def test_a_limit_can_be_taken_back(scenarios, asked_by):
+    from ddenv.world.load import load_scenario
+
+    data = fake_run.scenario()
+    data["reduction"]["budget"] = 50
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(data))
+    own = load_scenario(scenarios / "crates.yaml")
+    asked = form.asked_of(own, form.texts_of(own) | {"budget": ""}, "timeseg/random", "ddmin")
+    assert asked.reduction.budget is None
+    scenario, _ = asked_by(command("crates", own, asked, standard=own, jobs=4, reading={}))
+    assert scenario == asked
+
+
+async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, started):
+    async with Opened() as session:
+        assert session.told("command") == "$ ddenv run crates"
+        await session.press("f9")
+        session.fill(iterations="5", growth="steady", spawn_x="-6.25", goal_y="-0.5", jobs="2", name="mine")
+        session.screen.query_one("#algorithm").value = "ddmin"
+        await session.pilot.pause()
+        shown = session.told("command").removeprefix("$ ")
+        assert shown.startswith("ddenv run crates --spawn=-6.25,0,0.2,0 --goal=6,-0.5 --algorithm ddmin --iterations 5")
+        assert shown.endswith("--growth steady --jobs 2 --name mine")
+        await session.press("f8")
+        assert session.app.clipboard == shown
+        await session.press("ctrl+s")
+        assert asked_by(shlex.split(shown)) == [session.made(), session.app.screen.run]
+
+
+async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_path, asked_by):
+    folder = tmp_path / "my worlds"
+    folder.mkdir()
+    path = folder / "it's.sdf"
+    path.write_bytes((scenarios / "crates.sdf").read_bytes())
+    async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",), "model_path": (folder,)}) as session:
+        await session.open(path)
+        assert session.told("command") == ""
+        assert "not ready: spawn x m: is missing" in session.told("cost")
+        session.fill(spawn_x="-6", spawn_y="0", spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+        await session.pilot.pause()
+        words = shlex.split(session.told("command"))[1:]
+        assert words[2] == str(path)
+        assert words[3:5] == ["--spawn=-6,0,0.16,0", "--goal=6,0"]
+        scenario, run = asked_by(words)
+        assert scenario == session.screen._scenario()
+        assert run.stem == "it-s-1"
+
+
+async def test_what_is_wrong_has_no_command_to_copy(scenarios):
+    async with Opened() as session:
+        session.fill(timeout="soon")
+        await session.pilot.pause()
+        assert "not ready: timeout s: expected a number" in session.told("cost")
+        await session.press("f8")
+        assert session.app.clipboard == ""
+        assert session.app.focused.id == "timeout"
+
+
+def test_other_files_are_named_whole(scenarios, tmp_path):
+    assert source_of(scenarios / "crates.yaml", scenarios) == "crates"
+    assert source_of(tmp_path / "crates.yaml", scenarios) == str(tmp_path / "crates.yaml")

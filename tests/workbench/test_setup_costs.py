@@ -1,0 +1,79 @@
+"""What a reduction is said to cost, and where the seconds come from."""
+
+import fake_run
+import pytest
+
+from ddenv.workbench import form
+from ddenv.workbench.costs import Past, past_of, whole_cost
+from ddenv.workbench.meanings import Circumstances, cost, meaning, not_used
+from ddenv.world.scenario import Scenario
+
+FIELDS = {field.id: field for field in form.ALL}
+
+
+def scenario(**reduction):
+    data = fake_run.scenario()
+    data["reduction"] |= reduction
+    return Scenario.model_validate(data)
+
+
+def test_choices_are_those_of_the_scenario():
+    for field in form.ALL:
+        if not field.key or not field.choices or field.kind is bool:
+            continue
+        section, key = field.key.split(".")
+        allowed = Scenario.model_fields[section].annotation.model_fields[key].annotation.__args__
+        assert field.choices == allowed
+
+
+def test_seconds_and_rate_come_from_earlier_runs_of_the_same_scenario(runs):
+    assert past_of(scenario(), runs) == Past()
+    fake_run.FakeRun(runs / "a.ddenv").created().baseline().close()
+    other = fake_run.scenario(name="other")
+    fake_run.FakeRun(runs / "b.ddenv", other).created().baseline(4).close()
+    (runs / "bad.ddenv").write_text("no run")
+    assert past_of(scenario(), runs) == Past(1, 2.0, 0.75)
+    assert past_of(scenario(), runs / "none") == Past()
+
+
+def test_tests_and_time_are_told():
+    known = Past(1, 3.0, 1.0)
+    words = whole_cost(scenario(), 43, 2, known)
+    assert words.startswith("about ")
+    assert "with 2 jobs; 4 of them the baseline; 3.0 s a test in earlier runs" in words
+    assert "the time is known after the baseline of 4 tests" in whole_cost(scenario(), 43, 2, Past())
+    assert whole_cost(scenario(budget=9), 43, 1, known).startswith("9 tests at most, 27 s with 1 job")
+
+
+def test_more_iterations_and_more_models_cost_more():
+    def tests(models, **reduction):
+        return int(whole_cost(scenario(**reduction), models, 2, Past()).split()[1])
+
+    assert tests(43, iterations=0) < tests(43, iterations=8)
+    assert tests(10) < tests(300)
+
+
+@pytest.mark.parametrize("field", form.ALL, ids=lambda field: field.id)
+def test_every_field_has_a_meaning(field):
+    words = meaning(field)
+    assert words.endswith(".")
+    assert words[0].isupper()
+
+
+def test_costs_follow_what_is_typed():
+    now = Circumstances(seconds=1.25, processors=8)
+    assert cost(FIELDS["iterations"], {"iterations": "0"}, now) == "A candidate without f costs 1 test."
+    assert "up to 6 candidates" in cost(FIELDS["n_partitions"], {"n_partitions": "3", "candidates": "both"}, now)
+    assert "up to 3 candidates" in cost(FIELDS["n_partitions"], {"n_partitions": "3", "candidates": "partitions"}, now)
+    assert "about 1.2 s of real time" in cost(FIELDS["timeout"], {"timeout": "30"}, now)
+    assert "8 processors" in cost(FIELDS["jobs"], {"jobs": "2"}, now)
+    for text in ("", "many", "inf", "nan", "-1"):
+        assert "candidate without" not in cost(FIELDS["iterations"], {"iterations": text}, now)
+
+
+def test_what_is_not_used_is_said():
+    assert "ddmin does not look at it" in not_used(FIELDS["growth"], Circumstances("ddmin"))
+    assert not not_used(FIELDS["growth"], Circumstances("ddenv"))
+    assert not not_used(FIELDS["growth"], Circumstances("of-another-package"))
+    assert not not_used(FIELDS["delta"], Circumstances("ddenv", "trajectoryseg/random"))
+    assert not_used(FIELDS["delta"], Circumstances("ddmin", "trajectoryseg/random"))

@@ -1,0 +1,94 @@
+"""What the setup screen says of input that is wrong, strange or too large; and its baseline."""
+
+import fake_run
+import pytest
+import yaml
+from setup_session import Opened
+from textual.widgets import Input
+
+from ddenv.runfile.store import RunFile
+
+GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
+STRANGE = "[bold]x[/] \x1b[31m\u202eסוף" + "m" * 300
+
+
+async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
+    async with Opened() as session:
+        session.fill(jobs="3")
+        await session.press("f6")
+        assert session.wrong_or_run() == "crates-1"
+        assert started == [("crates-1.ddenv", 3, {"accept_mode": "automatic"})]
+        with RunFile(runs / "crates-1.ddenv") as run:
+            assert [(command.kind, command.data) for command in run.commands()] == [("step", {"unit": "round"})]
+
+
+@pytest.mark.parametrize(
+    ("models", "told"),
+    [("", "No model of it can be removed"), (fake_run.box("one", 3, 3), "1 model: all that can be found")],
+    ids=["none", "one"],
+)
+async def test_worlds_with_little_in_them(scenarios, runs, started, models, told):
+    own = fake_run.scenario(protected=())
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    (scenarios / "crates.sdf").write_text(GROUND_ONLY.format(fake_run.GROUND + models))
+    async with Opened() as session:
+        assert session.told("about").startswith(told)
+        await session.press("ctrl+s")
+        assert (
+            session.wrong_or_run() == "crates-1" if models else "has no model that could be removed" in session.wrong()
+        )
+        assert len(started) == bool(models)
+
+
+async def test_a_folder_that_cannot_be_written_is_told_in_one_line(scenarios, tmp_path, monkeypatch, started):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path / "file"))
+    async with Opened() as session:
+        await session.press("ctrl+s")
+        assert "cannot be written: Not a directory" in session.wrong()
+        session.fill(epsilon="0.5")
+        await session.press("ctrl+s")
+        assert "cannot be written" in session.wrong()
+        assert started == []
+
+
+async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs, started):
+    own = fake_run.scenario(name="[red]" + "ß" * 70) | {"description": STRANGE}
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    (scenarios / "crates.sdf").write_bytes(fake_run.world_text([STRANGE.replace("\x1b", "").strip("[]"), "b"]))
+    async with Opened((80, 24)) as session:
+        assert "[bold]x[/] �[31m" in session.screen.chosen.about
+        assert str(session.screen.query_one("#preview").border_title).startswith("\\[red]ß")
+        await session.press("ctrl+s")
+        assert session.wrong_or_run().startswith("-red-ß")
+
+
+NAMES = (
+    ("x" * 300, "cannot be written"),
+    ("a\0b", "cannot be"),
+    (".hidden", "cannot be a file's name"),
+    ("no/such", ""),
+)
+
+
+async def test_names_that_cannot_be_files_are_told(scenarios, started):
+    async with Opened() as session:
+        for name, words in NAMES:
+            # A NUL can be pasted, though not typed.
+            field = session.screen.query_one("#name", Input)
+            field.value = name
+            await session.press("ctrl+s")
+            assert words in session.wrong(), name
+            assert session.app.focused is field
+        assert started == []
+
+
+@pytest.mark.parametrize("size", [(20, 5), (63, 40), (200, 17)], ids=str)
+async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
+    async with Opened(size) as session:
+        assert session.told("small") == f"ddenv needs 64 x 18, this is {size[0]} x {size[1]}"
+        assert session.screen.query_one("#small").region.size == size
+        await session.pilot.resize_terminal(120, 36)
+        await session.pilot.pause()
+        assert not session.screen.query_one("#small").display
+        assert session.screen.query_one("#map").size.height > 10

@@ -1,0 +1,87 @@
+"""A run can be made again with other settings, also where the files it came from are gone."""
+
+import shutil
+
+import fake_run
+import pytest
+from setup_session import Opened
+
+from ddenv.errors import UserError
+from ddenv.launch.runs import create_like, create_run, read_parts
+from ddenv.runfile.store import RunFile
+from ddenv.workbench.screens.setup import SetupScreen
+from ddenv.world.load import load_scenario
+
+
+@pytest.fixture
+def made(scenarios, runs):
+    """A run whose scenario's files are gone."""
+    path = runs / "crates-1.ddenv"
+    create_run(load_scenario(scenarios / "crates.yaml"), path)
+    shutil.rmtree(scenarios)
+    return path
+
+
+def scenario_of(path):
+    with RunFile(path) as run:
+        return read_parts(run)[0]
+
+
+async def test_it_starts_from_the_run_file_alone(made, runs, started):
+    async with Opened(screen=lambda: SetupScreen(like=made)) as session:
+        assert session.told("about").startswith("11 models. As in the run crates-1.")
+        assert session.value("name") == "crates-2"
+        assert "f7 saves it" in session.told("command")
+        session.fill(iterations="9", spawn_y="1")
+        await session.press("ctrl+s")
+        assert session.wrong_or_run() == "crates-2"
+        scenario = scenario_of(runs / "crates-2.ddenv")
+        assert (scenario.reduction.iterations, scenario.robot.spawn.y) == (9, 1.0)
+        assert started[0][0] == "crates-2.ddenv"
+
+
+async def test_what_is_gone_cannot_be_saved(made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    async with Opened(screen=lambda: SetupScreen(like=made)) as session:
+        await session.press("f7")
+        await session.press("enter")
+        assert "not there any more" in session.app.screen.query_one("#wrong").render().plain
+
+
+async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, runs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = runs / "crates-1.ddenv"
+    create_run(load_scenario(scenarios / "crates.yaml"), path)
+    async with Opened(screen=lambda: SetupScreen(like=path)) as session:
+        await session.press("f7", "enter")
+        await session.settle()
+        assert session.told("command") == f"$ ddenv run {tmp_path / 'crates.yaml'}"
+        session.fill(iterations="9")
+        await session.pilot.pause()
+        assert session.told("command").endswith("crates.yaml --iterations 9")
+
+
+async def test_a_damaged_run_is_told_in_the_preview(runs):
+    (runs / "bad.ddenv").write_text("no run")
+    async with Opened(screen=lambda: SetupScreen(like=runs / "bad.ddenv")) as session:
+        assert "is no ddenv run file" in session.notice()
+
+
+def test_what_does_not_fit_is_refused_before_anything_is_written(made, runs):
+    scenario = scenario_of(made)
+    spawn = scenario.robot.spawn.model_copy(update={"z": 0.0})
+    low = scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"spawn": spawn})})
+    with pytest.raises(UserError, match="stands inside"):
+        create_like(made, low, runs / "low.ddenv")
+    with pytest.raises(UserError, match="no model 'who'"):
+        create_like(made, scenario.model_copy(update={"protected": ("who",)}), runs / "low.ddenv")
+    assert [path.name for path in runs.glob("*.ddenv")] == ["crates-1.ddenv"]
+
+
+def test_files_beside_the_world_come_along(runs):
+    run = fake_run.FakeRun(runs / "old.ddenv")
+    run.file._db.execute("INSERT INTO document VALUES ('resource model://x', ?)", (b"<x/>",))
+    run.close()
+    create_like(run.path, scenario_of(run.path), runs / "new.ddenv")
+    with RunFile(runs / "new.ddenv") as new:
+        assert new.documents("resource ") == {"model://x": b"<x/>"}
