@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ddenv import schemas
-from ddenv.console.words import first_of
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.words import first_of
 from ddenv.workbench.methods import chosen, uses
 
 PAPER = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")

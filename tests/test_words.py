@@ -81,3 +81,15 @@ def test_why_tests_broke_is_told_at_the_end():
     state = states(started(1), ended(1, "error", "the controller Follow raised ValueError: no"))[-1]
     assert broken(state) == ["1 test broke, the last one: the controller Follow raised ValueError: no"]
     assert broken(states(started(1), ended(1, "pass"))[-1]) == []
+
+
+def test_what_the_user_does_by_hand_is_told_in_its_own_words():
+    tried = ("trial_started", {"trial": 1, "models": [0, 1]})
+    judged = ("trial_judged", {"trial": 1, "verdict": "dissimilar", "tests": [], "known": 0})
+    _, before, after, last = states(started(1), tried, judged)
+    assert news("trial_started", before, after) == "tried 2 of 4 models (try 1): without c, d"
+    assert news("trial_judged", after, last) == "  try 1 (2 models): dissimilar after 0 tests"
+    before, after = states(("paused", {}), ("command_refused", {"command": 1, "why": "not pinned"}))[-2:]
+    assert news("paused", states(started(1))[-1], before).endswith("attach with 'ddenv open'")
+    assert news("paused", states(started(1))[-1], before, attached=True) == "paused"
+    assert news("command_refused", before, after) == "not done: not pinned"

@@ -97,7 +97,7 @@ def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, heig
 
 def test_the_first_screen_offers_the_ditch(terminal):
     setup = terminal(80, 24)
-    screen = setup.see("Start")
+    screen = setup.see("ditch")
     assert "ditch" in screen
     assert "43 models" in setup.see("43 models")
     setup.press("q")

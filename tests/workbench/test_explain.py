@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import fake_run
 import pytest
 
@@ -327,6 +329,60 @@ def test_the_last_sweep_is_told_as_one(run_by, algorithm):
     run.write("round_finished")
     run.write("finished", minimal=True, reason="no candidate showed f")
     assert told(run, "absent")[0] == 8
+
+
+def test_tries_and_pins_are_told_beside_the_round(run):
+    fake_run.guided(run)
+    line, words = told(run)
+    assert line == 5
+    assert "First run of part B (3 models)" in words
+    assert "try 3 by hand (4 models) is tested: first run." in words
+    assert "Pinned, and so in every candidate: crate_00." in words
+    run.judge_trial(3, "similar", [15])
+    assert told(run)[1].startswith("try 3 shows f with 4 models: a on its row adopts it.")
+
+
+def test_how_the_user_came_to_this_environment_is_told_until_something_is_run(run):
+    fake_run.guided(run).go_back(1)
+    assert told(run)[1].startswith("Went to 6 models (part A).")
+    run.write("changed", settings={"iterations": 5})
+    assert told(run)[1].startswith("Changed iterations 3 to 5: it holds from this round on.")
+    run.try_out(run.elements[:3])
+    run.finish(run.start_hand(4), "similar", 0.1, failure="stuck")
+    run.judge_trial(4, "similar", [run.tests])
+    run.adopt(4, run.elements[:3], run.tests)
+    words = told(run)[1]
+    assert words.startswith("You adopted try 4: 6 → 3 models. Round 4")
+    run.write("accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={}, distances={})
+    assert told(run)[1].startswith("You took the other failure of try 2 for as good as f: 3 → 2 models.")
+    run.start_round(2, run.elements[:2])
+    run.dissimilar(0)
+    run.write("round_finished")
+    assert "You took" not in told(run)[1]
+
+
+def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):
+    run.created().baseline()
+    run.write("changed", settings={"budget": 4})
+    run.write("engine_stopped", reason="the budget of 4 tests is used up")
+    words = told(run, "absent")[1]
+    assert "The engine was stopped: the budget of 4 tests is used up." in words
+    assert "c gives more, and the run goes on" in words
+
+
+def test_what_was_pinned_is_not_called_needed(run):
+    fake_run.finished(run)
+    run.pin("crate_00")
+    assert "1 model pinned by you always stayed" in told(run, "absent")[1]
+
+
+def test_a_file_that_is_gone_and_another_engine_are_told(run):
+    fake_run.mid_round(run)
+    found = snapshot(run)
+    gone = replace(found, gone=True, error="x.ddenv: the run file was deleted", engine="absent")
+    assert explain(gone).sentences[0] == "x.ddenv: the run file was deleted."
+    other = replace(found, state=found.state.changed(engine_version="0.0.1"))
+    assert explain(other).sentences[0].startswith("Another version of ddenv works on this run (0.0.1)")
 
 
 @pytest.mark.parametrize("scenario", [{}, {"reduction": 3, "failure": {"epsilon": "x"}}])

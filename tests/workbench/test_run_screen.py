@@ -1,4 +1,4 @@
-"""Every key of the run screen, on runs whose engine is a fake."""
+"""What the run screen shows and its keys that change nothing, on runs whose engine is a fake."""
 
 import subprocess
 import sys
@@ -6,181 +6,59 @@ from types import SimpleNamespace
 
 import fake_run
 import pytest
+from attached import Attached, starts
 from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.poll import Poll
+from ddenv.workbench.screens.change import Change
+from ddenv.workbench.screens.choose import ChooseModels
+from ddenv.workbench.screens.compare import Compare
+from ddenv.workbench.screens.copy import Copy
 from ddenv.workbench.screens.dialogs import Help, Method, Quit, SceneDialog, ssh_line
+from ddenv.workbench.screens.history import History
+from ddenv.workbench.screens.layers import Layers
+from ddenv.workbench.screens.question import Question
 from ddenv.workbench.screens.run import RunScreen
 from ddenv.workbench.screens.setup import SetupScreen
 from ddenv.workbench.widgets.candidates import Candidates
+from ddenv.workbench.widgets.footer import KeyFooter
+from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.map import WorldMap
 from ddenv.workbench.widgets.schema import SchemaSelect
 
 URL = "http://127.0.0.1:7012/static/"
 
 
-class Session:
-    """An app on a run, with what tests ask of it."""
-
-    def __init__(self, app, pilot, run):
-        self.app, self.pilot, self.run = app, pilot, run
-
-    @property
-    def screen(self) -> RunScreen:
-        return next(screen for screen in self.app.screen_stack if isinstance(screen, RunScreen))
-
-    async def press(self, *keys):
-        for key in keys:
-            await self.pilot.press(key)
-        await self.pilot.pause()
-
-    async def look(self):
-        """Lets the screen see what was written, without waiting for its clock."""
-        self.screen._poll._looked = -1e9
-        self.screen._look()
-        await self.pilot.pause()
-        assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
-
-    def commands(self):
-        return [(command.kind, command.data) for command in self.run.file.commands()]
-
-    def notices(self):
-        return [notice.message for notice in self.app._notifications]
-
-    def text(self, selector):
-        rendered = self.screen.query_one(selector).render()
-        return getattr(rendered, "plain", str(rendered))
-
-
-class Attached:
-    def __init__(self, run, size=(120, 36)):
-        self.run, self.size = run, size
-
-    async def __aenter__(self):
-        app = Workbench(self.run.path)
-        self._context = app.run_test(size=self.size)
-        pilot = await self._context.__aenter__()
-        await app.workers.wait_for_complete()
-        await pilot.pause()
-        return Session(app, pilot, self.run)
-
-    async def __aexit__(self, *error):
-        await self._context.__aexit__(*error)
-
-
-async def test_space_pauses_and_resumes(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("space")
-        assert session.commands() == [("pause", {})]
-        assert "… pause" in session.text("#status")
-        run.write("paused")
-        run.write("command_handled", command=1)
-        await session.look()
-        assert "‖ paused" in session.text("#status")
-        assert "… pause" not in session.text("#status")
-        await session.press("space")
-        assert session.commands()[1:] == [("resume", {})]
-
-
-async def test_s_steps_a_test_and_shift_s_a_round(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("s", "S")
-        assert session.commands() == [("step", {"unit": "test"}), ("step", {"unit": "round"})]
-
-
-@pytest.mark.parametrize(("key", "kind"), [("a", "accept"), ("x", "reject")])
-async def test_a_and_x_decide_on_the_reduction_that_waits(run, key, kind):
-    fake_run.waiting(run).hold()
-    async with Attached(run) as session:
-        assert "? waiting" in session.text("#status")
-        await session.press("s")
-        assert "a reduction waits" in session.notices()[-1]
-        await session.press(key)
-        assert session.commands() == [(kind, {"round": 1, "candidate": 0})]
-
-
-async def test_a_does_nothing_when_nothing_waits(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("a", "x")
-        assert session.commands() == []
-        assert session.notices() == ["nothing waits for accept", "nothing waits for reject"]
-
-
-async def test_v_vetoes_what_is_under_the_cursor(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("down", "down", "v")
-        assert session.commands() == [("veto", {"round": 2, "candidate": 3})]
-        run.write("vetoed", candidate=3, verdict="vetoed")
-        await session.look()
-        await session.press("v")
-        assert "without B is vetoed already" in session.notices()[-1]
-        await session.press("home", "v")
-        assert len(session.commands()) == 1
-        assert "part A is dissimilar already" in session.notices()[-1]
-
-
-async def test_v_before_the_first_round(run):
-    run.created().hold()
-    async with Attached(run) as session:
-        await session.press("v")
-        assert session.notices() == ["there are no candidates yet"]
-
-
-async def test_v_after_the_last_round(run):
-    fake_run.confirming(run).hold()
-    async with Attached(run) as session:
-        await session.press("v")
-        assert (session.notices(), session.commands()) == (["the rounds are over"], [])
-
-
-async def test_t_switches_between_automatic_and_ask(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("t")
-        run.write("accept_mode", mode="ask")
-        run.write("command_handled", command=1)
-        await session.look()
-        assert "accept: ask" in session.text("#status")
-        await session.press("t")
-        assert session.commands() == [("accept_mode", {"mode": "ask"}), ("accept_mode", {"mode": "automatic"})]
-
-
 async def test_the_cursor_follows_the_run_until_it_is_moved(run):
     fake_run.mid_round(run).hold()
     async with Attached(run) as session:
-        table = session.screen.query_one(Candidates)
-        assert table.cursor_row == 1
-        assert session.screen.query_one(WorldMap).candidate.label == "without A"
+        table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
+        assert table.under_cursor.label == world.candidate.label == "without A"
         await session.press("down", "down", "down")
-        assert session.screen.query_one(WorldMap).candidate.label == "part C"
+        assert world.candidate.label == "part C"
         run.finish(11, "pass")
         run.finish(12, "similar", 0.1)
-        await session.look()
-        assert table.cursor_row == 4
-        assert table.get_cell("1", "tests").plain == "2/4"
         run.start(3)
         await session.look()
+        assert table.under_cursor.label == "part C"
+        assert table.get_cell("1", "tests").plain == "2/4"
         await session.press("escape")
-        await session.look()
-        assert table.cursor_row == 3
-
-
-async def test_a_new_round_is_followed_again(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
+        assert table.under_cursor.label == "without B"
         await session.press("end")
         run.start_round(4, run.elements[:4])
         await session.look()
-        table = session.screen.query_one(Candidates)
         assert table.row_count == 8
         assert table.following
+        for size in ((80, 24), (50, 12), (20, 5), (120, 36)):
+            await session.pilot.resize_terminal(*size)
+            await session.pilot.pause()
+            small = session.screen.query_one("#small")
+            assert small.display == (size[0] < 64)
+            assert not small.display or f"needs 64 x 18; this terminal has {size[0]} x {size[1]}" in str(small.render())
+        assert len(table.columns) == 6
 
 
 async def test_the_baseline_is_listed_run_by_run(run):
@@ -191,38 +69,102 @@ async def test_the_baseline_is_listed_run_by_run(run):
         table = session.screen.query_one(Candidates)
         assert [table.get_row_at(row)[-1].plain.strip() for row in range(2)] == ["◆ failed", "▶ 22.2 s"]
         assert "Baseline" in str(session.screen.query_one("#round").border_title)
+        await session.press("v", "w")
+        assert "there are no candidates yet" in session.said()
 
 
-async def test_zoom_and_fit(run):
-    fake_run.mid_round(run)
+async def test_keys_that_only_look(run):
+    fake_run.guided(run).hold()
     async with Attached(run) as session:
-        world = session.screen.query_one(WorldMap)
+        screen, world = session.screen, session.screen.query_one(WorldMap)
         fitted = world._view
         await session.press("plus")
-        assert world._view.scale == pytest.approx(fitted.scale / 1.25)
-        world.focus()
-        await session.press("minus", "right", "up")
-        assert world._view.x > fitted.x
-        assert world._view.y > fitted.y
+        assert world._view.scale < fitted.scale
         await session.press("0")
         assert world._view == fitted
-
-
-async def test_question_mark_names_every_key(run):
-    fake_run.mid_round(run)
-    async with Attached(run) as session:
-        await session.press("question_mark")
-        assert isinstance(session.app.screen, Help)
-        words = session.app.screen.query_one(Static).render().plain
-        for key in ("space", "shift+s", "e", "escape", "ctrl+z", "+", "0"):
-            assert f"{key}   " in words
+        await session.press("slash", *"_03", "enter")
+        assert world.has_focus
+        assert world.model_at_cursor == "crate_03"
+        await session.press("enter")
+        assert world.selection == {"crate_03"}
+        assert "1 selected" in session.text("#map-lines")
+        await session.press("l", "down", "space", "escape")
+        assert "removed" not in world.shown_layers
+        await session.press("y", "enter")
+        assert session.app.clipboard.split() == run.elements[:5]
+        await session.press("y", "down", "down", "enter")
+        assert session.app.clipboard == "ddenv open crates-1"
         await session.press("escape")
-        assert session.app.screen is session.screen
+        assert not world.selection
+        await session.press("E")
+        assert type(session.app.screen).__name__ == "ExportScreen"
+        await session.press("escape", "question_mark")
+        assert isinstance(session.app.screen, Help)
+        words = {
+            (shortcut.keys, shortcut.words) for group in session.app.screen._groups for shortcut in group.shortcuts
+        }
+        keys = {key for each, _ in words for key in each.split()}
+        assert keys >= {*"?+-012345/acdeghlmopqrstuvwxy", "space", "shift+s", "shift+r"}
+        await session.press("escape", "R")
+        assert type(session.app.screen).__name__ == "RunsScreen"
+        await session.press("escape")
+        assert session.app.screen is screen
+        assert session.commands() == []
+
+
+async def test_the_log_tells_what_happened_and_goes_on(run):
+    fake_run.guided(run).hold()
+    async with Attached(run, (80, 24)) as session:
+        await session.press("L")
+        log = session.screen.query_one("#log", Lines)
+        words = [entry.words.strip() for entry in log.items]
+        assert log.has_focus
+        assert "pinned crate_00" in words
+        assert "try 1 (5 models): similar after 1 test (1 stuck)" in words
+        assert "adopted try 1: 5 models" in words
+        run.write("command_refused", command=1, why="there is no such trial")
+        await session.look()
+        assert log.items[-1].words == "not done: there is no such trial"
+        assert len(log.items) == len(words) + 1
+        assert log.render_line(0).text.startswith("22:13:20")
+
+
+async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(run):
+    fake_run.guided(run).hold()
+    seen = {
+        "1": ["#map", "#candidates", "#happening"],
+        "2": ["#candidates", "#happening"],
+        "3": ["#chart"],
+        "4": ["#happening"],
+        "5": ["#log"],
+    }
+    panes = ("#map", "#candidates", "#chart", "#happening", "#log")
+    async with Attached(run, (80, 24)) as session:
+        for key, shown in seen.items():
+            await session.press(key)
+            assert [pane for pane in panes if session.screen.query_one(pane).is_on_screen] == shown
+        await session.press("g")
+        assert session.screen.query_one(WorldMap).has_focus
+        await session.pilot.click("#pane-chart")
+        assert session.screen.query_one("#chart").is_on_screen
+        await session.press("v")
+        assert "2 shows it" in session.said()
+        footer = [key.description for key in session.screen.query("FooterKey")]
+        assert footer == ["pause", "step", "accept", "veto", "pin", "try without", "undo", "help", "quit"]
+        await session.pilot.resize_terminal(200, 60)
+        await session.pilot.pause()
+        more = ("#models", "#decisions", *panes)
+        assert all(session.screen.query_one(pane).is_on_screen for pane in more)
+        names = [row.name for row in session.screen.query_one("#models", Lines).items]
+        assert names == ["crate_04", "crate_03", "crate_02", "crate_01", "crate_00"]
+        await session.pilot.click("#models", offset=(2, 1))
+        assert session.screen.query_one(WorldMap).model_at_cursor == "crate_03"
 
 
 def test_every_binding_has_an_id_and_a_tooltip():
-    bindings = [*RunScreen.BINDINGS, *WorldMap.BINDINGS, *Workbench.BINDINGS, *Quit.BINDINGS, *SceneDialog.BINDINGS]
-    bindings += [*Method.BINDINGS, *SetupScreen.BINDINGS, *SchemaSelect.BINDINGS]
+    owners = (RunScreen, WorldMap, Workbench, Quit, SceneDialog, Method, SetupScreen, SchemaSelect, History)
+    owners += (Compare, Question, ChooseModels, Change, Layers, Copy)
+    bindings = [binding for owner in owners for binding in owner.BINDINGS]
     assert all(binding.id and binding.tooltip for binding in bindings)
     assert len({binding.id for binding in bindings}) == len(bindings)
 
@@ -255,29 +197,6 @@ def run_by(algorithm, runs):
     return fake_run.FakeRun(runs / f"{algorithm}.ddenv", data)
 
 
-HEADERS = {
-    "ddenv": ("crates · model2model/failure-proximal ", "crates · model2model/fa… "),
-    "ddmin": ("crates · ddmin ", "crates · ddmin "),
-    "probdd": ("crates · probdd ", "crates · probdd "),
-    "splitting": ("crates · splitting · failure-proximal ", "crates · splitting "),
-    "theirs": ("crates · theirs · model2model/failure-proximal ", "crates · theirs "),
-}
-
-
-@pytest.mark.parametrize("algorithm", HEADERS)
-async def test_the_header_names_what_the_run_is_reduced_by_as_it_fits(runs, algorithm):
-    run = run_by(algorithm, runs)
-    fake_run.mid_round(run)
-    wide, narrow = HEADERS[algorithm]
-    async with Attached(run) as session:
-        assert wide in session.text("#header")
-        assert ("n 3" in session.text("#header")) == (algorithm not in ("probdd", "splitting"))
-    left_out = algorithm in ("probdd", "splitting")
-    async with Attached(run, (74 if left_out else 80, 24)) as session:
-        assert narrow in session.text("#header")
-    run.close()
-
-
 @pytest.mark.parametrize(
     ("key", "commands", "words"), [("s", [("stop", {})], "ddenv resume crates-1"), ("l", [], "ddenv open crates-1")]
 )
@@ -286,21 +205,12 @@ async def test_q_asks_what_becomes_of_the_engine(run, key, commands, words):
     async with Attached(run) as session:
         await session.press("q")
         assert isinstance(session.app.screen, Quit)
-        await session.press(key)
+        await session.press("escape")
+        assert session.app.screen is session.screen
+        await session.press("q", key)
         assert session.commands() == commands
         assert words in session.app._exit_renderables[0].plain
         assert session.app.return_value == 0
-
-
-async def test_q_can_be_cancelled(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("q", "escape")
-        assert session.app.screen is session.screen
-        await session.pilot.press("q")
-        await session.pilot.click("#cancel")
-        assert session.app.screen is session.screen
-        assert not session.app._exit
 
 
 async def test_q_without_an_engine_just_leaves(run):
@@ -319,28 +229,27 @@ async def test_leaving_tells_how_to_come_back(run, key):
         assert session.commands() == []
 
 
-async def test_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
-    started = []
-
-    def start_engine(path, jobs, **options):
-        started.append((path, jobs, options))
-        return SimpleNamespace(poll=lambda: None)
-
-    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
+async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
+    started = starts(monkeypatch)
     fake_run.mid_round(run)
     async with Attached(run) as session:
         assert "engine is gone" in session.text("#status")
+        assert "r resumes" in session.text("#happening")
+        assert next(iter(session.screen.query("FooterKey"))).description == "start"
+        await session.press("s")
+        assert "space starts one" in session.said()
         await session.press("space")
-        assert "r resumes" in session.notices()[-1]
-        await session.press("r")
         assert started == [(run.path, 2, {"accept_mode": "automatic"})]
         await session.look()
         assert "engine starts" in session.text("#status")
+        await session.press("r")
+        assert "starting already" in session.said()
         run.hold()
         await session.look()
         assert "▶ running" in session.text("#status")
         await session.press("r")
-        assert "running already" in session.notices()[-1]
+        assert "running already" in session.said()
+        assert session.commands() == []
 
 
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
@@ -355,21 +264,12 @@ async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch
         assert "crashed: ModuleNotFoundError: No module named 'x'" in session.text("#happening")
 
 
-async def test_a_finished_run_is_not_resumed(run):
-    fake_run.finished(run)
-    async with Attached(run) as session:
-        await session.press("r", "space")
-        assert session.notices() == ["the run is finished"] * 2
-        assert "2 of 11 models" in session.text("#header")
-        assert "82 % smaller" in session.text("#header")
-
-
 def scene_program(code):
     words = [sys.executable, "-c", code]
     return lambda run: subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-async def test_m_shows_where_the_scene_is(run, monkeypatch):
+async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(run, monkeypatch):
     program = f"import time; print({URL!r}, flush=True); time.sleep(60)"
     monkeypatch.setattr("ddenv.launch.programs.start_scene", scene_program(program))
     monkeypatch.setattr("getpass.getuser", lambda: "ada")
@@ -396,6 +296,10 @@ async def test_m_shows_where_the_scene_is(run, monkeypatch):
         await session.press("m", "x")
         assert process.poll() is not None
         assert not session.screen.scene.on
+        await session.press("m")
+        await session.app.workers.wait_for_complete()
+        process = session.screen.scene._process
+    assert process.poll() is not None
 
 
 async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
@@ -408,47 +312,16 @@ async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
         await session.pilot.pause()
         assert "no port is free" in session.app.screen.query_one("#address", Static).render().plain
         await session.press("c")
-        assert "no address yet" in session.notices()[-1]
-
-
-async def test_the_scene_ends_with_the_workbench(run, monkeypatch):
-    monkeypatch.setattr(
-        "ddenv.launch.programs.start_scene", scene_program(f"import time; print({URL!r}, flush=True); time.sleep(60)")
-    )
-    fake_run.finished(run)
-    async with Attached(run) as session:
-        await session.press("m")
-        await session.app.workers.wait_for_complete()
-        process = session.screen.scene._process
-    assert process.poll() is not None
-
-
-async def test_g_shows_the_chart_where_there_is_little_room(run):
-    fake_run.finished(run)
-    async with Attached(run, (80, 24)) as session:
-        assert not session.screen.query_one("#left").display
-        await session.press("g")
-        assert session.screen.query_one("#left").display
-        assert not session.screen.query_one("#now").display
-
-
-async def test_resizing_keeps_the_selection(run):
-    fake_run.mid_round(run).hold()
-    async with Attached(run) as session:
-        await session.press("end")
-        for size in ((80, 24), (50, 12), (120, 36)):
-            await session.pilot.resize_terminal(*size)
-            await session.pilot.pause()
-            assert session.screen.query_one("#small").display == (size == (50, 12))
-        assert session.screen.query_one(Candidates).cursor_row == 5
-        assert len(session.screen.query_one(Candidates).columns) == 6
+        assert "no address yet" in session.said()
 
 
 async def test_a_damaged_run_is_told_and_nothing_breaks(run):
     fake_run.mid_round(run).write("nonsense")
     async with Attached(run) as session:
         assert "unknown kind 'nonsense'" in session.text("#happening")
-        await session.press("space", "r", "v", "plus", "down")
+        await session.press("space", "r", "v", "p", "w", "u", "plus", "down")
+        assert "cannot be read" in session.said()
+        assert session.commands() == []
 
 
 @pytest.mark.parametrize("pose", ['"x"', "[1, 2]", "{}", "[null, 0, 0, 1, 0, 0, 0]", "[NaN, 0, 0, 1, 0, 0, 0]"])
@@ -480,9 +353,26 @@ async def test_names_are_text_and_never_markup(runs):
     world = fake_run.world_text(names)
     run = fake_run.FakeRun(runs / "markup.ddenv", fake_run.scenario(name="[red]crates[/]"), world)
     run.created().baseline()
+    run.pin(*run.elements[:2])
     run.write("finished", minimal=True, reason="no candidate showed f")
-    async with Attached(run) as session:
+    async with Attached(run, (200, 60)) as session:
         assert "[bold]x[/]" in session.text("#happening")
         assert "[link=file:///]y" in session.text("#happening")
         assert "[red]crates[/]" in session.text("#header")
+        shown = [strip.text for strip in map(session.screen.query_one("#models", Lines).render_line, range(11))]
+        assert any("[bold]x[/]" in line for line in shown)
+        assert "[bold]x[/]" in session.screen.query_one("#decisions", Lines).render_line(0).text
+        await session.press("w", *"[bo", "tab", "enter")
+        assert "without [bold]x[/]" in session.said()
     run.close()
+
+
+async def test_the_footer_keeps_to_its_width(run):
+    fake_run.finished(run)
+    async with Attached(run, (64, 18)) as session:
+        for width in (64, 80, 120, 200):
+            await session.pilot.resize_terminal(width, 36)
+            await session.pilot.pause()
+            keys = list(session.screen.query_one(KeyFooter).children)
+            assert sum(key.size.width + 1 for key in keys) <= width
+            assert {"help", "quit", "accept"} <= {key.description for key in keys}

@@ -13,11 +13,13 @@ from typing import Any
 
 import click
 
-from ddenv import __version__
+from ddenv.cli.config import config_command
 from ddenv.cli.options import JOBS, reading_options, reduction_options, scenario_options
 from ddenv.cli.schemas import schemas_command
+from ddenv.cli.serve import serve_command
 from ddenv.cli.world import world_group
 from ddenv.errors import UserError, printable
+from ddenv.version import __version__
 
 # Of one URI so many columns are told.
 LONGEST_URI = 80
@@ -33,11 +35,13 @@ def app(context: click.Context, **reading) -> None:
     The options are on how the workbench reads worlds; commands that read worlds have them, too.
     """
     if context.invoked_subcommand is None:
-        from ddenv.launch.scenarios import reading_of
         from ddenv.workbench.app import run_workbench
 
-        # What is wrong with them is told before the screen is taken.
-        reading_of(**reading)
+        if any(reading.values()):
+            from ddenv.launch.scenarios import reading_of
+
+            # What is wrong with them is told before the screen is taken.
+            reading_of(**reading)
         context.exit(run_workbench(reading=reading))
     if any(reading.values()):
         raise UserError(f"options on how to read worlds go behind the command: ddenv {context.invoked_subcommand} ...")
@@ -58,8 +62,9 @@ def run(
     scenario, spawn, goal, world, timeout, model_path, stand_in, ignore, name, output, jobs, as_json, **options
 ) -> int:
     """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
+    from ddenv.launch.folder import run_path
     from ddenv.launch.programs import start_engine
-    from ddenv.launch.runs import create_run, run_path
+    from ddenv.launch.runs import create_run
     from ddenv.launch.scenarios import with_options
 
     reading = {"model_path": model_path, "stand_in": stand_in, "ignore": ignore}
@@ -77,8 +82,8 @@ def run(
 @click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 def resume(run: str, jobs: int, as_json: bool) -> int:
     """Goes on with RUN (a name or a file) without a screen; no finished test is made again."""
+    from ddenv.launch.folder import find_run
     from ddenv.launch.programs import start_engine
-    from ddenv.launch.runs import find_run
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
 
@@ -91,23 +96,22 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
 
 @app.command("open")
 @click.argument("run")
-def open_run(run: str) -> int:
+@click.option(
+    "--watch", is_flag=True, help="Only look: nothing is changed, and nothing is written, not even beside RUN."
+)
+def open_run(run: str, watch: bool) -> int:
     """Attaches the workbench to RUN (a name or a file)."""
-    from ddenv.launch.runs import find_run
-    from ddenv.runfile.store import RunFile
-
-    path = find_run(run)
-    RunFile(path).close()
+    from ddenv.launch.folder import find_run
     from ddenv.workbench.app import run_workbench
 
-    return run_workbench(path)
+    return run_workbench(find_run(run), watch=watch)
 
 
 @app.command()
 def runs() -> int:
     """Lists the runs."""
     from ddenv.console.runs import run_lines
-    from ddenv.launch.runs import runs_folder
+    from ddenv.launch.folder import runs_folder
 
     lines = run_lines(runs_folder())
     print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
@@ -153,7 +157,7 @@ def test(
 def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     """Writes the world that RUN has left."""
     from ddenv.launch.export import export_world
-    from ddenv.launch.runs import find_run
+    from ddenv.launch.folder import find_run
 
     if sdf is None:
         raise UserError("nothing to export: give --sdf FILE")
@@ -161,6 +165,28 @@ def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     for path in exported.files:
         print(f"wrote {path}")
     _tell_needs(sdf, exported.needs)
+    return 0
+
+
+@app.command()
+@click.argument("run")
+@click.option(
+    "-o",
+    "--output",
+    "file",
+    type=Path,
+    required=True,
+    metavar="FILE",
+    help="A .html page, or a .md file with its pictures beside it.",
+)
+@click.option("--force", is_flag=True, help="Replace files that exist.")
+def report(run: str, file: Path, force: bool) -> int:
+    """Writes what RUN came to as one page: to read, to print, to mail."""
+    from ddenv.launch.folder import find_run
+    from ddenv.report.write import write_report
+
+    for path in write_report(find_run(run), file, force):
+        print(f"wrote {path}")
     return 0
 
 
@@ -184,7 +210,7 @@ def _scenario(name, spawn, goal, world, timeout, reading):
 def _subject(name, spawn, goal, world, timeout, reading):
     """What `ddenv test` tries: a run where there is one of that name, else a scenario."""
     from ddenv.engine.trial import Subject, subject_of_run
-    from ddenv.launch.runs import find_run
+    from ddenv.launch.folder import find_run
     from ddenv.launch.scenarios import load_parts
     from ddenv.runfile.store import RunFile
 
@@ -207,7 +233,7 @@ def _tell(line: str) -> None:
 
 
 def _tell_notes(world: Any, as_json: bool) -> None:
-    from ddenv.console.words import count
+    from ddenv.words import count
 
     if world.notes:
         were = f"{count(len(world.notes), 'part')} of {world.path} {'was' if len(world.notes) == 1 else 'were'}"
@@ -217,8 +243,8 @@ def _tell_notes(world: Any, as_json: bool) -> None:
 
 def _tell_needs(sdf: Path, uris: list[str]) -> None:
     """A written world keeps its text, and with it what that names of other files."""
-    from ddenv.console.words import first_of
     from ddenv.map.names import shortened
+    from ddenv.words import first_of
 
     if uris:
         _tell(f"{sdf} still needs {first_of([shortened(uri, LONGEST_URI) for uri in uris], 3)}")
@@ -271,6 +297,8 @@ def _cannot_print(error: OSError) -> int:
 
 app.add_command(world_group)
 app.add_command(schemas_command)
+app.add_command(config_command)
+app.add_command(serve_command)
 
 
 def main() -> None:

@@ -82,6 +82,8 @@ def reduction_options(command):
             click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal."),
             click.option("--algorithm", help="How the environment is searched; 'ddenv schemas' lists all."),
             click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure."),
+            click.option("--budget", type=click.IntRange(0), help="The most tests in all; 0: any number."),
+            click.option("--baseline-runs", type=int, help="Runs of the whole world before the first round."),
             click.option("--n-partitions", type=int, help="Partitions in the first round."),
             click.option("--delta", type=float, help="Change of the angular velocity where trajectoryseg cuts, rad/s."),
             click.option(
@@ -96,6 +98,9 @@ def reduction_options(command):
             ),
             click.option("--prior", metavar="spatial|uniform", help="Where probdd and splitting begin."),
             click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m."),
+            click.option(
+                "--similarity", metavar="end-pose|trajectory", help="Where it ends, or also how it got there."
+            ),
             click.option(
                 "--early-stop/--no-early-stop",
                 default=None,

@@ -13,7 +13,6 @@ import threading
 import time
 from pathlib import Path
 
-from ddenv import __version__
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
@@ -24,6 +23,7 @@ from ddenv.launch.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.launch.runs import read_parts
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.version import __version__
 
 
 def main() -> int:

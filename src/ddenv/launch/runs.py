@@ -1,12 +1,9 @@
-"""Run files by name: where they are, how one is made from a scenario, and what it was made from."""
+"""Run files: how one is made from a scenario, and what it was made from."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
-
-import platformdirs
 
 from ddenv.errors import UserError
 from ddenv.launch.scenarios import check_parts, load_parts
@@ -18,56 +15,8 @@ from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
 
-SUFFIX = ".ddenv"
-# Bytes of a run's name, which leaves room for a number and for the names of the files beside it.
-LONGEST_STEM = 180
 # How the names of documents begin that were read of other files.
 RESOURCE = "resource "
-
-
-def runs_folder() -> Path:
-    """Where runs are kept unless a path is given: `$DDENV_HOME/runs`, or the user's data folder."""
-    home = os.environ.get("DDENV_HOME")
-    return (Path(home) if home else Path(platformdirs.user_data_dir("ddenv", appauthor=False))) / "runs"
-
-
-def find_run(name: str) -> Path:
-    """The run file called `name`, a path or a name in the runs folder."""
-    path = Path(name)
-    if path.is_file() or len(path.parts) > 1:
-        return path
-    return runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
-
-
-def free_run_path(scenario_name: str) -> Path:
-    """The first free name-1, name-2, ... in the runs folder."""
-    return _free(runs_folder(), scenario_name)
-
-
-def _free(folder: Path, scenario_name: str) -> Path:
-    stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
-    # A name of 80 letters can have four bytes for each, which no file system takes.
-    stem = stem.encode()[:LONGEST_STEM].decode(errors="ignore")
-    number = 1
-    while (path := folder / f"{stem}-{number}{SUFFIX}").exists():
-        number += 1
-    return path
-
-
-def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
-    """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
-    if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
-        raise UserError(f"--name: '{name}' cannot be a file's name; use letters, digits, - and _")
-    name = None if name is None else name.removesuffix(SUFFIX)
-    if output is None or output.suffix in (".sdf", ".world"):
-        if output is not None and not output.parent.is_dir():
-            raise UserError(f"--output: there is no folder {output.parent}")
-        return free_run_path(scenario_name) if name is None else runs_folder() / f"{name}{SUFFIX}"
-    if output.is_dir():
-        return _free(output, scenario_name) if name is None else output / f"{name}{SUFFIX}"
-    if output.suffix != SUFFIX:
-        raise UserError(f"--output: '{output}' is neither a folder nor a {SUFFIX}, .sdf or .world file")
-    return output
 
 
 def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | None = None) -> World:

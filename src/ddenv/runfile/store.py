@@ -101,6 +101,14 @@ class RunFile:
         try:
             self._db = sqlite3.connect(_address(path), uri=True, isolation_level=None, timeout=VIEWER_WAIT)
             self._db.execute("PRAGMA trusted_schema = OFF")
+        except sqlite3.Error as error:
+            raise UserError(f"{path}: cannot be read: {error}") from None
+        self._check()
+
+    def _check(self) -> None:
+        """Raises UserError if what is open is no run file that can be read."""
+        path = self.path
+        try:
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.OperationalError as error:

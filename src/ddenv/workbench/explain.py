@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ddenv.runfile.failures import DEEDS, deed
 from ddenv.runfile.state import Candidate, Round, RunState, Test
+from ddenv.workbench.explain_hand import arrival, by_hand, older_engine, out_of_budget, to_adopt
 from ddenv.workbench.listings import DDENV, Lines, Step, is_sweep, listing
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.rounds import GROUPS, beginning, follows, fruitless
@@ -35,6 +36,8 @@ def explain(snapshot: Snapshot) -> Explanation:
     options = settings(state)
     shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
+    if not snapshot.error:
+        sentences = (*older_engine(snapshot), *to_adopt(state), *sentences, *by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
 
@@ -42,6 +45,11 @@ def explain(snapshot: Snapshot) -> Explanation:
 def _happening(snapshot: Snapshot) -> Happening:
     """The step the run is at, and the sentences on it."""
     state, options = snapshot.state, settings(snapshot.state)
+    if snapshot.gone:
+        return None, (
+            f"{plain(snapshot.error)}.",
+            "Nothing can be asked for any more: y copies names, R lists the runs, q leaves.",
+        )
     if snapshot.error:
         return None, (snapshot.error,)
     if snapshot.status == "finished":
@@ -53,7 +61,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     if state.confirming:
         return _with_pause(state, ("returned", _confirming(snapshot)))
     if state.round is None or state.round.done:
-        return _with_pause(state, ("split", _between(state, options)))
+        return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
         return "waiting", _waiting(state, state.round, options)
     return _with_pause(state, _testing(snapshot, state.round, options))
@@ -103,7 +111,8 @@ def _failed(state: RunState) -> tuple[str, ...]:
 
 def _stopped(state: RunState) -> tuple[str, ...]:
     why = f": {plain(state.reason).rstrip('.')}" if state.reason else ""
-    return (f"The engine was stopped{why}.", "Everything so far is kept; r resumes.")
+    then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
+    return (f"The engine was stopped{why}.", *then)
 
 
 def _lost(state: RunState) -> tuple[str, ...]:
@@ -134,8 +143,13 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
 
 
-def _between(state: RunState, options: Settings) -> tuple[str, ...]:
-    first = f"Round {state.rounds_done + 1}: {beginning(options, len(state.environment))}"
+def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
+    state = snapshot.state
+    number = 1 if state.round is None else state.round.number + 1
+    first = f"Round {number}: {beginning(options, len(state.environment))}"
+    arrived = arrival(state)
+    if arrived:
+        return (arrived, first)
     then = baseline_sentence(state, options.iterations) if state.round is None else follows(options, state.round)
     return (first, then) if then else (first,)
 
@@ -251,11 +265,19 @@ def _finished(state: RunState) -> Happening:
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
     if not state.minimal:
-        return "returned", (_reason(state, "The run ended early."), f"{kept} left: {_names(state)}.")
+        return "returned", (
+            _reason(state, "The run ended early."),
+            *out_of_budget(state),
+            f"{kept} left: {_names(state)}.",
+        )
     if not state.environment:
         none = "f is seen without any of the models that can be removed: look at the robot, its goal and what always stays."
         return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
     single = len(state.environment) == 1
+    pinned = state.pinned.intersection(state.environment)
+    if pinned:
+        proof = f"f is not seen again without any one of the others; {count(len(pinned), 'model')} pinned by you always stayed"
+        return "returned", (f"Ended: {kept} left. {proof}.", f"Kept: {_names(state)}.")
     proof = f"without {'it' if single else 'any one of them'} f is not seen again"
     sure = "; full runs confirm it" if state.confirming else ""
     return "returned", (

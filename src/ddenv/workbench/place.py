@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddenv.map.footprints import footprints
-from ddenv.runfile.store import RunFile
+from ddenv.workbench.observed import Observed
 from ddenv.workbench.widgets.map import Place
 
 if TYPE_CHECKING:
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:
     """The models of a world, with the scenario's start and goal if there is one."""
+    from ddenv.map.footprints import footprints
+
     protected = frozenset(scenario.protected) if scenario else frozenset()
     place = Place(footprints(world), elements=frozenset(world.elements(protected)))
     if scenario is None:
@@ -30,6 +31,6 @@ def place_of_run(path: Path) -> Place:
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
     from ddenv.launch.runs import read_parts
 
-    with RunFile(path) as run:
+    with Observed(path) as run:
         scenario, world, _ = read_parts(run)
     return place_of(world, scenario)

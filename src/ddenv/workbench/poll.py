@@ -1,22 +1,31 @@
-"""Looks at a run file again and again, and says when something changed."""
+"""Looks at a run file again and again, and says when something changed; sends commands beside the screen."""
 
 from __future__ import annotations
 
+import asyncio
+import contextvars
 import math
 import time
 from array import array
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
-from ddenv.runfile.store import COLUMNS, Live, RunFile
+from ddenv.runfile.store import COLUMNS, Live
+from ddenv.version import __version__
+from ddenv.workbench.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.
 LOCK_PERIOD = 0.5
+# So many events are read at one look: keys are answered while a long run is caught up with.
+MOST_EVENTS = 1500
 
 
 def now() -> float:
@@ -28,8 +37,9 @@ def now() -> float:
 class Snapshot:
     """All that the run screen shows at one moment.
 
-    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, flat rows of
-    `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the run file cannot be read.
+    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path
+    in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the
+    run file cannot be read. `gone` says that it was deleted or replaced: all else is what was read last.
     """
 
     state: RunState = field(default_factory=RunState)
@@ -38,6 +48,14 @@ class Snapshot:
     evidence: array | None = None
     spent: int = 0
     error: str = ""
+    original: array | None = None
+    gone: bool = False
+
+    @property
+    def older_engine(self) -> str:
+        """The version of the ddenv whose engine works on the run, or did last, if it is not this one's; "" if it is, or unknown."""
+        version = self.state.engine_version
+        return "" if version == __version__ else version
 
     @property
     def status(self) -> str:
@@ -74,58 +92,132 @@ class Snapshot:
 
 
 class Poll:
-    """One open run file. `starting` says whether an engine was started that may not hold the lock yet."""
+    """One open run file, which is only ever read; commands are sent beside it.
+
+    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing can be sent. `told` is
+    called with each event's kind, and the states before and after it; again with the same ones where a look was cut short.
+    """
 
     def __init__(
         self,
         path: Path,
         *,
         starting: Callable[[], bool] = lambda: False,
+        watch: bool = False,
+        told: Callable[[str, RunState, RunState], None] = lambda kind, before, after: None,
     ) -> None:
         """Raises UserError for a file that is no run file."""
         self.path = path
-        self.file = RunFile(path)
+        self.watch = watch
+        self._told = told
+        self.file = Observed(path, strictly=watch)
         self._starting = starting
         self._snapshot: Snapshot | None = None
+        self._behind = True
         self._looked = -math.inf
         self._alive = False
         self._evidence: tuple[int | None, array | None] = (None, None)
+        self._original: tuple[int | None, array | None] = (None, None)
+        self._sender: ThreadPoolExecutor | None = None
+
+    @property
+    def catching_up(self) -> bool:
+        """Whether there is more to read than the last look did."""
+        return self._behind
 
     def close(self) -> None:
-        self.file.close()
+        """What was sent is still written."""
+        if self._sender is not None:
+            self._sender.shutdown(wait=False)
+        if self.watch:
+            self.file.close()
+            return
+        with suppress(UserError):
+            self.file.tidy()
 
     def look(self) -> Snapshot | None:
-        """The new snapshot, or None if nothing changed since the last look."""
-        snapshot = self._read()
+        """The new snapshot, or None if nothing changed since the last look, or another program writes just now."""
+        try:
+            self._behind = self.file.refresh() or self._behind
+            snapshot = self._read()
+        except Busy:
+            return None
+        except Gone as error:
+            self._behind = True
+            snapshot = self._left(str(error))
+        except UserError as error:
+            self._behind = True
+            snapshot = replace(self._snapshot or Snapshot(), error=str(error))
         if snapshot == self._snapshot:
             return None
         self._snapshot = snapshot
         return snapshot
 
+    def send(self, kind: str, data: dict[str, Any], done: Callable[[int, str], None]) -> None:
+        """Asks the engine for something, without waiting for the file; commands arrive in the order they were sent.
+
+        `done` is then called on the screen's thread with the command's id and "", or with 0 and why it was not sent.
+        """
+        if self._sender is None:
+            self._sender = ThreadPoolExecutor(1, "send")
+        self._sender.submit(self._send, kind, data, done, asyncio.get_running_loop(), contextvars.copy_context())
+
+    def _send(self, kind: str, data: dict[str, Any], done: Callable, loop: Any, context: contextvars.Context) -> None:
+        id, error = 0, "this run is only watched: open it without --watch to guide it"
+        if not self.watch:
+            try:
+                id, error = self.file.send(kind, **data), ""
+            except UserError as trouble:
+                error = str(trouble)
+        # The screen may be gone by now.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(done, id, error, context=context)
+
     def _read(self) -> Snapshot:
-        """Of a damaged file as much as makes sense is shown, with what is wrong."""
-        state, error = self._fold(self._snapshot.state if self._snapshot else RunState())
-        engine = self._engine()
+        """Of a damaged file as much as makes sense is shown, with what is wrong. Raises Busy."""
+        engine, last = self._engine(), self._snapshot
+        if last is not None and not self._behind:
+            spent = self._spent(last.state, engine)
+            if engine == last.engine and spent == last.spent:
+                return last
+            return replace(last, engine=engine, spent=spent)
+        state, error, more = self._fold(last.state if last else RunState())
         spent = self._spent(state, engine)
         try:
             live = self._live(state) if engine == "alive" else ()
-            return Snapshot(state, live, engine, self._motion(state), spent, error)
+            snapshot = Snapshot(state, live, engine, self._motion(state), spent, error, self._first_motion(state))
+        except Busy:
+            raise
         except UserError as trouble:
-            return Snapshot(state, (), engine, None, spent, error or str(trouble))
+            snapshot = Snapshot(state, (), engine, None, spent, error or str(trouble))
+        self._behind = more
+        return snapshot
 
-    def _fold(self, state: RunState) -> tuple[RunState, str]:
-        """The state after the new events, up to the first one that makes no sense."""
+    def _left(self, why: str) -> Snapshot:
+        """What was read last of a file that is not there any more."""
+        error = f"{why}; what you see is what was read last"
+        return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
+
+    def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
+        """The state after the new events, up to the first one that makes no sense, and whether there are more of them."""
         try:
-            for event in self.file.events(after=state.revision):
-                state = apply(state, event)
+            events = self.file.events(state.revision, MOST_EVENTS)
+            for event in events:
+                before, state = state, apply(state, event)
+                self._told(event.kind, before, state)
+        except Busy:
+            raise
         except UserError as error:
-            return state, str(error)
-        return state, ""
+            return state, str(error), False
+        return state, "", len(events) == MOST_EVENTS
 
     def _engine(self) -> str:
         moment = time.monotonic()
         if moment - self._looked >= LOCK_PERIOD:
-            self._looked, self._alive = moment, engine_is_alive(self.path)
+            alive = engine_is_alive(self.path)
+            # Rows of running tests are read only while an engine is there.
+            self._behind = self._behind or alive != self._alive
+            self._looked, self._alive = moment, alive
         if self._alive:
             return "alive"
         return "starting" if self._starting() else "absent"
@@ -143,6 +235,12 @@ class Poll:
         if test != self._evidence[0]:
             self._evidence = (test, None if test is None else self.file.motion(test))
         return self._evidence[1]
+
+    def _first_motion(self, state: RunState) -> array | None:
+        test = None if state.baseline is None else state.baseline.failure_test
+        if test != self._original[0]:
+            self._original = (test, None if test is None else self.file.motion(test))
+        return self._original[1]
 
     def _spent(self, state: RunState, engine: str) -> int:
         if state.started_at is None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from threading import Thread
 
 from ddenv.errors import UserError
 from ddenv.workbench.wording import plain
 
 # Exit codes of an engine that has finished or was stopped.
 GOOD_ENDS = (0, 1)
+# So long the screen may stand still for a program that is asked to end, s.
+A_MOMENT = 0.3
 # Of a log only its end is read, bytes.
 TAIL = 4000
 
@@ -21,6 +24,7 @@ class Engine:
         self.run = run
         self._process = process
         self._worked = False
+        self._last_words = ""
 
     def start(self, jobs: int, accept_mode: str) -> None:
         """Raises UserError if it cannot be started."""
@@ -30,7 +34,7 @@ class Engine:
             self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode)
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
-        self._worked = False
+        self._worked, self._last_words = False, ""
 
     def seen_at_work(self) -> None:
         """It has the run's lock: from now on the lock tells whether it lives."""
@@ -43,10 +47,14 @@ class Engine:
     @property
     def trouble(self) -> str:
         """Why it ended otherwise than by itself or because it was asked to, or nothing."""
+        code = None if self._process is None else self._process.poll()
+        if code in (None, *GOOD_ENDS):
+            return ""
         from ddenv.launch.programs import last_words
 
-        code = None if self._process is None else self._process.poll()
-        return "" if code in (None, *GOOD_ENDS) else f"The engine ended: {plain(last_words(self.run))}"
+        # Asked for at each look, and the log can be long.
+        self._last_words = self._last_words or plain(last_words(self.run))
+        return f"The engine ended: {self._last_words}"
 
 
 class Scene:
@@ -91,12 +99,26 @@ class Scene:
             return
         process.terminate()
         try:
-            process.wait(timeout=2.0)
+            process.wait(timeout=A_MOMENT)
         except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
+            # It takes its time, and the screen has none.
+            Thread(target=_end, args=(process,), name="scene").start()
+        else:
+            _close(process)
+
+
+def _end(process: subprocess.Popen) -> None:
+    try:
+        process.wait(timeout=2.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    _close(process)
+
+
+def _close(process: subprocess.Popen) -> None:
+    if process.stdout is not None:
+        process.stdout.close()
 
 
 def last_line(log: Path) -> str:

@@ -183,7 +183,9 @@ class Reduction(Section):
     prior: Literal["spatial", "uniform"] = Field("spatial", description="where probdd and splitting begin")
     seed: int = Field(0, ge=0, lt=2**31)
     baseline_runs: int = Field(10, ge=1, le=1000, description="runs of the whole world before the first round")
-    budget: int | None = Field(None, ge=1, description="the most tests in all; then the run stops, and can go on with more")
+    budget: int | None = Field(
+        None, ge=1, description="the most tests in all; then the run stops, and can go on with more"
+    )
 
 
 class Simulation(Section):

@@ -1,17 +1,18 @@
-"""From the keys of the run screen to the engine: what may be asked when, and why not."""
+"""From the keys of the run screen to the engine: how a command is sent, when an engine is started, and what is said of it."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import Any
 
 from textual.screen import Screen
 
 from ddenv.errors import UserError
-from ddenv.runfile.store import RunFile
-from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.attach import attach_name
+from ddenv.workbench.guiding import GOES_ON, Ask
+from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine
-from ddenv.workbench.widgets.candidates import Candidates
 
 
 class Controls(Screen[None]):
@@ -19,44 +20,131 @@ class Controls(Screen[None]):
 
     snapshot: Snapshot
     engine: Engine
-    file: RunFile
-    # The last command's id, and its words.
+    poll: Poll
+    watch: bool
+    # What was asked for last: the command's id, 0 while it is being sent, and its words.
     asked = (0, "")
+    sending = 0
+
+    def __init__(self) -> None:
+        super().__init__()
+        # The ids of this screen's own commands, with their words.
+        self._mine: dict[int, str] = {}
+        # The id of the last one that the run goes on from, 0 if an engine was started for it.
+        self._due = 0
 
     def waiting_for(self) -> str:
         """What was asked for and is not done yet."""
-        id, kind = self.asked
-        return kind if self.snapshot.state.last_command < id and self.snapshot.engine == "alive" else ""
+        id, words = self.asked
+        if self.sending:
+            return words
+        return words if self.snapshot.state.last_command < id and self.snapshot.engine == "alive" else ""
 
     def refuse(self, why: str) -> None:
-        self.notify(why, severity="warning", timeout=3, markup=False)
+        """Says why a key does nothing."""
+        self.notify(why, severity="warning", timeout=4, markup=False)
 
-    def send(self, kind: str, **data: Any) -> None:
-        try:
-            self.asked = (self.file.send(kind, **data), kind.replace("_", " "))
-        except UserError as error:
-            self.notify(str(error), severity="error", markup=False)
-        self.show_status()
+    def say(self, what: str) -> None:
+        self.notify(what, timeout=4, markup=False)
 
     def show_status(self) -> None:
         """Shows at once what was asked for."""
         raise NotImplementedError
 
+    # Sending.
+
+    def can_send(self) -> bool:
+        """Whether this screen may ask for anything; says why not."""
+        if self.watch:
+            self.refuse(f"watching only: 'ddenv open {attach_name(self.poll.path)}' without --watch guides it")
+        elif self.snapshot.gone:
+            self.refuse("the run file is gone: nothing can be asked for; q leaves")
+        elif self.snapshot.error:
+            self.refuse("this run file cannot be read")
+        else:
+            return True
+        return False
+
+    def send(self, kind: str, words: str = "", then: Callable[[], None] | None = None, **data: Any) -> None:
+        """Asks the engine for something, without waiting for the file; `then` comes once it is written."""
+        words = words or kind.replace("_", " ")
+        self.sending += 1
+        self.asked = (0, words)
+        self.show_status()
+
+        def sent(id: int, error: str) -> None:
+            self.sending -= 1
+            if error:
+                self.notify(error, severity="error", markup=False)
+            else:
+                self._mine[id] = words
+                self.asked = (id, words)
+                if kind in GOES_ON:
+                    self._due = id
+                    self.go_on()
+                if then is not None:
+                    then()
+            if self.is_attached:
+                self.show_status()
+
+        self.poll.send(kind, data, sent)
+
+    def ask(self, make: Callable[[], Ask]) -> None:
+        """Sends what `make` comes to, after its question if it has one; a UserError of it is said instead."""
+        if not self.can_send():
+            return
+        try:
+            asked = make()
+        except UserError as error:
+            self.refuse(str(error))
+            return
+        if not asked.question:
+            self._send_asked(asked)
+            return
+        from ddenv.workbench.screens.question import Question
+
+        self.app.push_screen(Question(asked.question), lambda yes: self._send_asked(asked) if yes else None)
+
+    def _send_asked(self, asked: Ask) -> None:
+        """Where no engine works it is written down for the next one, which is started if the run goes on from there."""
+        starts = self.snapshot.engine == "absent" and asked.kind in GOES_ON
+        later = "" if self.snapshot.engine != "absent" else "; kept until an engine works, space starts one"
+        self.say(f"{asked.said}; an engine is started for it" if starts else f"{asked.said}{later}")
+        self.send(asked.kind, **asked.data)
+
+    def go_on(self) -> None:
+        """Starts an engine for what was asked for where none works, or where the last one ended without having read it."""
+        late = self._due > self.snapshot.state.last_command
+        if late and self.snapshot.engine == "absent" and not self.snapshot.error:
+            self._due = 0
+            self._start_engine()
+
+    def told_refusal(self, before: Snapshot) -> None:
+        """Says why the engine did not do what this screen asked for."""
+        id, why = self.snapshot.state.refusal
+        if (id, why) != before.state.refusal and id in self._mine:
+            self.refuse(f"{self._mine[id]}: not done, {why}")
+
+    # The engine.
+
     def _works(self) -> bool:
         """Whether there is an engine to ask; says why not."""
-        status = self.snapshot.status
+        if not self.can_send():
+            return False
         if self.snapshot.engine == "alive":
             return True
-        if status == "finished":
-            self.refuse("the run is finished")
-        elif status == "starting":
+        if self.snapshot.status == "finished":
+            self.refuse("the run is finished; u, h, c, w and o go on from there")
+        elif self.snapshot.status == "starting":
             self.refuse("the engine is still starting")
         else:
-            self.refuse("no engine is running; r resumes the run")
+            self.refuse("no engine is running; space starts one")
         return False
 
     def action_pause(self) -> None:
-        if self._works():
+        if self.snapshot.engine == "absent":
+            self.action_resume()
+        elif self._works():
             self.send("resume" if self.snapshot.state.paused else "pause")
 
     def action_step(self, unit: str) -> None:
@@ -65,54 +153,32 @@ class Controls(Screen[None]):
         if self.snapshot.state.status == "waiting":
             self.refuse("a reduction waits: accept it with a, or reject it with x")
         else:
-            self.send("step", unit=unit)
-
-    def action_decide(self, decision: str) -> None:
-        state = self.snapshot.state
-        if state.waiting_candidate is None or state.round is None:
-            self.refuse(f"nothing waits for {decision}")
-        elif self._works():
-            self.send(decision, round=state.round.number, candidate=state.waiting_candidate)
-
-    def action_veto(self) -> None:
-        candidate = self.query_one(Candidates).under_cursor
-        state, current = self.snapshot.state, self.snapshot.state.round
-        if state.confirming and not state.ended:
-            self.refuse("the rounds are over")
-        elif current is None or candidate is None:
-            self.refuse("there are no candidates yet")
-        elif candidate.verdict:
-            self.refuse(f"{candidate.label} is {candidate.verdict} already")
-        elif current.done or current.winner is not None:
-            self.refuse("this round is over")
-        elif candidate.index == state.waiting_candidate:
-            self.refuse(f"{candidate.label} showed f and waits: reject it with x")
-        elif self._works():
-            self.send("veto", round=current.number, candidate=candidate.index)
+            self.send("step", f"step one {unit}", unit=unit)
 
     def action_mode(self) -> None:
         if self._works():
             mode = "automatic" if self.snapshot.state.accept_mode == "ask" else "ask"
-            self.send("accept_mode", mode=mode)
-            self.notify(
-                "each reduction will wait for you" if mode == "ask" else "reductions are accepted automatically",
-                timeout=3,
-            )
+            self.send("accept_mode", f"accept mode {mode}", mode=mode)
+            self.say("each reduction will wait for you" if mode == "ask" else "reductions are accepted automatically")
 
     def action_resume(self) -> None:
         state = self.snapshot.state
+        if not self.can_send():
+            return
         if self.snapshot.engine == "alive":
             self.refuse("the engine is running already" + ("; space resumes" if state.paused else ""))
         elif self.snapshot.engine == "starting":
             self.refuse("the engine is starting already")
         elif state.status == "finished":
-            self.refuse("the run is finished")
-        elif self.snapshot.error:
-            self.refuse("this run file cannot be read")
+            self.refuse("the run is finished; u, h, c, w and o go on from there")
+        elif state.budget is not None and state.tests_done >= state.budget:
+            self.refuse(f"the budget of {state.budget} tests is used up; c gives more")
         else:
             self._start_engine()
 
     def _start_engine(self) -> None:
+        if self.snapshot.engine != "absent":
+            return
         try:
             self.engine.start(self.snapshot.state.jobs or os.cpu_count() or 1, self.snapshot.state.accept_mode)
         except UserError as error:

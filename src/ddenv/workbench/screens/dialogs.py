@@ -6,50 +6,69 @@ import getpass
 import socket
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
 
 from rich.style import Style
+from rich.table import Table
 from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
-from textual.screen import ModalScreen
+from textual.screen import ModalScreen, Screen
 from textual.widgets import Button, DirectoryTree, Input, Static
 
-from ddenv.schemas import Kind
-from ddenv.workbench.methods import chosen, note, paragraph
 from ddenv.workbench.processes import Scene
+from ddenv.workbench.shortcuts import Group, groups
 from ddenv.workbench.wording import plain
+
+if TYPE_CHECKING:
+    from ddenv.schemas import Kind
 
 SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
 
 
 class Help(ModalScreen[None]):
-    """Every key with what it does."""
+    """Every key with what it does: those of the focused pane first."""
 
     CSS_PATH = "dialogs.tcss"
     BINDINGS: ClassVar = [
-        Binding("escape,question_mark,q,enter", "dismiss", "close", id="help.close", tooltip="close this dialog"),
+        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
     ]
 
-    def __init__(self, keys: Iterable[tuple[str, str]]) -> None:
-        """`keys` are (key, what it does)."""
+    def __init__(self, keys: Iterable[tuple[str, str]] = (), groups: Iterable[Group] = ()) -> None:
+        """`keys` are (key, what it does), for those that no binding tells of."""
         super().__init__()
-        self._keys = tuple(keys)
+        self._keys, self._groups = tuple(keys), tuple(groups)
+
+    @classmethod
+    def of(cls, screen: Screen) -> Help:
+        """The help for a screen as it is now."""
+        return cls(groups=groups(screen))
 
     def compose(self) -> ComposeResult:
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = "Keys"
-            dialog.border_subtitle = "escape closes"
+            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
             with VerticalScroll():
                 yield Static(self._table(), markup=False)
 
-    def _table(self) -> Text:
-        width = max(len(key) for key, _ in self._keys)
-        rows = [Text(f"{key:>{width}}", "bold").append(f"   {what}", "not bold") for key, what in self._keys]
-        return Text("\n").join(rows)
+    def _table(self) -> Table:
+        table = Table.grid(padding=(0, 2))
+        table.add_column(justify="right", style="bold", max_width=24)
+        table.add_column(overflow="fold")
+        for group in self._groups:
+            if table.row_count:
+                table.add_row()
+            table.add_row("", Text(group.title, "bold underline"))
+            for shortcut in group.shortcuts:
+                table.add_row(Text(shortcut.keys), Text(shortcut.words))
+            for hint in group.hints:
+                table.add_row("", Text(hint))
+        for key, what in self._keys:
+            table.add_row(Text(key), Text(what))
+        return table
 
 
 class Method(ModalScreen[None]):
@@ -72,10 +91,14 @@ class Method(ModalScreen[None]):
                 yield Static(self._words(), markup=False)
 
     def _words(self) -> Text:
+        from ddenv.workbench.methods import chosen
+
         names = chosen(self._algorithm, self._pair)
         return Text("\n\n").join(self._paragraph(kind, name) for kind, name in names.items())
 
     def _paragraph(self, kind: Kind, name: str) -> Text:
+        from ddenv.workbench.methods import note, paragraph
+
         text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
         unused = note(kind, self._algorithm)
         if unused:
@@ -142,7 +165,7 @@ class SceneDialog(ModalScreen[None]):
 
     def _words(self) -> Text:
         if self._scene.trouble:
-            return Text(self._scene.trouble, self.app.theme_variables["text-error"])
+            return Text(self._scene.trouble, Style.parse(self.app.theme_variables["text-error"]))
         url = self._scene.url
         if not url:
             return Text("The scene starts ...", "dim")

@@ -18,14 +18,14 @@ from ddenv.workbench import form
 from ddenv.workbench.chosen import Chosen, read_choice, read_run
 from ddenv.workbench.costs import Past, past_of
 from ddenv.workbench.place import place_of
-from ddenv.workbench.screens.dialogs import Help, OpenFile
+from ddenv.workbench.screens.dialogs import OpenFile
 from ddenv.workbench.screens.starting import Starting
 from ddenv.workbench.widgets.about import About
 from ddenv.workbench.widgets.files import FileList
 from ddenv.workbench.widgets.map import Place, WorldMap
 from ddenv.workbench.widgets.options import OptionsForm
 from ddenv.workbench.widgets.runs import RunList
-from ddenv.workbench.widgets.schema import Explained, SchemaSelect
+from ddenv.workbench.widgets.schema import Explained
 from ddenv.workbench.widgets.setup_panes import SetupPanes
 from ddenv.workbench.wording import plain, shorten
 
@@ -82,11 +82,12 @@ class SetupScreen(Starting):
         Binding("f2", "pane('choose')", "choose", id="setup.choose", tooltip="to what there is to choose", show=False),
         Binding("f3", "pane('map')", "map", id="setup.map", tooltip="to the map", show=False),
         Binding("f4", "pane('settings')", "settings", id="setup.settings", tooltip="to the settings", show=False),
-        Binding("f1,question_mark", "help", "help", id="setup.help", tooltip="show every key", key_display="?"),
+        Binding("R", "app.runs", "runs", id="setup.runs", tooltip="the list of all runs", show=False),
+        Binding("f1,question_mark", "app.help", "help", id="setup.help", tooltip="show every key", key_display="?"),
         Binding(
             "escape", "home", "back", id="setup.home", tooltip="leave picking; back to the list of files", show=False
         ),
-        Binding("ctrl+q,q", "app.leave", "quit", id="setup.quit", tooltip="leave", key_display="q"),
+        Binding("q", "app.leave", "quit", id="setup.quit", tooltip="leave"),
     ]
 
     def __init__(self, reading: Mapping[str, Any] | None = None, like: Path | None = None) -> None:
@@ -194,7 +195,7 @@ class SetupScreen(Starting):
     def _read(self, path: Path) -> None:
         from textual.worker import get_current_worker
 
-        from ddenv.launch.runs import runs_folder
+        from ddenv.launch.folder import runs_folder
 
         worker = get_current_worker()
         try:
@@ -306,16 +307,6 @@ class SetupScreen(Starting):
         else:
             self.action_pane("choose")
 
-    def action_help(self) -> None:
-        bindings = (*self.BINDINGS, *SchemaSelect.BINDINGS)
-        keys = [(binding.key_display or binding.key.replace(",", " "), binding.tooltip) for binding in bindings]
-        more = [
-            ("tab", "next field"),
-            ("enter", "in a list: take it; in a field: start"),
-            ("ctrl+p", "commands: themes, screenshot"),
-        ]
-        self.app.push_screen(Help(keys + more))
-
 
 def _title() -> Text:
     return Text(" ddenv", "bold", no_wrap=True).append("  find the few models that make a robot fail", "not bold dim")
@@ -323,7 +314,7 @@ def _title() -> Text:
 
 def _free_name(name: str) -> str:
     """The name that the next run of a scenario gets."""
-    from ddenv.launch.runs import free_run_path
+    from ddenv.launch.folder import free_run_path
 
     try:
         return free_run_path(name).stem

@@ -212,7 +212,7 @@ class Starting(Picking):
 
 def _run_file(scenario_name: str, name: str) -> Path:
     """Where the run called `name`, or the file of that path, will be. Raises FieldError."""
-    from ddenv.launch.runs import run_path
+    from ddenv.launch.folder import run_path
 
     file = len(Path(name).parts) > 1
     try:

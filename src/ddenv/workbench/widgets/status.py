@@ -9,9 +9,9 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv import __version__
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import RunState, Test
+from ddenv.version import __version__
 from ddenv.workbench.branches import path
 from ddenv.workbench.estimate import Remaining, remaining
 from ddenv.workbench.methods import labels

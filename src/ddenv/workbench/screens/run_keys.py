@@ -1,0 +1,102 @@
+"""The keys of the run screen, and which of them the footer has room for."""
+
+from __future__ import annotations
+
+from textual.binding import Binding
+
+
+def _hidden(key: str, action: str, words: str, id: str, tooltip: str, display: str | None = None) -> Binding:
+    return Binding(key, action, words, id=id, tooltip=tooltip, show=False, key_display=display)
+
+
+KEYS = [
+    Binding(
+        "space",
+        "pause",
+        "pause",
+        id="run.pause",
+        tooltip="pause: no new test is started; again to go on; starts the engine where none works",
+    ),
+    Binding("s", "step('test')", "step", id="run.step", tooltip="run one test, then pause"),
+    Binding(
+        "a",
+        "accept",
+        "accept",
+        id="run.accept",
+        tooltip="accept the reduction that waits; or adopt the try under the cursor that shows f; or take another failure of the "
+        "candidate or try under the cursor for as good as f",
+    ),
+    Binding(
+        "x", "reject", "reject", id="run.reject", tooltip="reject the reduction that waits, and go on with the round"
+    ),
+    Binding(
+        "v", "veto", "veto", id="run.veto", tooltip="leave out the candidate under the cursor; again takes that back"
+    ),
+    Binding(
+        "p", "pin", "pin", id="run.pin", tooltip="pin the selected models, so that they always stay; again unpins them"
+    ),
+    Binding(
+        "w",
+        "without",
+        "try without",
+        id="run.without",
+        tooltip="try by hand: test the environment without the selected models; asks for their names if none is selected",
+    ),
+    Binding(
+        "o", "only", "try only", id="run.only", tooltip="try by hand: test the selected models alone, or those you name"
+    ),
+    Binding("u", "undo", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"),
+    Binding(
+        "h",
+        "history",
+        "history",
+        id="run.history",
+        tooltip="history: the tree of reductions; go back to any, branch from there, compare two",
+    ),
+    Binding(
+        "c", "change", "settings", id="run.change", tooltip="change pair, algorithm, iterations or budget from here on"
+    ),
+    Binding("E", "export", "export", id="run.export", tooltip="export: the world that is left, the report, the tables"),
+    Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
+    Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks what becomes of the engine"),
+    _hidden("S", "step('round')", "round", "run.round", "run to the end of the round, then pause"),
+    _hidden("t", "mode", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
+    _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
+    _hidden("l", "layers", "layers", "run.layers", "choose what the map shows"),
+    _hidden("y", "copy", "copy", "run.copy", "copy the names of the models left, or the command to come back"),
+    _hidden("m", "scene", "scene", "run.scene", "start the 3-D scene and show its address"),
+    _hidden("e", "method", "explain", "run.method", "explain how this run is reduced"),
+    _hidden("1", "pane('map')", "map", "run.map", "the map"),
+    _hidden("2", "pane('round')", "round", "run.table", "the table of candidates and tries"),
+    _hidden("3", "pane('chart')", "chart", "run.chart", "the chart of models left by test"),
+    _hidden("4", "pane('now')", "what is happening", "run.now", "what is happening, in words"),
+    _hidden("5,L", "pane('log')", "log", "run.log", "the log: what happened so far, with the time of day"),
+    _hidden("g", "next_pane", "next pane", "run.next_pane", "the next of these panes"),
+    _hidden("escape", "follow", "follow", "run.follow", "nothing is selected, and cursor and map follow the run again"),
+    _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
+    _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
+    _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
+    _hidden("r", "resume", "resume", "run.resume", "start the engine again"),
+    _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
+    _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
+]
+# In the order of the screen, and in the order in which they are given room.
+SHOWN = tuple(binding.id for binding in KEYS if binding.show)
+FIRST = (
+    "run.help",
+    "run.quit",
+    "run.pause",
+    "run.accept",
+    "run.veto",
+    "run.pin",
+    "run.without",
+    "run.undo",
+    "run.step",
+    "run.reject",
+    "run.history",
+    "run.export",
+    "run.change",
+    "run.only",
+)
+# What is left in the footer for who only looks.
+LOOKING = ("run.history", "run.export", "run.find", "run.copy", "run.layers", "run.help", "run.quit")

@@ -1,0 +1,90 @@
+"""A workbench that is attached to a fake run, with what tests ask of it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.screens.run import RunScreen
+
+
+class Session:
+    """An app on a run, driven by keys."""
+
+    def __init__(self, app, pilot, run):
+        self.app, self.pilot, self.run = app, pilot, run
+        self.read = self.heard = 0
+
+    @property
+    def screen(self) -> RunScreen:
+        return next(screen for screen in self.app.screen_stack if isinstance(screen, RunScreen))
+
+    async def press(self, *keys):
+        """Presses keys, and waits until what they ask for is written."""
+        for key in keys:
+            await self.pilot.press(key)
+        await self.pilot.pause()
+        while self.app.is_running and self.screen.sending:
+            await self.pilot.pause(0.01)
+
+    async def look(self):
+        """Lets the screen see what was written, without waiting for its clock."""
+        self.screen.poll._looked = -1e9
+        self.screen._look()
+        await self.pilot.pause()
+        assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
+
+    def commands(self):
+        """All that was asked for."""
+        return [(command.kind, command.data) for command in self.run.file.commands()]
+
+    def asked(self):
+        """What was asked for since this was called last."""
+        commands = self.commands()
+        new, self.read = commands[self.read :], len(commands)
+        return new
+
+    def notices(self):
+        return [notice.message for notice in self.app._notifications]
+
+    def said(self):
+        """What was said since this was called last, as one text."""
+        notices = self.notices()
+        new, self.heard = notices[self.heard :], len(notices)
+        return "\n".join(new)
+
+    def text(self, selector):
+        rendered = self.app.screen.query_one(selector).render()
+        return getattr(rendered, "plain", str(rendered))
+
+    def dialog(self):
+        """All the words of the dialog on top."""
+        return "\n".join(str(static.render()) for static in self.app.screen.query("Static"))
+
+
+class Attached:
+    def __init__(self, run, size=(120, 36), watch=False):
+        self.run, self.size, self.watch = run, size, watch
+
+    async def __aenter__(self):
+        app = Workbench(self.run.path, watch=self.watch)
+        self._context = app.run_test(size=self.size)
+        pilot = await self._context.__aenter__()
+        await app.workers.wait_for_complete()
+        await pilot.pause()
+        return Session(app, pilot, self.run)
+
+    async def __aexit__(self, *error):
+        await self._context.__aexit__(*error)
+
+
+def starts(monkeypatch) -> list:
+    """Engines that are started from now on do nothing; returns where they are noted."""
+    started = []
+
+    def start_engine(path, jobs, **options):
+        started.append((path, jobs, options))
+        return SimpleNamespace(poll=lambda: None)
+
+    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
+    return started

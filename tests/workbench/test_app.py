@@ -1,0 +1,140 @@
+"""What holds on every screen: help, the list of commands, keys of the user's own, and the program in a browser."""
+
+import asyncio
+import contextlib
+import os
+import re
+import socket
+import subprocess
+import sys
+
+import fake_run
+import pytest
+from textual.command import CommandPalette
+from textual.widgets import OptionList, Static
+
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.config import Config
+from ddenv.workbench.screens.dialogs import Help
+from ddenv.workbench.screens.runs import RunsScreen
+from ddenv.workbench.shortcuts import commands, groups
+
+
+def told(screen):
+    """The help's words as a user sees them."""
+    table = screen.query_one(Static)
+    return "\n".join("".join(segment.text for segment in table.render_line(y)) for y in range(table.size.height))
+
+
+async def test_help_begins_with_the_focused_pane_and_shows_the_users_own_keys(run):
+    fake_run.mid_round(run)
+    async with Workbench(run.path, config=Config(keys={"run.pause": "f8"})).run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        found = groups(pilot.app.screen)
+        assert len(found) == 3
+        assert [group.title for group in found][1:] == ["This screen", "Everywhere"]
+        pilot.app.action_help()
+        await pilot.pause()
+        assert isinstance(pilot.app.screen, Help)
+        words = told(pilot.app.screen)
+        assert words.index(found[0].title) < words.index("This screen") < words.index("Everywhere")
+        assert re.search("^ *f8 +pause", words, re.MULTILINE)
+        await pilot.press("end", "escape")
+        assert not isinstance(pilot.app.screen, Help)
+
+
+async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs):
+    names = [f"[bold]box_{number}[/]" for number in range(3)]
+    run = fake_run.FakeRun(runs / "m.ddenv", world=fake_run.world_text(names))
+    fake_run.mid_round(run)
+    run.close()
+    async with Workbench(run.path).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        shortcuts = commands(pilot.app.screen)
+        assert all(shortcut.words for shortcut in shortcuts)
+        assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.veto", "app.leave"}
+        assert any("choose the colours" in words for words in await searched(pilot, "choose the colours"))
+        assert "go to [bold]box_1[/] on the map" in await searched(pilot, "box_1")
+
+
+async def searched(pilot, query):
+    """What the list of commands offers for a query."""
+    await pilot.press("ctrl+p")
+    assert isinstance(pilot.app.screen, CommandPalette)
+    await pilot.press(*query)
+    listed = pilot.app.screen.query_one(OptionList)
+    for _ in range(200):
+        await pilot.pause(0.02)
+        if listed.option_count:
+            break
+    words = [str(listed.get_option_at_index(index).prompt).split("\n")[0] for index in range(listed.option_count)]
+    await pilot.press("escape")
+    return words
+
+
+@pytest.mark.parametrize("theme", ["ddenv-light", "ansi-dark"])
+async def test_every_theme_can_be_worn(run, theme):
+    fake_run.mid_round(run)
+    async with Workbench(run.path, config=Config(theme=theme)).run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        pilot.app.action_help()
+        await pilot.pause()
+        await pilot.press("escape")
+        pilot.app.action_runs()
+        await pilot.pause()
+        assert isinstance(pilot.app.screen, RunsScreen)
+        await pilot.app.workers.wait_for_complete()
+
+
+def test_serving_is_for_this_machine_alone(runs):
+    refused = subprocess.run(
+        [sys.executable, "-m", "ddenv", "serve", "--host", "0.0.0.0"], capture_output=True, text=True, timeout=60
+    )
+    assert refused.returncode == 2 and "127.0.0.1 alone" in refused.stderr
+
+
+def test_without_the_package_it_says_what_to_install(monkeypatch):
+    from ddenv.errors import UserError
+    from ddenv.workbench.served import serve
+
+    monkeypatch.setitem(sys.modules, "textual_serve", None)
+    monkeypatch.setitem(sys.modules, "textual_serve.server", None)
+    with pytest.raises(UserError, match=r"pip install 'ddenv\[serve\]'"):
+        serve(8000)
+
+
+async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
+    aiohttp = pytest.importorskip("aiohttp")
+    pytest.importorskip("textual_serve")
+    fake_run.finished(run).close()
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = [sys.executable, "-m", "ddenv", "serve", "--port", str(port), str(run.path)]
+    server = await asyncio.create_subprocess_exec(*words, stdout=asyncio.subprocess.PIPE, env=dict(os.environ))
+    own = f"http://127.0.0.1:{port}"
+    try:
+        said = [(await server.stdout.readline()).decode() for _ in range(4)]
+        assert own in said[0] and "acts as" in said[1] and f"ssh -L {port}:127.0.0.1:{port}" in said[3]
+        async with aiohttp.ClientSession() as session:
+            for _ in range(100):
+                with contextlib.suppress(aiohttp.ClientConnectorError):
+                    (await session.get(own)).close()
+                    break
+                await asyncio.sleep(0.1)
+            async with session.get(own) as page:
+                assert page.status == 200 and "textual.js" in await page.text()
+            async with session.get(own, headers={"Host": "elsewhere.example"}) as page:
+                assert page.status == 403
+            with pytest.raises(aiohttp.WSServerHandshakeError):
+                await session.ws_connect(f"{own}/ws", headers={"Origin": "http://elsewhere.example"})
+            async with session.ws_connect(f"{own}/ws?width=120&height=36", headers={"Origin": own}) as socketed:
+                seen = b""
+                while b"crates" not in seen:
+                    message = await socketed.receive(timeout=60)
+                    assert message.type is aiohttp.WSMsgType.BINARY, message
+                    seen += message.data
+                await socketed.send_json(["stdin", "\x11"])
+    finally:
+        server.terminate()
+        await server.wait()

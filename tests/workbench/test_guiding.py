@@ -1,0 +1,312 @@
+"""How a run is guided by keys: what each one asks for, what it says, and when it does nothing."""
+
+import subprocess
+import sys
+
+import fake_run
+import pytest
+from attached import Attached, starts
+from textual.widgets import Input, Select
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.workbench import guiding
+from ddenv.workbench.poll import Poll
+from ddenv.workbench.screens.change import Change
+from ddenv.workbench.screens.choose import ChooseModels
+from ddenv.workbench.screens.question import Question
+from ddenv.workbench.widgets.candidates import Candidates
+from ddenv.workbench.widgets.map import WorldMap
+
+
+def state_of(run):
+    return fold(run.file.events())
+
+
+async def test_pausing_stepping_and_vetoing(run):
+    fake_run.mid_round(run).hold()
+    async with Attached(run) as session:
+        await session.press("space")
+        assert session.asked() == [("pause", {})]
+        assert "… pause" in session.text("#status")
+        run.write("paused")
+        run.write("command_handled", command=1)
+        await session.look()
+        assert "‖ paused" in session.text("#status")
+        assert "… pause" not in session.text("#status")
+        await session.press("space", "s", "S", "t")
+        assert session.asked() == [
+            ("resume", {}),
+            ("step", {"unit": "test"}),
+            ("step", {"unit": "round"}),
+            ("accept_mode", {"mode": "ask"}),
+        ]
+        run.write("accept_mode", mode="ask")
+        await session.look()
+        assert "accept: ask" in session.text("#status")
+        await session.press("t", "a", "x")
+        assert session.asked() == [("accept_mode", {"mode": "automatic"})]
+        assert "nothing waits for accept" in session.said()
+        await session.press("down", "down", "v")
+        assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
+        assert "vetoes without B" in session.said()
+        run.write("vetoed", candidate=3, verdict="vetoed")
+        await session.look()
+        await session.press("v")
+        assert session.asked() == [("unveto", {"round": 2, "candidate": 3})]
+        await session.press("home", "v", "u")
+        assert "part A is dissimilar already" in session.said()
+        assert session.asked() == [("undo", {})]
+        await session.press("u")
+        assert session.asked() == []
+        assert "still on its way" in session.said()
+        run.write("command_refused", command=session.run.file.commands()[-1].id, why="there is nothing to take back")
+        await session.look()
+        assert "undo: not done, there is nothing to take back" in session.said()
+
+
+@pytest.mark.parametrize(("key", "kind"), [("a", "accept"), ("x", "reject")])
+async def test_a_and_x_decide_on_the_reduction_that_waits(run, key, kind):
+    fake_run.waiting(run).hold()
+    async with Attached(run) as session:
+        assert "? waiting" in session.text("#status")
+        await session.press("s", "v")
+        assert "a reduction waits" in session.said()
+        await session.press(key)
+        assert session.asked() == [(kind, {"round": 1, "candidate": 0})]
+
+
+async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        await session.press("p")
+        dialog = session.app.screen
+        assert isinstance(dialog, ChooseModels)
+        await session.press(*"04", "enter")
+        assert session.asked() == [("pin", {"models": [4]})]
+        assert "pins crate_04" in session.said()
+        world = session.screen.query_one(WorldMap)
+        await session.press("1")
+        world.go_to("crate_00")
+        await session.press("p")
+        assert session.asked() == [("unpin", {"models": [0]})]
+        world.select(["crate_02", "crate_03", "crate_01"])
+        await session.press("p", "w", "o")
+        assert session.asked() == [
+            ("pin", {"models": [1, 2, 3]}),
+            ("try", {"models": [0, 4]}),
+            ("try", {"models": [1, 2, 3]}),
+        ]
+        assert "try 4: 2 models, without crate_01, crate_02 and 1 more" in session.said()
+        world.clear_selection()
+        await session.press("2", "w")
+        await session.press("tab", "down", "tab", "enter")
+        assert session.asked() == [("try", {"models": [2, 3, 4]})]
+        await session.press("w", *"nothing", "enter")
+        assert isinstance(session.app.screen, ChooseModels)
+        assert "no model is called so" in session.dialog()
+        await session.press("escape")
+        trial = run.try_out(run.elements[2:5])
+        test = run.start_hand(trial)
+        await session.look()
+        session.said()
+        run.finish(test, "similar", 0.1, failure="stuck")
+        run.judge_trial(trial, "similar", [test])
+        await session.look()
+        assert session.said() == "try 4 shows f with 3 models: a adopts it"
+
+
+async def test_another_failure_is_accepted_after_a_question(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        table = session.screen.query_one(Candidates)
+        row = next(each for each in state_of(run).round.candidates if each.label == "part A")
+        while table.under_cursor != row:
+            await session.press("up")
+        await session.press("a")
+        assert isinstance(session.app.screen, Question)
+        words = " ".join(session.dialog().split())
+        assert "In part A (3 models) the robot tipped over at (2.00, 0.40) m, 2.30 m from f's end." in words
+        assert "In f it got stuck at (2.00, 0.40) m." in words
+        await session.press("n")
+        assert session.asked() == []
+        await session.press("a", "y")
+        assert session.asked() == [("accept_other", {"test": row.tests[0]})]
+
+
+async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        await session.press("c", "ctrl+s")
+        assert "nothing was changed" in session.said()
+        await session.press("c")
+        dialog = session.app.screen
+        assert isinstance(dialog, Change)
+        dialog.query_one("#budget", Input).value = "3"
+        await session.press("ctrl+s")
+        assert "budget: 15 tests are made already" in session.dialog()
+        dialog.query_one("#budget", Input).value = "200"
+        dialog.query_one("#iterations", Input).value = "x"
+        await session.press("ctrl+s")
+        assert "iterations: expected a whole number, found 'x'" in session.dialog()
+        dialog.query_one("#iterations", Input).value = "5"
+        dialog.query_one("#prioritization", Select).value = "random"
+        await session.press("ctrl+s")
+        assert session.asked() == [
+            ("change", {"settings": {"pair": "model2model/random", "iterations": 5, "budget": 200}})
+        ]
+
+
+async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_run.guided(run)
+    async with Attached(run) as session:
+        await session.press("1")
+        session.screen.query_one(WorldMap).select(["crate_02"])
+        await session.press("p")
+        assert "kept until an engine works, space starts one" in session.said()
+        assert not started
+        await session.press("u")
+        assert "an engine is started for it" in session.said()
+        assert session.asked() == [("pin", {"models": [2]}), ("undo", {})]
+        assert len(started) == 1
+
+
+async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_run.finished(run)
+    async with Attached(run) as session:
+        await session.press("r", "space", "s")
+        assert session.said().count("the run is finished; u, h, c, w and o go on from there") == 3
+        await session.press("w", *"01", "enter")
+        assert session.asked() == [("try", {"models": [0]})]
+        assert len(started) == 1
+
+
+async def test_an_engine_is_started_for_what_the_last_one_did_not_read(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        await session.press("u")
+        assert session.asked() == [("undo", {})]
+        assert not started
+        run.write("finished", minimal=True, reason="no candidate showed f")
+        run.let_go()
+        await session.look()
+        await session.look()
+        assert len(started) == 1
+
+
+async def test_watching_asks_for_nothing(run):
+    fake_run.waiting(run).hold()
+    async with Attached(run, watch=True) as session:
+        assert "watching only" in session.text("#watching")
+        await session.press(*"spacesSaxvpwouctr".replace("space", ""), "space")
+        assert "'ddenv open crates-1' without --watch" in session.said()
+        assert session.app.screen is session.screen
+        await session.press("h", "up", "enter")
+        assert "watching only" in session.said()
+        await session.press("escape")
+        assert session.commands() == []
+        await session.press("q")
+        assert session.app._exit_renderables[0].plain.endswith("ddenv open crates-1 --watch")
+
+
+async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
+    fake_run.mid_round(run).hold()
+    async with Attached(run) as session:
+        run.let_go()
+        run.path.unlink()
+        session.screen._look()
+        await session.pilot.pause()
+        assert "was deleted while it was open" in " ".join(session.text("#happening").split())
+        await session.press("v", "u")
+        assert "the run file is gone" in session.said()
+        await session.press("q")
+        assert session.app._exit
+
+
+# Without a screen: what keys mean for a run.
+
+
+def refusal(make, *arguments):
+    with pytest.raises(UserError) as error:
+        make(*arguments)
+    return str(error.value)
+
+
+def test_what_a_means_for_a_try(run):
+    fake_run.guided(run)
+    state = state_of(run)
+    adopted, vain, under_way = state.trials
+    assert "is the environment already" in refusal(guiding.accept, state, adopted)
+    assert guiding.accept(state, vain).kind == "accept_other"
+    assert "try 3 is not judged yet" in refusal(guiding.accept, state, under_way)
+    run.judge_trial(3, "similar", list(under_way.tests))
+    state = state_of(run)
+    assert "without crate_00, which is pinned" in refusal(guiding.accept, state, state.trials[2])
+    run.write("unpinned", models=[0])
+    state = state_of(run)
+    ask = guiding.accept(state, state.trials[2])
+    assert (ask.kind, ask.data, ask.question) == ("adopt", {"trial": 3}, "")
+
+
+def test_the_nearest_other_failure_is_the_one_to_accept(run):
+    run.created().baseline()
+    run.start_round(2)
+    tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
+    state = state_of(run)
+    assert guiding.accept(state, state.round.candidates[0]).data == {"test": tests[1]}
+
+
+def test_models_that_cannot_be_pinned_or_tried(run):
+    fake_run.guided(run)
+    state = state_of(run)
+    assert "floor is protected" in refusal(guiding.pin, state, ["floor"])
+    assert "crate_09 is removed already" in refusal(guiding.pin, state, ["crate_09"])
+    assert "nothing to leave out" in refusal(guiding.try_without, state, ["crate_09"])
+    assert "that is no change" in refusal(guiding.try_only, state, state.environment)
+    assert guiding.try_only(state, ["crate_09", "crate_01"]).data == {"models": [1, 9]}
+    assert guiding.try_without(state, state.environment).data == {"models": []}
+
+
+def test_before_f_is_known_nothing_is_tried_or_undone(run):
+    run.created()
+    state = state_of(run)
+    assert "the baseline comes first" in refusal(guiding.try_only, state, ["crate_01"])
+    assert "no reduction to take back" in refusal(guiding.undo, state)
+    assert guiding.pin(state, ["crate_01"]).data == {"models": [1]}
+    assert "no candidates yet" in refusal(guiding.veto, state, None)
+
+
+def test_a_round_that_is_over_cannot_be_vetoed(run):
+    state = state_of(fake_run.confirming(run))
+    assert refusal(guiding.veto, state, None) == "the rounds are over"
+    run.write("finished", minimal=True, reason="no candidate showed f")
+    state = state_of(run)
+    assert refusal(guiding.veto, state, state.round.candidates[0]) == "this round is over"
+
+
+# Holds a run file open as an engine does, in a process of its own.
+WRITER = """
+import sys
+from pathlib import Path
+from ddenv.runfile.store import RunFile
+file = RunFile(Path(sys.argv[1]))
+file.own()
+file.append("paused", {})
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_command_is_written_while_another_program_has_the_run_file_open(run):
+    fake_run.mid_round(run).close()
+    words = [sys.executable, "-c", WRITER, str(run.path)]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
+        assert writer.stdout.readline() == b"ready\n"
+        poll = Poll(run.path)
+        assert poll.look().state.paused
+        assert poll.file.send("resume") == 1
+        poll.close()
+        writer.stdin.close()

@@ -1,0 +1,106 @@
+"""The history of a run: its tree, going back in it, and two of its environments side by side."""
+
+import fake_run
+from attached import Attached, starts
+from textual.widgets import DataTable
+
+from ddenv.runfile.fold import fold
+from ddenv.runfile.guiding import Node
+from ddenv.workbench import branches
+from ddenv.workbench.comparing import compare
+from ddenv.workbench.screens.compare import Compare
+from ddenv.workbench.screens.history import History
+from ddenv.workbench.screens.question import Question
+from ddenv.workbench.widgets.lines import Lines
+
+
+def tree(*parents, here=0):
+    """The lines of a tree given by each node's parent, with the nodes' numbers."""
+    nodes = [Node(number, parent, "reduced", "", ()) for number, parent in enumerate((None, *parents))]
+    return [f"{row.lines}{row.node.number}" for row in branches.rows(nodes, here)]
+
+
+def test_the_way_to_where_the_run_is_goes_straight_down():
+    assert tree() == ["0"]
+    assert tree(0, 1, 2, here=3) == ["0", "1", "2", "3"]
+    assert tree(0, 1, 1, 3, 0, here=4) == ["0", "├─5", "1", "├─2", "3", "4"]
+    assert tree(0, 1, 1, 3, 0, here=2) == ["0", "├─5", "1", "├─3", "│ 4", "2"]
+    assert tree(0, 1, 1, here=1) == ["0", "1", "├─2", "3"]
+
+
+def test_long_histories_are_drawn_at_once():
+    lines = tree(*range(1500), here=1500)
+    assert lines[-1] == "1500"
+    assert branches.path([], 0) == []
+
+
+def test_what_a_node_is_has_a_sign_and_words(run):
+    state = fold(fake_run.guided(run).file.events())
+    told = [(branches.sign(node, state.node), branches.words(node, state.node)) for node in state.nodes]
+    assert told == [("○", ""), ("○", ""), ("✗", "taken back"), ("●", "here")]
+    state = fold(fake_run.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
+    assert branches.words(state.nodes[-1], 0) == "minimal"
+
+
+def test_two_environments_are_compared_by_name(run):
+    state = fold(fake_run.guided(run).file.events())
+    found = compare(state.nodes[2], state.nodes[3])
+    assert found.only_first == ("crate_05",)
+    assert found.only_second == ("crate_02", "crate_03")
+    assert found.common == ("crate_00", "crate_01", "crate_04")
+
+
+def cells(session):
+    table = session.app.screen.query_one(DataTable)
+    return [[cell.plain for cell in table.get_row_at(row)] for row in range(table.row_count)]
+
+
+async def test_the_history_follows_the_run_and_compares(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        await session.press("h")
+        history = session.app.screen
+        assert isinstance(history, History)
+        assert [row[0] for row in cells(session)] == ["○ 11 models", "○ 6 models", "├─✗ 4 models", "● 5 models"]
+        assert [row[3] for row in cells(session)] == ["", "", "taken back", "here"]
+        assert history.under_cursor.number == 3
+        decided = [decision.words for decision in history.query_one(Lines).items]
+        assert decided[:2] == ["took back without A: 6 models again", "pinned crate_00"]
+        await session.press("c")
+        assert "mark one environment first" in session.said()
+        await session.press("m", "c")
+        assert "this one is marked" in session.said()
+        await session.press("up", "c")
+        assert isinstance(session.app.screen, Compare)
+        words = session.dialog()
+        assert "only in A: 2 models" in words
+        assert "in both: 3 models" in words
+        await session.press("escape")
+        run.start_round(2, run.elements[:5])
+        run.reduce(0, run.elements[:2], run.similar(0))
+        await session.look()
+        history._look()
+        assert [row[0] for row in cells(session)][-2:] == ["○ 5 models", "● 2 models"]
+        assert history.under_cursor.number == 2
+        await session.press("escape")
+        assert session.app.screen is session.screen
+        assert session.commands() == []
+
+
+async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_works(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_run.finished(run)
+    async with Attached(run, (80, 24)) as session:
+        await session.press("h", "enter")
+        assert "the run is there already" in session.said()
+        await session.press("up", "enter")
+        assert isinstance(session.app.screen, Question)
+        words = " ".join(session.dialog().split())
+        assert "Go on from 6 models (#1, part A)? The run pauses there." in words
+        await session.press("escape")
+        assert isinstance(session.app.screen, History)
+        await session.press("enter", "y")
+        assert session.app.screen is session.screen
+        assert session.asked() == [("go_back", {"node": 1})]
+        assert "goes to 6 models (#1, part A), and pauses there; an engine is started for it" in session.said()
+        assert len(started) == 1

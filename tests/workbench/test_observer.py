@@ -1,0 +1,211 @@
+"""A screen looks at a run file: whatever becomes of the file, it neither writes, nor waits, nor falls over."""
+
+import asyncio
+import os
+import sqlite3
+
+import fake_run
+import pytest
+
+from ddenv import __version__
+from ddenv.errors import UserError
+from ddenv.workbench import poll as polling
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.observed import Busy, Observed
+from ddenv.workbench.poll import Poll
+
+
+def look(poll):
+    poll._looked = -1e9
+    return poll.look()
+
+
+def files(folder):
+    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+
+
+@pytest.fixture
+def poll(run):
+    fake_run.mid_round(run)
+    opened = Poll(run.path)
+    yield opened
+    opened.close()
+
+
+def test_only_what_is_new_makes_a_snapshot(run, poll):
+    assert look(poll).state.tests_done == 10
+    assert look(poll) is None
+    run.write("paused")
+    assert look(poll).state.paused
+    assert look(poll) is None
+
+
+def test_a_look_with_nothing_new_folds_and_reads_nothing(run, poll, monkeypatch):
+    poll.look()
+    monkeypatch.setattr(poll.file, "events", None)
+    monkeypatch.setattr(poll.file, "live", None)
+    assert all(poll.look() is None for _ in range(20))
+
+
+def test_a_long_run_is_caught_up_with_over_several_looks(run, poll, monkeypatch):
+    monkeypatch.setattr(polling, "MOST_EVENTS", 10)
+    revisions = [snapshot.state.revision for _ in range(9) if (snapshot := poll.look())]
+    assert revisions[:3] == [10, 20, 30]
+    assert revisions[-1] == len(run.file.events())
+
+
+def test_the_path_of_f_itself_comes_with_the_snapshot(run, poll):
+    snapshot = look(poll)
+    assert snapshot.original == fake_run.path_samples()
+    run.write("paused")
+    assert look(poll).original is snapshot.original
+
+
+def test_a_deleted_file_is_told_and_never_made_again(run, poll):
+    before = look(poll)
+    run.close()
+    for path in run.path.parent.glob("crates-1*"):
+        path.unlink()
+    after = look(poll)
+    assert after.gone and after.state is before.state
+    assert "deleted" in after.error and after.status == "lost"
+    assert look(poll) is None
+    with pytest.raises(UserError, match="not there"):
+        poll.file.send("pause")
+    poll.close()
+    assert not list(run.path.parent.glob("crates-1*"))
+
+
+def test_another_file_in_its_place_is_left_alone(run, poll):
+    look(poll)
+    run.path.rename(run.path.with_name("moved.ddenv"))
+    other = fake_run.FakeRun(run.path)
+    after = look(poll)
+    assert after.gone and "replaced" in after.error
+    with pytest.raises(UserError):
+        poll.file.send("pause")
+    assert other.file.commands() == []
+    other.close()
+
+
+def test_watching_writes_nothing(run, runs):
+    fake_run.mid_round(run)
+    before = files(runs)
+    watching = Poll(run.path, watch=True)
+    assert look(watching).state.tests_done == 10
+    run.write("paused")
+    assert look(watching).state.paused
+    watching.close()
+    run.close()
+    assert set(before) - {"crates-1.ddenv-wal", "crates-1.ddenv-shm"} == set(files(runs))
+    settled = files(runs)
+    watching = Poll(run.path, watch=True)
+    assert look(watching).state.tests_done == 10
+    watching.close()
+    assert files(runs) == settled
+
+
+async def test_the_whole_screen_writes_nothing_while_it_watches(run, runs):
+    fake_run.finished(run).close()
+    before = files(runs)
+    async with Workbench(run.path, watch=True).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        await pilot.app.workers.wait_for_complete()
+        assert files(runs) == before
+    assert files(runs) == before
+
+
+def test_a_run_that_comes_to_life_is_followed(run, runs):
+    fake_run.mid_round(run).close()
+    watching = Poll(run.path, watch=True)
+    assert look(watching).status == "lost"
+    engine = fake_run.RunFile(run.path)
+    engine.own()
+    engine.append("engine_started", {"pid": 1, "jobs": 2})
+    with run.engine():
+        assert look(watching).status in ("running", "baseline")
+    engine.close()
+    watching.close()
+
+
+def test_the_last_to_close_leaves_one_file(run, runs, poll):
+    look(poll)
+    run.close()
+    assert (runs / "crates-1.ddenv-wal").exists()
+    poll.close()
+    assert [path.name for path in runs.iterdir() if path.name.startswith("crates-1.ddenv-")] == []
+
+
+def test_a_writer_that_holds_the_file_does_not_stop_the_screen(run, runs):
+    run.close()
+    # Before an engine has worked on it a run file has no log: who writes then locks readers out.
+    made = fake_run.FakeRun(runs / "b.ddenv")
+    made.close()
+    poll = Poll(made.path)
+    first = look(poll)
+    writer = sqlite3.connect(made.path, isolation_level=None)
+    writer.execute("PRAGMA locking_mode = EXCLUSIVE")
+    writer.execute("BEGIN EXCLUSIVE")
+    writer.execute("DELETE FROM live")
+    assert look(poll) is None
+    writer.execute("COMMIT")
+    writer.close()
+    look(poll)
+    assert poll._snapshot.state.elements == first.state.elements
+    poll.close()
+
+
+def test_a_busy_file_keeps_what_was_read(run, poll, monkeypatch):
+    snapshot = look(poll)
+    run.write("paused")
+
+    def busy(*_):
+        raise Busy("busy")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Observed, "_all", busy)
+        assert look(poll) is None
+    assert poll._snapshot is snapshot
+    assert look(poll).state.paused
+
+
+async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run, poll):
+    answers = []
+    for kind in ("pause", "resume", "stop"):
+        poll.send(kind, {}, lambda id, error: answers.append((id, error)))
+    while len(answers) < 3:
+        await asyncio.sleep(0.01)
+    assert answers == [(1, ""), (2, ""), (3, "")]
+    assert [command.kind for command in run.file.commands()] == ["pause", "resume", "stop"]
+
+
+async def test_a_watched_run_is_sent_nothing(run):
+    watching = Poll(run.path, watch=True)
+    answers = []
+    watching.send("stop", {}, lambda id, error: answers.append((id, error)))
+    while not answers:
+        await asyncio.sleep(0.01)
+    assert answers[0][0] == 0 and "--watch" in answers[0][1]
+    assert run.file.commands() == []
+    watching.close()
+
+
+def test_an_engine_of_another_version_is_told(run, poll):
+    run.hold()
+    assert look(poll).older_engine == ""
+    run.write("engine_started", pid=1, jobs=2, version="0.0.1")
+    assert look(poll).older_engine == "0.0.1"
+    run.write("engine_started", pid=1, jobs=2, version=__version__)
+    assert look(poll).older_engine == ""
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")
+def test_a_folder_where_nothing_may_be_written(run, runs):
+    fake_run.finished(run).close()
+    runs.chmod(0o500)
+    try:
+        poll = Poll(run.path)
+        assert look(poll).state.ended
+        poll.close()
+    finally:
+        runs.chmod(0o700)
