@@ -114,6 +114,14 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         run.judge_trial(trial, "similar", [test])
         await session.look()
         assert session.said() == "try 4 shows f with 3 models: a adopts it"
+        run.write("unpinned", models=[0])
+        await session.look()
+        table = session.screen.query_one(Candidates)
+        while getattr(table.under_cursor, "number", 0) != trial:
+            await session.press("up")
+        await session.press("v", "a")
+        assert "only candidates of the round can be vetoed" in session.said()
+        assert session.asked() == [("adopt", {"trial": 4})]
 
 
 async def test_another_failure_is_accepted_after_a_question(run):

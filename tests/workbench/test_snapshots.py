@@ -5,13 +5,28 @@ import pytest
 
 from ddenv.workbench.app import Workbench
 
-SIZES = [(120, 36), (80, 24)]
+SMALL, USUAL, LARGE = (80, 24), (120, 36), (200, 60)
+SIZES = [SMALL, USUAL, LARGE]
+THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
 
 
 async def settled(pilot):
     await pilot.pause()
     await pilot.app.workers.wait_for_complete()
     await pilot.pause(0.15)
+
+
+def shown(theme="ddenv", *keys):
+    """Presses `keys` under a theme once the screen stands still."""
+
+    async def run_before(pilot):
+        pilot.app.theme = theme
+        await settled(pilot)
+        for key in keys:
+            await pilot.press(key)
+            await settled(pilot)
+
+    return run_before
 
 
 def baseline(run):
@@ -23,43 +38,92 @@ def baseline(run):
 
 
 MOMENTS = [baseline, fake_run.mid_round, fake_run.waiting, fake_run.confirming, fake_run.finished]
+by_name = lambda value: value.__name__ if callable(value) else str(value)  # noqa: E731
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_run_screen(snap_compare, run, moment, size):
+@pytest.mark.parametrize("theme", THEMES)
+def test_run_screen(snap_compare, run, theme, size):
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme))
+
+
+@pytest.mark.parametrize("size", [SMALL, USUAL], ids=str)
+@pytest.mark.parametrize("moment", MOMENTS, ids=by_name)
+def test_moments_of_a_run(snap_compare, run, moment, size):
     moment(run)
     if moment is not fake_run.finished:
         run.hold()
-    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=settled)
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown())
 
 
 def test_run_screen_without_its_engine(snap_compare, run):
     fake_run.mid_round(run)
-    assert snap_compare(Workbench(run.path), terminal_size=SIZES[0], run_before=settled)
+    assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
+
+
+# The dialogs and screens that a key opens over a run; the table's first rows are trials.
+OPENED = {
+    "help": ["question_mark"],
+    "palette": ["ctrl+p"],
+    "method": ["e"],
+    "pin": ["p"],
+    "try": ["w"],
+    "find": ["slash"],
+    "layers": ["l"],
+    "settings": ["c"],
+    "accept-other": ["up", "up", "up", "a"],
+    "history": ["h"],
+    "compare": ["h", "m", "up", "c"],
+    "log": ["L"],
+    "copy": ["y"],
+    "export": ["E"],
+    "quit": ["q"],
+    "runs": ["R"],
+}
+
+
+@pytest.mark.parametrize("name", OPENED)
+@pytest.mark.parametrize(
+    ("theme", "size"), [("ddenv", SMALL), ("ddenv-light", USUAL), ("ansi-dark", SMALL)], ids=["dark", "light", "ansi"]
+)
+def test_what_a_key_opens(snap_compare, run, name, theme, size, monkeypatch, tmp_path):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
+
+
+@pytest.mark.parametrize("name", ["history", "compare", "runs"])
+def test_what_a_key_opens_where_there_is_room(snap_compare, run, name):
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=LARGE, run_before=shown("ddenv", *OPENED[name]))
+
+
+@pytest.mark.parametrize("pane", ["2", "3", "4", "5"])
+def test_panes_where_there_is_little_room(snap_compare, run, pane):
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", pane))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
-def test_setup_screen(snap_compare, scenarios, runs, size):
+@pytest.mark.parametrize("theme", THEMES)
+def test_setup_screen(snap_compare, scenarios, runs, theme, size):
     fake_run.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
-    assert snap_compare(Workbench(), terminal_size=size, run_before=settled)
+    assert snap_compare(Workbench(), terminal_size=size, run_before=shown(theme))
 
 
-@pytest.mark.parametrize("size", SIZES, ids=str)
-def test_setup_screen_with_an_open_list(snap_compare, scenarios, size):
-    async def opened(pilot):
-        await settled(pilot)
-        await pilot.press("enter", "end", "enter", "tab", "tab", "enter", "down")
-
-    assert snap_compare(Workbench(), terminal_size=size, run_before=opened)
+@pytest.mark.parametrize("pane", ["f3", "f4"])
+def test_panes_of_the_setup_screen(snap_compare, scenarios, pane):
+    assert snap_compare(Workbench(), terminal_size=SMALL, run_before=shown("ddenv", pane))
 
 
-def test_setup_screen_explains_what_is_not_used(snap_compare, scenarios):
-    async def chosen(pilot):
-        await settled(pilot)
-        await pilot.press("enter", "enter", "down", "enter", "tab")
-
-    assert snap_compare(Workbench(), terminal_size=SIZES[1], run_before=chosen)
+def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    assert snap_compare(Workbench(), terminal_size=SMALL, run_before=shown("ddenv", "f7"))
 
 
 def reduced_by(algorithm, runs):
@@ -84,23 +148,29 @@ def reduced_by(algorithm, runs):
 def test_run_screen_of_another_algorithm(snap_compare, runs):
     run = reduced_by("splitting", runs)
     run.hold()
-    assert snap_compare(Workbench(run.path), terminal_size=SIZES[0], run_before=settled)
+    assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
     run.close()
 
 
-def test_explained_run(snap_compare, runs):
-    run = reduced_by("splitting", runs)
-    run.hold()
-
-    async def explained(pilot):
-        await settled(pilot)
-        await pilot.press("e")
-
-    assert snap_compare(Workbench(run.path), terminal_size=SIZES[1], run_before=explained)
-    run.close()
+@pytest.mark.parametrize("size", [(20, 5), (60, 20)], ids=str)
+def test_too_small_says_what_it_needs(snap_compare, run, size):
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=settled)
 
 
 def test_no_color(snap_compare, run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
-    fake_run.mid_round(run).hold()
-    assert snap_compare(Workbench(run.path), terminal_size=SIZES[0], run_before=settled)
+    fake_run.guided(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
+
+
+def test_gone(snap_compare, run):
+    """The file is deleted while it is looked at."""
+    fake_run.mid_round(run)
+
+    async def deleted(pilot):
+        await settled(pilot)
+        run.path.unlink()
+        await pilot.pause(0.6)
+
+    assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=deleted)

@@ -14,6 +14,8 @@ from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
+NICENESS = 5
+
 
 class Simulator(Protocol):
     """Runs the robot in parts of one world."""
@@ -38,6 +40,8 @@ def prepare(scenario: Scenario, world: World, robot: Model, progress: Any) -> No
     """
     global _simulator, _progress
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Simulations take all cores: a screen on the same machine comes first, since it needs little and somebody waits for it.
+    os.nice(NICENESS)
     # Whatever is printed here, also by native code, must not get into what our caller prints for programs to read.
     os.dup2(2, 1)
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
+from rich.console import RenderableType
 from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding
@@ -17,6 +18,7 @@ from ddenv.errors import UserError
 from ddenv.workbench.config import Config
 from ddenv.workbench.themes import DARK, OURS, fitting, for_rich
 from ddenv.workbench.wording import plain
+from ddenv.workbench.written import Written
 
 
 def _commands() -> type[Provider]:
@@ -72,6 +74,7 @@ class Workbench(App[int]):
         config: Config | None = None,
     ) -> None:
         super().__init__()
+        self._written = Written()
         self._reading = reading
         for theme in OURS:
             self.register_theme(theme)
@@ -109,7 +112,7 @@ class Workbench(App[int]):
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and nothing would be drawn before it changes.
-        self.app_resume_signal.subscribe(self, lambda _: self.refresh(layout=True))
+        self.app_resume_signal.subscribe(self, lambda _: self._redraw())
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
         if self.is_headless:
@@ -122,6 +125,16 @@ class Workbench(App[int]):
             self.push_screen(self._setup() if self._run is None else self._attached(self._run, self._watch))
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
+
+    def _redraw(self) -> None:
+        self._written.forget()
+        self.refresh(layout=True)
+
+    def on_resize(self) -> None:
+        self._written.forget()
+
+    def _display(self, screen: Screen, renderable: RenderableType | None) -> None:
+        super()._display(screen, self._written.fewer(renderable))
 
     def on_unmount(self) -> None:
         self._write("\x1b[23;2t")

@@ -62,7 +62,7 @@ class RunScreen(Leaving):
 
     def compose(self) -> ComposeResult:
         yield Header(id="header")
-        yield Panes(id="panes")
+        yield Panes(id="run-panes")
         with Horizontal(id="run-body"):
             with Vertical(id="run-main"):
                 with Horizontal(id="top"):

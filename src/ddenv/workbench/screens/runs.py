@@ -163,7 +163,7 @@ class RunsScreen(Screen[None]):
             self._complain("its engine is at work: open the run and stop it first")
         else:
             words = f"Delete {plain(run.path.stem)} for good?\n\n{run.words}; its log goes, too."
-            self.app.push_screen(Question(words), lambda yes: self._delete(run.path) if yes else None)
+            self.app.push_screen(Question(words, final=True), lambda yes: self._delete(run.path) if yes else None)
 
     @work(thread=True, group="delete")
     def _delete(self, path: Path) -> None:

@@ -1,0 +1,153 @@
+"""What was written to the terminal: of all that widgets draw again, only the cells that changed are sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from rich.cells import cell_len
+from rich.console import Console, RenderableType
+from rich.segment import Segment
+from rich.style import Style
+from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
+from textual.strip import Strip
+
+# So many unchanged cells between changed ones are written again: to go elsewhere takes as many letters.
+GAP = 4
+# What is remembered of styles.
+MOST_STYLES = 4096
+# Takes the place of text while it is found out what stands around it.
+TEXT = "\0"
+
+# What is written before and after text of a style.
+Pen = tuple[str, str]
+
+
+@dataclass(slots=True)
+class _Row:
+    """The cells of a row; "" in `chars` is one of which nothing is known, or the second half of a wide character."""
+
+    chars: list[str] = field(default_factory=list)
+    pens: list[Pen | None] = field(default_factory=list)
+
+    def widen(self, columns: int) -> None:
+        missing = columns - len(self.chars)
+        self.chars += [""] * missing
+        self.pens += [None] * missing
+
+
+class Written:
+    """The cells of a terminal, as far as they are known."""
+
+    def __init__(self) -> None:
+        self._rows: dict[int, _Row] = {}
+        self._pens: dict[Style | None, Pen] = {}
+
+    def forget(self) -> None:
+        """Something else was written, or the terminal was resized."""
+        self._rows.clear()
+
+    def fewer(self, update: RenderableType | None) -> RenderableType | None:
+        """The same update, that writes only what is not there yet."""
+        if isinstance(update, ChopsUpdate | LayoutUpdate):
+            return _Fewer(self, update)
+        if update is not None:
+            self.forget()
+        return update
+
+    def sequence(self, update: ChopsUpdate | LayoutUpdate, console: Console) -> str:
+        """What to write, and all of it is taken as written."""
+        strips = _of_layout(update) if isinstance(update, LayoutUpdate) else _of_chops(update)
+        return "".join(part for x, y, strip in strips for part in self._changes(x, y, strip, console))
+
+    def _changes(self, x: int, y: int, strip: Strip, console: Console) -> Iterator[str]:
+        chars, pens, simple = self._cells(strip, console)
+        row = self._rows.setdefault(y, _Row())
+        end = x + len(chars)
+        row.widen(end)
+        old_chars, old_pens = row.chars[x:end], row.pens[x:end]
+        if old_chars == chars and old_pens == pens:
+            return
+        row.chars[x:end], row.pens[x:end] = chars, pens
+        if not simple or "" in old_chars:
+            # Terminals do not agree on what is wide: the whole piece is written, from its first cell on.
+            yield _move(x, y)
+            yield strip.render(console)
+            return
+        for first, last in _differing(old_chars, chars, old_pens, pens):
+            yield _move(x + first, y)
+            cells = zip(chars[first:last], pens[first:last], strict=True)
+            for (before, after), some in groupby(cells, key=lambda cell: cell[1]):
+                yield f"{before}{''.join(char for char, _ in some)}{after}"
+
+    def _cells(self, strip: Strip, console: Console) -> tuple[list[str], list[Pen | None], bool]:
+        """Characters and pens by cell, and whether each character takes just one."""
+        chars: list[str] = []
+        pens: list[Pen | None] = []
+        simple = True
+        for segment in strip:
+            text, width = segment.text, segment.cell_length
+            pen = self._pen(segment.style, console)
+            if text.isascii() or (width == len(text) and all(cell_len(char) == 1 for char in set(text))):
+                chars += text
+            else:
+                # With all of the text in its first cell, another text is another cell.
+                chars += [text, *[""] * (width - 1)][:width]
+                simple = False
+            pens += [pen] * width
+        return chars, pens, simple
+
+    def _pen(self, style: Style | None, console: Console) -> Pen:
+        pen = self._pens.get(style)
+        if pen is None:
+            if len(self._pens) >= MOST_STYLES:
+                self._pens.clear()
+            before, _, after = Strip([Segment(TEXT, style)]).render(console).partition(TEXT)
+            pen = self._pens[style] = before, after
+        return pen
+
+
+class _Fewer(CompositorUpdate):
+    def __init__(self, written: Written, update: ChopsUpdate | LayoutUpdate) -> None:
+        self._written, self._update = written, update
+
+    def render_segments(self, console: Console) -> str:
+        return self._written.sequence(self._update, console)
+
+
+def _of_layout(update: LayoutUpdate) -> Iterator[tuple[int, int, Strip]]:
+    """Column, row and cells of all pieces."""
+    for y, line in enumerate(update.strips, update.region.y):
+        x = update.region.x
+        for strip in line:
+            yield x, y, strip
+            x += strip.cell_length
+
+
+def _of_chops(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
+    """Column, row and cells of the pieces that lie in the spans to update."""
+    for y, left, right in update.spans:
+        for end, (x, strip) in zip(update.chop_ends[y], update.chops[y].items(), strict=False):
+            if strip is not None and x <= right and end > left:
+                yield x, y, strip if end <= right else strip.crop(0, right - x)
+
+
+def _differing(
+    old_chars: list[str], chars: list[str], old_pens: list[Pen | None], pens: list[Pen | None]
+) -> list[tuple[int, int]]:
+    """From where to where cells differ."""
+    found: list[tuple[int, int]] = []
+    cells = zip(old_chars, chars, old_pens, pens, strict=True)
+    for place, (old_char, char, old_pen, pen) in enumerate(cells):
+        if old_char == char and old_pen == pen:
+            continue
+        if found and place - found[-1][1] <= GAP:
+            found[-1] = found[-1][0], place + 1
+        else:
+            found.append((place, place + 1))
+    return found
+
+
+def _move(x: int, y: int) -> str:
+    return f"\x1b[{y + 1};{x + 1}H"
