@@ -28,9 +28,9 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     CSS_PATH: ClassVar = ["dialogs.tcss", "guide.tcss"]
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
-        Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name", priority=True),
-        Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name", priority=True),
-        Binding("tab", "toggle", show=False, id="choose.toggle", tooltip="choose this one too, or not", priority=True),
+        Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
+        Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
+        Binding("tab", "toggle", show=False, id="choose.toggle", tooltip="choose this one too, or not"),
     ]
 
     def __init__(self, title: str, names: Sequence[str], *, several: bool, pinned: Iterable[str] = ()) -> None:
@@ -40,6 +40,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         self._pinned = frozenset(pinned)
         self._chosen: set[str] = set()
         self._listed: list[str] = []
+        self._part: str | None = None
 
     def compose(self) -> ComposeResult:
         with Vertical(classes="dialog") as dialog:
@@ -52,14 +53,17 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     def on_mount(self) -> None:
         self.query_one(Input).focus()
-        self._list("")
+        self._filter()
 
     @on(Input.Changed)
-    def _filtered(self, event: Input.Changed) -> None:
-        self._list(event.value)
+    def _filter(self) -> None:
+        """Lists what is called so. Before any key acts on the list, too: who types fast is ahead of the message that says so."""
+        part = self.query_one(Input).value.strip().casefold()
+        if part != self._part:
+            self._part = part
+            self._list(part)
 
     def _list(self, part: str) -> None:
-        part = part.strip().casefold()
         found = [name for name in self._names if part in name.casefold()]
         self._listed = found[:LISTED]
         options = self.query_one(OptionList)
@@ -83,6 +87,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         return Text(f"{mark}{'+ ' if name in self._pinned else ''}{shortened(name, WIDTH)}", no_wrap=True)
 
     def action_move(self, by: int) -> None:
+        self._filter()
         options = self.query_one(OptionList)
         if by > 0:
             options.action_cursor_down()
@@ -90,6 +95,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
             options.action_cursor_up()
 
     def action_toggle(self) -> None:
+        self._filter()
         place = self.query_one(OptionList).highlighted
         if self._several and place is not None:
             self._toggle(place)
@@ -103,6 +109,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     @on(Input.Submitted)
     def _entered(self) -> None:
         """What is chosen, or the one under the cursor."""
+        self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
             self.dismiss(tuple(name for name in self._names if name in self._chosen))

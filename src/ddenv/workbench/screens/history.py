@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from textwrap import wrap
 from typing import ClassVar
 
 from rich.text import Text
@@ -13,7 +15,7 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
 from ddenv.errors import UserError
-from ddenv.runfile.guiding import Node
+from ddenv.runfile.guiding import Decision, Node
 from ddenv.workbench import branches, guiding
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.screens.compare import Compare
@@ -27,11 +29,23 @@ from ddenv.workbench.wording import count, plain, shorten
 # How often the run is looked at, s.
 PERIOD = 0.5
 # Name and width of the tree's columns behind the tree itself; the last is for wide terminals.
-COLUMNS = (("made by", 15), ("tests", 5), ("", 22), ("method", 36))
+COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("", 22), ("method", 36))
 ROOM = 90
 # Of the tree so many columns, besides the lines of its branches.
 TREE = 15
 MARK = "marked"
+# Where the words of a decision begin, behind its time.
+INDENT = 10
+
+
+class Tree(DataTable):
+    """With a cursor of whole rows, home and end mean the first and the last of them."""
+
+    def action_scroll_home(self) -> None:
+        self.action_scroll_top()
+
+    def action_scroll_end(self) -> None:
+        self.action_scroll_bottom()
 
 
 class History(Screen[int | None]):
@@ -52,6 +66,7 @@ class History(Screen[int | None]):
         Binding(
             "c", "compare", "compare", id="history.compare", tooltip="compare the marked environment with this one"
         ),
+        Binding("question_mark,f1", "app.help", "help", id="history.help", tooltip="show every key", key_display="?"),
         Binding("escape,h,q", "close", "close", id="history.close", tooltip="back to the run", key_display="esc"),
     ]
 
@@ -63,30 +78,29 @@ class History(Screen[int | None]):
         self._here = -1
         self._rows: list[branches.Row] = []
         self._marked: int | None = None
+        self._decided: tuple[tuple[Decision, ...], int] = ((), 0)
 
     def compose(self) -> ComposeResult:
         with Horizontal(id="both"):
             with Vertical(id="tree-panel", classes="panel") as panel:
                 panel.border_title = "Reductions"
-                yield DataTable(id="tree", cursor_type="row", cell_padding=1)
+                yield Tree(id="tree", cursor_type="row", cell_padding=1)
             with Vertical(id="past-decisions", classes="panel") as panel:
                 panel.border_title = "What you decided"
-                yield Lines(decision_line, nothing="nothing was decided by hand yet", tail=True, id="decisions")
+                yield Lines(_as_it_is, nothing="nothing was decided by hand yet", tail=True, id="decisions")
         yield Static("", id="about", markup=False)
-        shown = ("history.go", "history.mark", "history.compare", "history.close")
+        shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
         yield KeyFooter(shown, shown)
 
     def on_mount(self) -> None:
-        self.query_one(DataTable).focus()
+        self.query_one(Tree).focus()
         self.set_interval(PERIOD, self._look)
 
     # What is shown.
 
     def _look(self) -> None:
         state = self._look_at().state
-        lines = self.query_one(Lines)
-        if lines.items != state.decisions:
-            lines.show(state.decisions)
+        self._show_decisions(state.decisions)
         if (state.nodes, state.node) != (self._tree, self._here):
             at = self.under_cursor
             followed = at is None or at.number == self._here
@@ -94,8 +108,16 @@ class History(Screen[int | None]):
             self._rows = branches.rows(state.nodes, state.node)
             self._fill(self._here if followed else at.number)
 
+    def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
+        """Whole: this is where they are read."""
+        lines = self.query_one(Lines)
+        made_of = decisions, lines.scrollable_content_region.width
+        if made_of != self._decided and made_of[1] > 0:
+            self._decided = made_of
+            lines.show([line for each in decisions for line in decision_lines(each, made_of[1])])
+
     def _fill(self, cursor: int) -> None:
-        table = self.query_one(DataTable)
+        table = self.query_one(Tree)
         table.clear(columns=True)
         branched = max((len(row.lines) for row in self._rows), default=0)
         table.add_column("environment", width=TREE + min(branched, 20))
@@ -115,7 +137,7 @@ class History(Screen[int | None]):
         size = len(node.environment)
         marked = MARK if node.number == self._marked else ""
         told = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
-        texts = (plain(node.what), str(node.tests), told, plain(node.method))
+        texts = (str(node.number), plain(node.what), str(node.tests), told, plain(node.method))
         cells = (
             Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
         )
@@ -123,14 +145,15 @@ class History(Screen[int | None]):
 
     @property
     def under_cursor(self) -> Node | None:
-        row = self.query_one(DataTable).cursor_row
+        row = self.query_one(Tree).cursor_row
         return self._rows[row].node if 0 <= row < len(self._rows) else None
 
     def on_resize(self) -> None:
         self.call_after_refresh(self._arrange)
 
     def _arrange(self) -> None:
-        """Makes the table for the room that there is."""
+        """Makes table and lines for the room that there is."""
+        self._show_decisions(self._look_at().state.decisions)
         at = self.under_cursor
         if at is None:
             self._look()
@@ -196,8 +219,19 @@ class History(Screen[int | None]):
         self.notify(why, severity="warning", timeout=4, markup=False)
 
 
+def decision_lines(decision: Decision, width: int) -> list[Text]:
+    """A decision with its time of day, in lines that fit."""
+    first, *rest = wrap(plain(decision.words), max(width - INDENT, 12)) or [""]
+    lines = [decision_line(replace(decision, words=first), width)]
+    return lines + [Text(" " * INDENT + line) for line in rest]
+
+
+def _as_it_is(line: Text, width: int) -> Text:
+    return line.copy()
+
+
 def _side(name: str) -> str:
-    return "right" if name == "tests" else "left"
+    return "right" if name in ("#", "tests") else "left"
 
 
 HOW = {
