@@ -29,8 +29,10 @@ class Session:
 
     async def look(self):
         """Lets the screen see what was written, without waiting for its clock."""
-        self.screen.poll._looked = -1e9
+        self.screen.poll._looked = self.screen.poll._posed = -1e9
         self.screen._look()
+        while self.screen.poll.catching_up:
+            self.screen._look()
         await self.pilot.pause()
         assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
 

@@ -113,6 +113,19 @@ def test_paused_comes_first(run):
     assert words.startswith("Paused: no new test is started; what runs now is finished first.")
 
 
+def test_a_step_leaves_behind_what_came_of_it(run):
+    run.created().baseline()
+    run.start_round(2)
+    run.reduce(0, run.elements[:6], run.similar(0))
+    run.start_round(3, run.elements[:6])
+    run.write("paused")
+    assert "part A showed f: 11 → 6 models. Next is part A (2 models)" in told(run)[1]
+    run.test(0, "pass")
+    assert told(run)[1].endswith(
+        "Next is re-run 1 of 3 of part A (2 models), candidate 1 of 6: last time the goal was reached."
+    )
+
+
 def test_a_minimal_end_names_what_is_kept(run):
     line, words = told(fake_run.finished(run), "absent")
     assert line == 21
@@ -372,8 +385,13 @@ def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):
 
 def test_what_was_pinned_is_not_called_needed(run):
     fake_run.finished(run)
-    run.pin("crate_00")
-    assert "1 model pinned by you always stayed" in told(run, "absent")[1]
+    for name, words in (
+        ("crate_00", "the other one f is not seen again; 1 model pinned by you"),
+        ("crate_01", "was not tried"),
+    ):
+        run.pin(name)
+        run.write("finished", minimal=True, reason="")
+        assert words in told(run, "absent")[1]
 
 
 def test_a_file_that_is_gone_and_another_engine_are_told(run):

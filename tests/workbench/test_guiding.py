@@ -11,10 +11,11 @@ from textual.widgets import Input, Select
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.workbench import guiding
-from ddenv.workbench.poll import Poll
+from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.screens.change import Change
 from ddenv.workbench.screens.choose import ChooseModels
 from ddenv.workbench.screens.question import Question
+from ddenv.workbench.screens.run_footer import footer_words
 from ddenv.workbench.widgets.candidates import Candidates
 from ddenv.workbench.widgets.map import WorldMap
 
@@ -49,7 +50,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "nothing waits for accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert "vetoes without B" in session.said()
+        assert "without B is vetoed" in session.said()
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
@@ -84,7 +85,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         assert isinstance(dialog, ChooseModels)
         await session.press(*"04", "enter")
         assert session.asked() == [("pin", {"models": [4]})]
-        assert "pins crate_04" in session.said()
+        assert "crate_04 is pinned" in session.said()
         world = session.screen.query_one(WorldMap)
         await session.press("1")
         world.go_to("crate_00")
@@ -113,7 +114,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         run.finish(test, "similar", 0.1, failure="stuck")
         run.judge_trial(trial, "similar", [test])
         await session.look()
-        assert session.said() == "try 4 shows f with 3 models: a adopts it"
+        assert session.said() == "try 4 shows f with 3 models: a on its row adopts it"
         run.write("unpinned", models=[0])
         await session.look()
         table = session.screen.query_one(Candidates)
@@ -185,9 +186,48 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
     fake_run.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
-        assert session.said().count("the run is finished; u, h, c, w and o go on from there") == 3
+        assert session.said().count("the run is finished; u, h, c, p, w and o go on from there") == 3
         await session.press("w", *"01", "enter")
         assert session.asked() == [("try", {"models": [0]})]
+        assert len(started) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "shown"),
+    [
+        (fake_run.waiting, {"pause", "accept", "reject", "veto", "try without", "try only"}),
+        (fake_run.mid_round, {"pause", "step", "veto", "try without", "try only", "undo"}),
+        (fake_run.finished, {"try without", "try only", "undo"}),
+    ],
+)
+def test_the_footer_offers_what_can_be_done_now(run, make, shown):
+    make(run)
+    words = footer_words(Snapshot(fold(run.file.events()), engine="alive"), None, follows=True)
+    assert {each for each in words.values() if each} == shown
+
+
+def test_a_in_the_footer_says_what_it_would_take(run):
+    fake_run.guided(run)
+    run.judge_trial(3, "similar", [15])
+    run.write("unpinned", models=[0])
+    now = Snapshot(fold(run.file.events()), engine="alive")
+    adopted, vain, similar = now.state.trials
+    assert [footer_words(now, row, False)["run.accept"] for row in (adopted, vain, similar)] == [
+        "",
+        "take as f",
+        "adopt",
+    ]
+
+
+async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_run.finished(run)
+    async with Attached(run) as session:
+        await session.press("p", *"00", "enter")
+        assert (
+            "crate_00 is pinned, and always stays from the next round on; an engine is started for it" in session.said()
+        )
+        assert session.asked() == [("pin", {"models": [0]})]
         assert len(started) == 1
 
 

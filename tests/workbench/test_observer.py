@@ -16,7 +16,7 @@ from ddenv.workbench.poll import Poll
 
 
 def look(poll):
-    poll._looked = -1e9
+    poll._looked = poll._posed = -1e9
     return poll.look()
 
 
@@ -48,7 +48,8 @@ def test_a_look_with_nothing_new_folds_and_reads_nothing(run, poll, monkeypatch)
 
 
 def test_a_long_run_is_caught_up_with_over_several_looks(run, poll, monkeypatch):
-    monkeypatch.setattr(polling, "MOST_EVENTS", 10)
+    monkeypatch.setattr(polling, "SOME_EVENTS", 10)
+    monkeypatch.setattr(polling, "PATIENCE", 0.0)
     revisions = [snapshot.state.revision for _ in range(9) if (snapshot := poll.look())]
     assert revisions[:3] == [10, 20, 30]
     assert revisions[-1] == len(run.file.events())

@@ -40,6 +40,7 @@ class Bench:
 
     def __init__(self, journal: Journal, pool: Pool, control: Control) -> None:
         self._failures: tuple[Failure, ...] = ()
+        self._failed: tuple[int, ...] = ()
         self._journal = journal
         self._pool = pool
         self._control = control
@@ -73,17 +74,20 @@ class Bench:
             self._control.started()
 
     def finish_trials(self) -> None:
-        """Makes the tests that the user asked for. Raises as `work`."""
-        while self._journal.state.failures and open_trials(self._journal):
+        """Obeys what was asked last, and makes the tests that the user asked for. Raises as `work`."""
+        self._control.poll()
+        while self._control.holds or (self._journal.state.failures and open_trials(self._journal)):
             self.tick()
 
     def _serve_trials(self) -> None:
-        """They are made while the rounds are paused, too."""
+        """They are made while the rounds are paused, too. Raises Stopped where the budget has none left for them."""
         if not self._journal.state.failures or not open_trials(self._journal):
             return
         full = self._journal.is_full("hand")
         wanted = [one for one in judge_trials(self._journal) if (*one[:2], full) not in self._started]
         for keep, run, trial in wanted[: self._pool.idle]:
+            if self._is_spent():
+                return
             test = self._journal.start_test("hand", keep, run, trial=trial)
             self._started.add((keep, run, full))
             self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
@@ -111,11 +115,12 @@ class Bench:
 
     def _look_around(self) -> None:
         self._control.poll()
-        self._serve_trials()
         finished = self._pool.finished(WAIT)
         for test, result in finished:
             self._record(test, result)
             self._give_up_if_all_break(result)
+        # Before the search gets the workers that are free now.
+        self._serve_trials()
         if self._pool.busy == 0:
             self._control.settled()
             if not finished:
@@ -151,9 +156,9 @@ class Bench:
     def _counted(self) -> tuple[Failure, ...]:
         """f, and what the user took for as good."""
         state = self._journal.state
-        if len(self._failures) != len(state.failures):
+        if self._failed != state.failures:
             spec = FailureSpec.model_validate(state.scenario["failure"])
-            self._failures = failures_of(self._journal.file, state, spec)
+            self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
 
     def _numbered(self, times: dict[str, float]) -> list[list[float]]:

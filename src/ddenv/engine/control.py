@@ -26,7 +26,7 @@ class Control:
     """Commands turned into events and into what the driver may do next.
 
     `credit` is how many tests may still start before a pause, None for any number. A command that makes no sense any more
-    (a veto of a judged candidate, an accept of nothing) has no effect but is marked as handled. `terminated` is set by a signal,
+    (a veto of a judged candidate, an accept of nothing) is refused with the reason. `terminated` is set by a signal,
     `since` is when this engine was asked to start (Unix time, s).
     """
 
@@ -58,6 +58,9 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
+            if command.kind == "accept":
+                # The reduction is made before anything else is decided.
+                return
 
     def search_begins(self) -> None:
         """From now on what the user changes ends a search."""
@@ -97,21 +100,25 @@ class Control:
             self._pause()
 
     def _obey(self, command: Event) -> None:
-        # Marked first: a stop leaves by an exception, and must not be met again.
-        self._handled(command)
-        if command.kind in STEERING:
-            self._steer(command)
-            return
-        obey = getattr(self, f"_obey_{command.kind}", None)
-        if obey is not None:
-            obey(command.data)
+        """Once, whenever the engine is killed: the event that it becomes says which command it was."""
+        self._journal.command = command.id
+        try:
+            if why := self._try(command):
+                self._journal.record("command_refused", why=why)
+        finally:
+            # A stop leaves by an exception, and must not be met again.
+            self._journal.command = None
+            if self._journal.state.last_command < command.id:
+                self._handled(command)
 
-    def _steer(self, command: Event) -> None:
-        why = STEERING[command.kind](self._steering, command.data)
-        if why:
-            self._journal.record("command_refused", command=command.id, why=why)
-        elif command.kind == "go_back" and not self._paused:
-            self._pause()
+    def _try(self, command: Event) -> str:
+        if command.kind in STEERING:
+            why = STEERING[command.kind](self._steering, command.data)
+            if command.kind == "go_back" and not why and not self._paused:
+                self._pause()
+            return why
+        obey = getattr(self, f"_obey_{command.kind}", None)
+        return f"there is no command '{command.kind[:40]}'" if obey is None else obey(command.data) or ""
 
     def _handled(self, command: Event) -> None:
         self._journal.record("command_handled", command=command.id)
@@ -129,34 +136,14 @@ class Control:
         else:
             self._run(credit=1, pause_after_round=False)
 
-    def _obey_accept_mode(self, data: dict) -> None:
-        if data.get("mode") in ("automatic", "ask"):
-            self._journal.record("accept_mode", mode=data["mode"])
-
-    def _obey_accept(self, data: dict) -> None:
-        self._decide(data, "accept")
-
-    def _obey_reject(self, data: dict) -> None:
-        self._decide(data, "reject")
-
-    def _obey_veto(self, data: dict) -> None:
-        round = self._journal.state.round
-        if round is None or round.done or round.winner is not None or round.number != data.get("round"):
-            return
-        index = data.get("candidate")
-        if isinstance(index, int) and 0 <= index < len(round.candidates) and not round.candidates[index].verdict:
-            self._journal.record("vetoed", round=round.number, candidate=index, verdict="vetoed")
+    def _obey_accept_mode(self, data: dict) -> str:
+        if data.get("mode") not in ("automatic", "ask"):
+            return "the accept mode is automatic or ask"
+        self._journal.record("accept_mode", mode=data["mode"])
+        return ""
 
     def _obey_stop(self, _: dict) -> None:
         raise Stopped("stopped by the user")
-
-    def _decide(self, data: dict, decision: str) -> None:
-        state = self._journal.state
-        if state.waiting_candidate is None:
-            return
-        key = (state.round.number, state.waiting_candidate)
-        if (data.get("round"), data.get("candidate")) == key:
-            self._journal.record("decided", round=key[0], candidate=key[1], decision=decision)
 
     def _run(self, credit: int | None, pause_after_round: bool) -> None:
         self._credit, self._pause_after_round = credit, pause_after_round

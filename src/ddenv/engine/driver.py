@@ -105,6 +105,8 @@ class Driver:
         return candidate.models | self._pinned
 
     def _finish(self, kept: Keep) -> None:
+        # What they show counts, too.
+        self._bench.finish_trials()
         free = [name for name in self._journal.state.elements if name in kept - self._pinned]
         # Each model must have been left out, in tests and without success; a veto or a reject leaves that open.
         untried = [name for name in free if not self._is_dissimilar(kept - {name})]
@@ -258,16 +260,18 @@ class Driver:
         return Trial(self._journal.keep_of_test(test), self._journal.state.tests[test - 1].outcome == "similar")
 
     def _is_accepted(self, number: int, winner: int) -> bool:
-        """In accept mode `ask`, waits for the user."""
+        """In accept mode `ask`, waits for the user, who may as well want one before it after all."""
         journal, key = self._journal, (number, winner)
         if journal.has("reduced", number, winner):
             return True
         if journal.state.accept_mode == "ask" and key not in journal.decisions:
             journal.record("waiting", round=number, candidate=winner)
-            while journal.state.accept_mode == "ask" and key not in journal.decisions:
+            while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == winner:
                 self._bench.tick()
-            if key not in journal.decisions:
+            if journal.state.waiting_candidate == winner:
                 journal.record("decided", round=number, candidate=winner, decision="accept")
+            if key not in journal.decisions:
+                return False
         return journal.decisions.get(key, "accept") == "accept"
 
     def _take(self, number: int, round: Round, winner: int) -> None:

@@ -26,10 +26,10 @@ def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> 
 
 
 def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> dict[str, dict[str, Any]]:
-    """What all other failures so far are, seen from `failures`: their outcomes, and distances in m, by the test's id."""
+    """What all failed tests so far are, seen from `failures`: their outcomes, and distances in m, by the test's id."""
     outcomes, distances = {}, {}
     for test in state.tests:
-        if test.outcome != "other":
+        if test.outcome not in ("similar", "other"):
             continue
         judged = nearest([judge_trajectory(rows_of(file, test.id), failure) for failure in failures])
         outcomes[str(test.id)], distances[str(test.id)] = judged.outcome, judged.distance

@@ -13,7 +13,7 @@ from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
 # After these the search begins anew from what the user left it.
-STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back", "changed")
+STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back")
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ class Journal:
     it cuts. What only confirms stays out of the algorithm's sight, so that a resumed run takes the same way.
     `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
     they stay refused in later rounds, whatever is known of them; `refusals` counts how often that changed. `partitions` are those
-    of each round, as numbers of models. `leg` is the search that is on; once `steered`, a new one has to begin.
+    of each round, as numbers of models. `leg` is the search that is on; once `steered`, a new one has to begin. While a user's
+    `command` is obeyed, events tell its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -60,6 +61,7 @@ class Journal:
         self.refusals = 0
         self.steered = False
         self.leg: Leg | None = None
+        self.command: int | None = None
         self.partitions: dict[int, list[list[int]]] = {}
         self._keeps: dict[int, Keep] = {}
         self._refused_in: dict[Keep, int | None] = {}
@@ -71,6 +73,8 @@ class Journal:
 
     def record(self, kind: str, motions: dict[str, bytes] | None = None, **data: Any) -> None:
         """Writes an event."""
+        if self.command is not None:
+            data["command"] = self.command
         self._take(self.file.append(kind, data, motions))
 
     def record_once(self, kind: str, round: int | None = None, candidate: int | None = None, **data: Any) -> None:
@@ -205,6 +209,8 @@ class Journal:
         keep, round = self._keep_of(data["candidate"]), data["round"]
         self.refused.pop(keep, None)
         self.decisions.pop((round, data["candidate"]), None)
+        # A rejected one was judged, and is judged again.
+        self._seen.discard(("candidate_judged", round, data["candidate"]))
         self.refusals += 1
         if self._refused_in.pop(keep, None) != round:
             self.steered = True
@@ -213,6 +219,11 @@ class Journal:
         self.refused.setdefault(keep, verdict)
         self._refused_in.setdefault(keep, round)
         self.refusals += 1
+
+    def _changed(self, data: dict[str, Any]) -> None:
+        """A search goes the same way whatever its budget is."""
+        if set(data["settings"]) != {"budget"}:
+            self.steered = True
 
     def _went_back(self, data: dict[str, Any]) -> None:
         """What is undone is not to be taken again; what is gone to is wanted after all."""
@@ -257,4 +268,5 @@ _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "vetoed": Journal._vetoed,
     "unvetoed": Journal._unvetoed,
     "went_back": Journal._went_back,
+    "changed": Journal._changed,
 }

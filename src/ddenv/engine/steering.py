@@ -1,4 +1,4 @@
-"""What the user decides by hand: pins, trials, the way back, other settings. Each becomes an event, or a reason why it cannot."""
+"""What the user decides by hand: vetoes, pins, trials, the way back. Each becomes an event, or a reason why it cannot."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ddenv.engine.failures import failure_of, failures_of, rejudged
+from ddenv.engine.failures import failure_of, rejudged
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.runfile.fold_nodes import failures_at
 from ddenv.runfile.state import Candidate, Test
 from ddenv.schemas import check, split_pair
 from ddenv.world.scenario import FailureSpec, Reduction
@@ -17,6 +18,7 @@ from ddenv.world.scenario import FailureSpec, Reduction
 # The settings that may change on the way: all others are part of what a test is, or of how f was fixed.
 CHANGEABLE = ("pair", "algorithm", "iterations", "budget")
 NO_FAILURE = "f is not known before the baseline is done"
+OVER = "this round is over"
 
 
 class Steering:
@@ -25,10 +27,25 @@ class Steering:
     def __init__(self, journal: Journal) -> None:
         self._journal = journal
 
+    def accept(self, data: dict[str, Any]) -> str:
+        return self._decide(data, "accept")
+
+    def reject(self, data: dict[str, Any]) -> str:
+        return self._decide(data, "reject")
+
+    def veto(self, data: dict[str, Any]) -> str:
+        candidate = self._candidate(data)
+        if candidate is None:
+            return OVER
+        if candidate.verdict:
+            return f"{candidate.label} is {candidate.verdict} already"
+        self._journal.record("vetoed", round=data["round"], candidate=candidate.index, verdict="vetoed")
+        return ""
+
     def unveto(self, data: dict[str, Any]) -> str:
         candidate = self._candidate(data)
         if candidate is None:
-            return "this round is over"
+            return OVER
         if candidate.verdict not in ("vetoed", "rejected"):
             return f"{candidate.label} is neither vetoed nor rejected"
         self._journal.record("unvetoed", round=data["round"], candidate=candidate.index)
@@ -38,7 +55,8 @@ class Steering:
         state, models = self._journal.state, self._models(data)
         if models is None:
             return "no such models"
-        gone = [name for name in models if name not in set(state.environment)]
+        there = frozenset(state.environment)
+        gone = [name for name in models if name not in there]
         if gone:
             return f"'{gone[0]}' is removed already: go back to where it was there, and pin it then"
         new = [name for name in models if name not in state.pinned]
@@ -75,7 +93,8 @@ class Steering:
         if type(number) is not int or not 0 < number <= len(state.trials):
             return "there is no such trial"
         trial = state.trials[number - 1]
-        if trial.verdict != "similar":
+        # What counted as f then may not count here.
+        if trial.verdict != "similar" or state.tests[trial.tests[-1] - 1].outcome != "similar":
             return f"{trial.label} did not show f"
         reason = self._lacks_pinned(frozenset(trial.models))
         if reason:
@@ -108,7 +127,7 @@ class Steering:
         here = self._journal.state.here
         if here is None or here.parent is None:
             return "there is no reduction to take back"
-        self._journal.record("went_back", node=here.parent, rejected=here.number)
+        self._go(here.parent, rejected=here.number)
         return ""
 
     def go_back(self, data: dict[str, Any]) -> str:
@@ -119,10 +138,7 @@ class Steering:
             return NO_FAILURE
         if number == state.node:
             return "the run is there already"
-        gone = state.pinned.difference(state.nodes[number].environment)
-        if gone:
-            self._journal.record("unpinned", models=self._numbers(name for name in state.elements if name in gone))
-        self._journal.record("went_back", node=number, rejected=None)
+        self._go(number, rejected=None)
         return ""
 
     def change(self, data: dict[str, Any]) -> str:
@@ -130,25 +146,47 @@ class Steering:
         if not isinstance(asked, dict) or not asked or not set(asked) <= set(CHANGEABLE):
             return f"only {', '.join(CHANGEABLE)} can be changed on the way"
         before = self._journal.state.scenario["reduction"]
-        new = {key: value for key, value in asked.items() if before.get(key) != value}
+        reason = _wrong({**before, **asked})
+        if reason:
+            return reason
+        # As the scenario would hold them: "2" is 2.
+        meant = Reduction.model_validate({**before, **asked}).model_dump(mode="json", include=set(asked))
+        new = {key: value for key, value in meant.items() if before.get(key) != value}
         if not new:
             return "that is how it is set already"
-        reason = _wrong({**before, **new})
-        if not reason:
-            self._journal.record("changed", settings=new)
-        return reason
+        self._journal.record("changed", settings=new)
+        return ""
+
+    def _decide(self, data: dict[str, Any], decision: str) -> str:
+        state = self._journal.state
+        waits = None if state.waiting_candidate is None else (state.round.number, state.waiting_candidate)
+        # Where a new search is due, what was found before it is not taken any more.
+        if waits is None or self._journal.steered or (data.get("round"), data.get("candidate")) != waits:
+            return f"there is no such reduction to {decision} any more"
+        self._journal.record("decided", round=waits[0], candidate=waits[1], decision=decision)
+        return ""
+
+    def _go(self, node: int, rejected: int | None) -> None:
+        state = self._journal.state
+        failures = failures_at(state, node)
+        judged = {} if failures == state.failures else self._judged(failures)
+        self._journal.record("went_back", node=node, rejected=rejected, **judged)
+
+    def _judged(self, failures: tuple[int, ...]) -> dict[str, Any]:
+        """What all tests are where the ends of `failures` count as f."""
+        file, state = self._journal.file, self._journal.state
+        spec = FailureSpec.model_validate(state.scenario["failure"])
+        return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
 
     def _accept(self, test: Test, environment: list[str]) -> None:
         journal, state = self._journal, self._journal.state
-        spec = FailureSpec.model_validate(state.scenario["failure"])
-        failures = (*failures_of(journal.file, state, spec), failure_of(journal.file, state, test.id, spec))
         journal.record(
             "accepted_other",
             test=test.id,
             what=f"test {test.id}" if test.phase == "hand" else self._label(test),
             trial=test.trial,
             environment=self._numbers(environment),
-            **rejudged(journal.file, state, failures),
+            **self._judged((*state.failures, test.id)),
         )
 
     def _label(self, test: Test) -> str:
@@ -157,7 +195,8 @@ class Steering:
         return round.candidates[test.candidate].label if current else f"a candidate of round {test.round}"
 
     def _lacks_pinned(self, keep: frozenset[str]) -> str:
-        lacking = [name for name in self._journal.state.environment if name in self._journal.state.pinned - keep]
+        pinned = self._journal.state.pinned - keep
+        lacking = [name for name in self._journal.state.environment if name in pinned]
         return f"is without '{lacking[0]}', which is pinned: unpin it first" if lacking else ""
 
     def _candidate(self, data: dict[str, Any]) -> Candidate | None:
@@ -195,6 +234,9 @@ def _wrong(reduction: dict[str, Any]) -> str:
 
 
 STEERING: dict[str, Callable[[Steering, dict[str, Any]], str]] = {
+    "accept": Steering.accept,
+    "reject": Steering.reject,
+    "veto": Steering.veto,
     "unveto": Steering.unveto,
     "pin": Steering.pin,
     "unpin": Steering.unpin,

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from ddenv.map import arrays as np
 from ddenv.map.raster import label_cells
 
 Cell = tuple[int, int]
 # One letter for so many cells can still be read; of more, one is left in each block of (rows, columns), and one of each group
 # unless even those are too many.
 ROOM, LEAST_ROOM = 20, 4
-BLOCK = np.array([3, 8])
+BLOCK = 3, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
+from ddenv.map import arrays as np
 
 RGB = tuple[int, int, int]
 # Eight hues that stay apart for colour-blind eyes as far as eight can; parts beyond H repeat them, their letters do not.
@@ -26,7 +26,7 @@ BLACK, WHITE = 0x000000, 0xFFFFFF
 # So much brighter or darker than its ground a dot must be, of 255.
 LEAST_APART = 70
 # Blocks that fill their cells, whatever is behind them: what is put over them stands on their own colour.
-FILLED = np.array([ord(char) for char in "█▉▇"], dtype=np.uint32)
+FILLED = tuple(map(ord, "█▉▇"))
 _BRIGHT = frozenset({2, 3, 6, 7, 10, 11, 13, 14, 15})
 
 

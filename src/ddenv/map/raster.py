@@ -10,15 +10,17 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ddenv.map.footprints import Footprint
+from ddenv.map import arrays as np
 from ddenv.map.spans import Outlines, Spans, pack, rows_of
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
 
 EMPTY = -1
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
-DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
+DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
 ARROWS = "→↗↑↖←↙↓↘"
 # No closer and no farther than this, whatever is asked for, m for one pixel.
 FINEST, COARSEST = 0.002, 1e6
@@ -190,7 +192,7 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
     x, y = dots[:, 0], dots[:, 1]
     seen = (x >= 0) & (y >= 0) & (x < 2 * view.columns) & (y < 4 * view.rows)
     x, y = x[seen], y[seen]
-    np.bitwise_or.at(cells, (y // 4, x // 2), DOTS[y % 4, x % 2])
+    np.bitwise_or.at(cells, (y // 4, x // 2), np.array(DOTS, dtype=np.uint8)[y % 4, x % 2])
     return cells
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
+from ddenv.map import arrays as np
 
-from ddenv.map.footprints import Footprint
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
 
 # So much of a pixel may the middle of one be outside of an outline's edge, and still be filled.
 SLACK = 1e-9

@@ -14,8 +14,8 @@ pin           models: they stay, and are in no partition
 unpin         models
 try           models: those that are kept; a sub-environment of the user's own making is tested
 adopt         trial: one that was similar becomes the environment
-accept_other  test: its failure counts as f from now on, and where it showed becomes the environment
-undo          takes back the last reduction; the same is not made again
+accept_other  test: its failure counts as f from here on, and where it showed becomes the environment
+undo          takes back the last reduction, with what was accepted by it; the same is not made again
 go_back       node: its environment is the current one again, and the run pauses
 change        settings: some of pair, algorithm, iterations, budget, as in the scenario's section `reduction`
 stop          ends the engine; `ddenv resume` goes on from there

@@ -30,13 +30,16 @@ The kinds of events, with their data (models are numbers into the run's `element
     trial_judged         trial, verdict, tests [ids], known
     adopted              trial, environment [..], evidence_test
     accepted_other       test, what, trial or null, environment [..], outcomes {test: outcome}, distances {test: m}
-    went_back            node, rejected: the node that is undone, or null
+    went_back            node, rejected: the node that is undone, or null; outcomes and distances of tests where other failures
+                         count there
     changed              settings {...}: keys of the scenario's section `reduction`
-    command_refused      command, why
-    command_handled      command
+    command_refused      why
+    command_handled      command: no other event came of it
     finished             minimal, reason
     engine_stopped       reason
     engine_failed        reason
+
+An event that a viewer's command became also holds `command`, its number.
 """
 
 from __future__ import annotations
@@ -49,7 +52,7 @@ from ddenv.runfile import fold_guiding, fold_nodes, fold_rounds, fold_tests
 from ddenv.runfile.guiding import Node
 from ddenv.runfile.state import Point, RunState
 from ddenv.runfile.store import Event
-from ddenv.runfile.values import Changes, Data
+from ddenv.runfile.values import Changes, Data, one_of
 
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
@@ -67,12 +70,16 @@ def apply(state: RunState, event: Event) -> RunState:
         raise UserError(f"damaged run file: event {event.id} is of an unknown kind {event.kind[:40]!a}")
     try:
         changes = handler(state, event.data, event.time)
+        if (command := event.data.get("command")) is not None:
+            changes["last_command"] = max(state.last_command, int(command))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
         raise UserError(f"damaged run file: event {event.id} ({event.kind}) makes no sense here") from None
     return state.changed(revision=event.id, updated_at=event.time, **changes)
 
 
 def _created(state: RunState, data: Data, _: float) -> Changes:
+    if state.tests or len(state.nodes) > 1 or state.round is not None:
+        raise ValueError("it was made before")
     elements = tuple(str(name) for name in data["elements"])
     return {
         "scenario": dict(data["scenario"]),
@@ -113,7 +120,7 @@ def _resumed(state: RunState, _: Data, __: float) -> Changes:
 
 
 def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
-    mode = str(data["mode"])
+    mode = one_of(data["mode"], "automatic", "ask")
     if mode == state.accept_mode:
         return {}
     words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"

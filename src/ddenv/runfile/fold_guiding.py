@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ddenv.runfile.fold_nodes import arrived, decision, left_round
+from ddenv.runfile.fold_nodes import arrived, decision, failures_at, left_round, searched_anew
 from ddenv.runfile.fold_tests import with_outcomes
 from ddenv.runfile.guiding import Node, Trial
 from ddenv.runfile.state import Point, RunState
-from ddenv.runfile.values import Changes, Data, names
+from ddenv.runfile.values import Changes, Data, names, one_of
 
 # A decision names so many models, each with so many letters.
 NAMED, LONGEST = 3, 40
@@ -17,12 +17,14 @@ NAMED, LONGEST = 3, 40
 
 def pinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    return {"pinned": state.pinned.union(models), **decision(state, at, "pin", f"pinned {told(models)}")}
+    words = f"pinned {told(models)}"
+    return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
 
 
 def unpinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    return {"pinned": state.pinned.difference(models), **decision(state, at, "unpin", f"unpinned {told(models)}")}
+    words = f"unpinned {told(models)}"
+    return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
 
 
 def trial_started(state: RunState, data: Data, at: float) -> Changes:
@@ -38,8 +40,8 @@ def trial_started(state: RunState, data: Data, at: float) -> Changes:
 
 def trial_judged(state: RunState, data: Data, _: float) -> Changes:
     tests = tuple(map(int, data["tests"]))
-    trial = tried(state, data["trial"])
-    return _with_trial(state, replace(trial, verdict=str(data["verdict"]), tests=tests, known=int(data["known"])))
+    trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar")
+    return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=int(data["known"])))
 
 
 def adopted(state: RunState, data: Data, at: float) -> Changes:
@@ -53,7 +55,7 @@ def adopted(state: RunState, data: Data, at: float) -> Changes:
 
 
 def accepted_other(state: RunState, data: Data, at: float) -> Changes:
-    """Another failure counts as f from now on, and where it showed becomes the environment."""
+    """Another failure counts as f from here on, and where it showed becomes the environment."""
     test = state.tests[_index(data["test"])]
     # A trial that led there is known by its number; else it was a candidate.
     trial = None if data.get("trial") is None else tried(state, data["trial"])
@@ -63,7 +65,6 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
     return {
         "tests": judged.tests,
         "tally": judged.tally,
-        "deflake_runs": judged.deflake_runs,
         "failures": (*state.failures, test.id),
         **changes,
         **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
@@ -82,11 +83,21 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         last = nodes[_node(state, undone)]
         nodes[last.number] = replace(last, rejected=True)
         words = f"took back {last.what}: {len(node.environment)} models again"
+    # What is not there cannot stay.
+    gone = state.pinned.difference(node.environment)
+    if gone:
+        words += f"; unpinned {told([name for name in state.elements if name in gone])}"
+    # Where another failure was accepted in between, it counts there alone.
+    judged = with_outcomes(state, data) if "outcomes" in data else state
     return {
         **left_round(state),
+        "tests": judged.tests,
+        "tally": judged.tally,
+        "failures": failures_at(state, node.number),
         "nodes": tuple(nodes),
         "node": node.number,
         "environment": node.environment,
+        "pinned": state.pinned - gone,
         "evidence_test": node.evidence_test,
         "lower_bound": 0,
         "minimal": False,
@@ -100,12 +111,17 @@ def changed(state: RunState, data: Data, at: float) -> Changes:
     before = dict(state.scenario["reduction"])
     words = ", ".join(f"{key} {before.get(key, 'none')} to {value}" for key, value in settings.items())
     scenario = {**state.scenario, "reduction": before | settings}
-    return {"scenario": scenario, **decision(state, at, "change", f"changed {words}")}
+    # A search goes the same way whatever its budget is.
+    anew = {} if set(settings) == {"budget"} else searched_anew(state)
+    return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
 
 
-def leg_started(state: RunState, _: Data, __: float) -> Changes:
+def leg_started(state: RunState, data: Data, _: float) -> Changes:
     """A new search begins from the environment as it is."""
-    return left_round(state)
+    n_partitions = data["n_partitions"]
+    if type(data["round"]) is not int or not (n_partitions is None or (type(n_partitions) is int and n_partitions > 0)):
+        raise ValueError(data)
+    return searched_anew(state)
 
 
 def command_refused(state: RunState, data: Data, _: float) -> Changes:

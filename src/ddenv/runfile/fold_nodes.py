@@ -32,7 +32,8 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Chan
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
     )
     inside = set(environment) <= set(state.environment)
-    needed = min(state.lower_bound, len(environment)) if inside else 0
+    # What the other failure needs is not known yet.
+    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
     changes = {} if how == "reduced" else left_round(state)
     return changes | {
         "nodes": (*state.nodes, node),
@@ -45,11 +46,32 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Chan
     }
 
 
+def failures_at(state: RunState, number: int) -> tuple[int, ...]:
+    """The tests whose ends count as f in a node: f's own, and those of other failures that were accepted on the way there."""
+    accepted, node = [], state.nodes[number]
+    while node.parent is not None:
+        if node.how == "accepted":
+            accepted.append(node.evidence_test)
+        node = state.nodes[node.parent]
+    return (*state.failures[:1], *reversed(accepted))
+
+
 def left_round(state: RunState) -> Changes:
-    """No candidate of the round that was on is waited for any more."""
-    changes: Changes = {"confirming": False, "waiting_candidate": None}
-    if state.status == "waiting":
-        changes["status"] = "paused" if state.paused else "running"
+    """The search that was on is over, and so is its round."""
+    changes: Changes = {"confirming": False, **waits_no_more(state)}
     if state.round is not None and not state.round.done:
         changes["round"] = replace(state.round, done=True)
     return changes
+
+
+def waits_no_more(state: RunState) -> Changes:
+    """No candidate waits for accept or reject."""
+    working = "paused" if state.paused else "running"
+    return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
+
+
+def searched_anew(state: RunState) -> Changes:
+    """The search that was on is over; whether a model can be removed is open again."""
+    here = state.nodes[state.node]
+    nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
+    return {**left_round(state), "minimal": False, "nodes": nodes}

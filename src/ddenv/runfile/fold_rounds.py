@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ddenv.runfile.fold_nodes import arrived, decision
+from ddenv.runfile.fold_nodes import arrived, decision, waits_no_more
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Candidate, Point, Round, RunState, Split
-from ddenv.runfile.values import Changes, Data, names, number
+from ddenv.runfile.values import Changes, Data, names, number, one_of
 
 
 def round_started(state: RunState, data: Data, _: float) -> Changes:
@@ -16,11 +16,14 @@ def round_started(state: RunState, data: Data, _: float) -> Changes:
     partitions = tuple(names(state.elements, part) for part in data["partitions"])
     split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
     _check(split, data["candidates"])
+    if state.round is not None and int(data["round"]) <= state.round.number:
+        raise ValueError(data["round"])
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, None if distance is None else number(distance))
         for index, (kind, partition, distance) in enumerate(data["candidates"])
     )
-    return {"round": Round(int(data["round"]), int(data["n_partitions"]), split, candidates)}
+    round = Round(int(data["round"]), int(data["n_partitions"]), split, candidates)
+    return {**waits_no_more(state), "round": round}
 
 
 def _check(split: Split, candidates: list[Any]) -> None:
@@ -43,7 +46,7 @@ def _check(split: Split, candidates: list[Any]) -> None:
 def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
     candidate = replace(
         tried(state, data["candidate"]),
-        verdict=str(data["verdict"]),
+        verdict=one_of(data["verdict"], "similar", "dissimilar"),
         tests=tuple(map(int, data["tests"])),
         known=int(data["known"]),
     )
@@ -61,7 +64,8 @@ def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
 
 
 def vetoed(state: RunState, data: Data, at: float) -> Changes:
-    candidate = replace(tried(state, data["candidate"]), verdict=str(data["verdict"]))
+    verdict = one_of(data["verdict"], "vetoed", "rejected")
+    candidate = replace(tried(state, data["candidate"]), verdict=verdict)
     changes = with_candidate(state, candidate)
     if data.get("again"):
         return changes
@@ -73,7 +77,11 @@ def unvetoed(state: RunState, data: Data, at: float) -> Changes:
     words = f"took back the veto of {_told(state, candidate)}"
     if candidate.verdict == "rejected":
         words = f"took back the rejection of {_told(state, candidate)}"
-    return with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
+    changes = with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
+    # The first similar one wins: what waits behind this one has to wait for its verdict.
+    if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
+        changes |= waits_no_more(state)
+    return changes
 
 
 def waiting(state: RunState, data: Data, _: float) -> Changes:

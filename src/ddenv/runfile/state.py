@@ -175,7 +175,8 @@ class RunState:
 
     `confirming` says that the rounds are over, and that what is left is run in full because tests were cut.
     `pinned` models stay. `nodes` are the environments that the run came to, `node` is the number of the current one.
-    `trials` are the user's own selections, `decisions` all that the user decided. The ends of `failures` (tests) count as f.
+    `trials` are the user's own selections, `decisions` all that the user decided. The ends of `failures`
+    (tests) count as f in this node.
     `lower_bound`: at least so many models are needed, as far as f shows wherever all that it needs is there.
     `refusal` is the last command that the engine could not obey, with its reason.
     `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.runfile.values import moment
 
 APPLICATION_ID = 0x64644531
 # The tables are those of version 1; documents and events may hold what a reader of an earlier version does not know.
@@ -231,9 +232,9 @@ class RunFile:
     def _entries(self, table: str, after: int, most: int = -1) -> list[Event]:
         rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
         try:
-            entries = [Event(id, float(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
+            entries = [Event(id, moment(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
         except (ValueError, TypeError, RecursionError):
-            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is not JSON") from None
+            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' makes no sense") from None
         if not all(isinstance(entry.data, dict) for entry in entries):
             raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is no JSON object")
         return entries

@@ -10,6 +10,8 @@ from typing import Any
 Data = dict[str, Any]
 Changes = dict[str, Any]
 Names = tuple[str, ...]
+# In the year 5138, s.
+LATEST = 1e11
 
 
 def number(value: Any) -> float:
@@ -18,6 +20,21 @@ def number(value: Any) -> float:
     if not math.isfinite(finite):
         raise ValueError(value)
     return finite
+
+
+def moment(value: Any) -> float:
+    """A Unix time, s, that a calendar can show."""
+    time = number(value)
+    if not 0 <= time < LATEST:
+        raise ValueError(value)
+    return time
+
+
+def one_of(value: Any, *words: str) -> str:
+    """One of these words."""
+    if value not in words:
+        raise ValueError(value)
+    return value
 
 
 def vector(values: Iterable[Any], length: int) -> tuple[float, ...]:

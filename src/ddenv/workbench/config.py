@@ -70,6 +70,9 @@ def _load(path: Path) -> dict[Any, Any]:
         ) from None
     except RecursionError:
         raise UserError(f"{path}: is nested too deeply") from None
+    except ValueError as error:
+        # A date that no calendar has.
+        raise UserError(f"{path}: is no YAML: {error}; put it in quotes") from None
     if data is not None and not isinstance(data, dict):
         raise UserError(f"{path}: expected lines such as 'theme: ddenv-light'; 'ddenv config --example' prints some")
     return data or {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ddenv.runfile.failures import DEEDS, deed
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.workbench.explain_hand import arrival, by_hand, older_engine, out_of_budget, to_adopt
+from ddenv.workbench.explain_hand import arrival, by_hand, last_reduction, older_engine, out_of_budget, to_adopt
 from ddenv.workbench.listings import DDENV, Lines, Step, is_sweep, listing
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.rounds import GROUPS, beginning, follows, fruitless
@@ -110,9 +110,10 @@ def _failed(state: RunState) -> tuple[str, ...]:
 
 
 def _stopped(state: RunState) -> tuple[str, ...]:
-    why = f": {plain(state.reason).rstrip('.')}" if state.reason else ""
+    reason = plain(state.reason).rstrip(".")
+    said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
     then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
-    return (f"The engine was stopped{why}.", *then)
+    return (f"The engine was {said}.", *then)
 
 
 def _lost(state: RunState) -> tuple[str, ...]:
@@ -182,13 +183,20 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     ahead = len({test.candidate for test in snapshot.running if test.round == current.number} - {candidate.index})
     place = _place(candidate, current, options)
     if not running:
-        return "next", (f"Next is {place}.",)
+        return "next", (*last_reduction(state), _next(state, candidate, place, options))
     # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
     test = running[0]
     sentences = _first_run(place, options) if test.run == 0 else _rerun(state, candidate, test, place, options)
     if ahead:
         sentences = (*sentences, f"Idle workers run ahead: {count(ahead, 'later candidate')} at the same time.")
     return "test" if test.run == 0 else "rerun", sentences
+
+
+def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
+    if not 0 < len(candidate.tests) <= options.iterations:
+        return f"Next is {place}."
+    again = _why_again(_last(state, candidate))
+    return f"Next is re-run {len(candidate.tests)} of {options.iterations} of {place}: {again}"
 
 
 def _place(candidate: Candidate, current: Round, options: Settings) -> str:
@@ -276,8 +284,7 @@ def _finished(state: RunState) -> Happening:
     single = len(state.environment) == 1
     pinned = state.pinned.intersection(state.environment)
     if pinned:
-        proof = f"f is not seen again without any one of the others; {count(len(pinned), 'model')} pinned by you always stayed"
-        return "returned", (f"Ended: {kept} left. {proof}.", f"Kept: {_names(state)}.")
+        return "returned", (f"Ended: {kept} left. {_proof_with_pins(state, len(pinned))}", f"Kept: {_names(state)}.")
     proof = f"without {'it' if single else 'any one of them'} f is not seen again"
     sure = "; full runs confirm it" if state.confirming else ""
     return "returned", (
@@ -285,6 +292,14 @@ def _finished(state: RunState) -> Happening:
         f"Kept: {_names(state)}.",
         baseline_sentence(state, options.iterations),
     )
+
+
+def _proof_with_pins(state: RunState, pinned: int) -> str:
+    if pinned == len(state.environment):
+        what = "it is" if pinned == 1 else "all of them are"
+        return f"{what[:1].upper()}{what[1:]} pinned: whether f is seen with less was not tried. p unpins."
+    others = "the other one" if len(state.environment) - pinned == 1 else "any one of the others"
+    return f"Without {others} f is not seen again; {count(pinned, 'model')} pinned by you always stayed."
 
 
 def _reason(state: RunState, otherwise: str) -> str:

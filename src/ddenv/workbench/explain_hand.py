@@ -32,6 +32,14 @@ def by_hand(state: RunState) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def last_reduction(state: RunState) -> tuple[str, ...]:
+    """What the last test led to, while a run that pauses has made no other since: a step shows what came of it."""
+    here = state.here
+    if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
+        return ()
+    return (f"{here.what} showed f: {_sizes(state, here)}.",)
+
+
 def _can_be_adopted(state: RunState, trial: Trial) -> bool:
     return trial.verdict == "similar" and not trial.adopted and trial.node == state.node
 

@@ -42,7 +42,8 @@ def decide(state: RunState, decision: str) -> Ask:
     if state.waiting_candidate is None or state.round is None:
         raise UserError(f"nothing waits for {decision}")
     one = state.round.candidates[state.waiting_candidate]
-    return Ask(decision, {"round": state.round.number, "candidate": one.index}, f"{decision}s {one.label}")
+    said = f"{one.label} is {decision}ed"
+    return Ask(decision, {"round": state.round.number, "candidate": one.index}, said)
 
 
 def accept(state: RunState, row: Candidate | Trial | None) -> Ask:
@@ -62,7 +63,7 @@ def _adopt(state: RunState, trial: Trial) -> Ask:
     if trial.adopted and trial.models == state.environment:
         raise UserError(f"{trial.label} is the environment already")
     _check_pins(state, trial.models, trial.label)
-    said = f"adopts {trial.label}: E becomes its {count(trial.size, 'model')}"
+    said = f"{trial.label} is adopted: E becomes its {count(trial.size, 'model')}"
     return Ask("adopt", {"trial": trial.number}, said)
 
 
@@ -74,7 +75,7 @@ def _accept_other(state: RunState, row: Candidate | Trial) -> Ask:
     if not set(row.models) < set(state.environment):
         raise UserError(f"{row.label} is no part of the environment as it is now")
     _check_pins(state, row.models, row.label)
-    said = f"takes the other failure of {row.label} for as good as f"
+    said = f"the other failure of {row.label} counts as f, too"
     return Ask("accept_other", {"test": test.id}, said, other_failure(state, row, test))
 
 
@@ -120,14 +121,14 @@ def veto(state: RunState, row: Candidate | Trial | None) -> Ask:
         return Ask("unveto", where, f"{row.label} is no longer {row.verdict}: it is tried after all")
     if row.verdict:
         raise UserError(f"{row.label} is {row.verdict} already")
-    return Ask("veto", where, f"vetoes {row.label}: it is not tried; v again takes that back")
+    return Ask("veto", where, f"{row.label} is vetoed: it is not tried; v again takes that back")
 
 
 def pin(state: RunState, names: Collection[str]) -> Ask:
     """Pin models, or unpin them if all of them are pinned. Raises UserError."""
     _known(state, names)
     if all(name in state.pinned for name in names):
-        return Ask("unpin", {"models": _numbers(state, names)}, f"unpins {named(names)}")
+        return Ask("unpin", {"models": _numbers(state, names)}, f"{named(names)} {_are(names)} unpinned")
     kept = frozenset(state.environment)
     gone = next((name for name in names if name not in kept), None)
     if gone is not None:
@@ -135,10 +136,8 @@ def pin(state: RunState, names: Collection[str]) -> Ask:
             f"{shortened(gone, LONGEST)} is removed already: go back (h) to where it was there, and pin it then"
         )
     new = [name for name in names if name not in state.pinned]
-    verb = "stays" if len(new) == 1 else "stay"
-    return Ask(
-        "pin", {"models": _numbers(state, new)}, f"pins {named(new)}, which always {verb} from the next round on"
-    )
+    said = f"{named(new)} {_are(new)} pinned, and always {'stays' if len(new) == 1 else 'stay'} from the next round on"
+    return Ask("pin", {"models": _numbers(state, new)}, said)
 
 
 def try_without(state: RunState, names: Collection[str]) -> Ask:
@@ -173,7 +172,7 @@ def undo(state: RunState) -> Ask:
     if here is None or here.parent is None:
         raise UserError("there is no reduction to take back")
     before, after = len(here.environment), len(state.nodes[here.parent].environment)
-    return Ask("undo", {}, f"takes back {here.what}: {before} → {count(after, 'model')}; it is not made again")
+    return Ask("undo", {}, f"{here.what} is taken back: {before} → {count(after, 'model')}; it is not made again")
 
 
 def go_back(state: RunState, number: int) -> Ask:
@@ -185,9 +184,9 @@ def go_back(state: RunState, number: int) -> Ask:
     node = state.nodes[number]
     question = (
         f"Go on from {place(node)}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o), then space goes on. "
-        "What was found since then stays in the history, and you can come back to it."
+        "What was found since then stays in the history, and you can come back to it. No test is made twice."
     )
-    return Ask("go_back", {"node": number}, f"goes to {place(node)}, and pauses there", question)
+    return Ask("go_back", {"node": number}, f"back to {place(node)}; the run pauses there", question)
 
 
 def change(state: RunState, asked: dict[str, Any]) -> Ask:
@@ -220,6 +219,10 @@ def _check_pins(state: RunState, models: Iterable[str], label: str) -> None:
     lacking = state.pinned.intersection(state.environment).difference(models)
     if lacking:
         raise UserError(f"{label} is without {named(sorted(lacking))}, which is pinned: unpin it first (p)")
+
+
+def _are(names: Collection[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def _numbers(state: RunState, names: Iterable[str]) -> list[int]:

@@ -24,8 +24,11 @@ from ddenv.workbench.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.
 LOCK_PERIOD = 0.5
-# So many events are read at one look: keys are answered while a long run is caught up with.
-MOST_EVENTS = 1500
+# How often the poses of running tests are read: more would only be more to write to a terminal, s.
+LIVE_PERIOD = 0.25
+# So long a look may take, s, and so many events are read at a time: keys are answered while a long run is caught up with.
+PATIENCE = 0.015
+SOME_EVENTS = 50
 
 
 def now() -> float:
@@ -113,17 +116,18 @@ class Poll:
         self.file = Observed(path, strictly=watch)
         self._starting = starting
         self._snapshot: Snapshot | None = None
-        self._behind = True
+        self._behind = self._catching_up = True
         self._looked = -math.inf
         self._alive = False
+        self._posed = -math.inf
         self._evidence: tuple[int | None, array | None] = (None, None)
         self._original: tuple[int | None, array | None] = (None, None)
         self._sender: ThreadPoolExecutor | None = None
 
     @property
     def catching_up(self) -> bool:
-        """Whether there is more to read than the last look did."""
-        return self._behind
+        """Whether there are more events than the last look read."""
+        return self._catching_up
 
     def close(self) -> None:
         """What was sent is still written."""
@@ -184,13 +188,14 @@ class Poll:
         state, error, more = self._fold(last.state if last else RunState())
         spent = self._spent(state, engine)
         try:
-            live = self._live(state) if engine == "alive" else ()
+            live, due = self._poses(state) if engine == "alive" else ((), True)
             snapshot = Snapshot(state, live, engine, self._motion(state), spent, error, self._first_motion(state))
         except Busy:
             raise
         except UserError as trouble:
-            snapshot = Snapshot(state, (), engine, None, spent, error or str(trouble))
-        self._behind = more
+            snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
+        self._behind = more or not due
+        self._catching_up = more
         return snapshot
 
     def _left(self, why: str) -> Snapshot:
@@ -200,16 +205,21 @@ class Poll:
 
     def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
         """The state after the new events, up to the first one that makes no sense, and whether there are more of them."""
+        begun, more = time.monotonic(), True
         try:
-            events = self.file.events(state.revision, MOST_EVENTS)
-            for event in events:
-                before, state = state, apply(state, event)
-                self._told(event.kind, before, state)
+            while more:
+                events = self.file.events(state.revision, SOME_EVENTS)
+                for event in events:
+                    before, state = state, apply(state, event)
+                    self._told(event.kind, before, state)
+                more = len(events) == SOME_EVENTS
+                if time.monotonic() - begun > PATIENCE:
+                    break
         except Busy:
             raise
         except UserError as error:
             return state, str(error), False
-        return state, "", len(events) == MOST_EVENTS
+        return state, "", more
 
     def _engine(self) -> str:
         moment = time.monotonic()
@@ -221,6 +231,15 @@ class Poll:
         if self._alive:
             return "alive"
         return "starting" if self._starting() else "absent"
+
+    def _poses(self, state: RunState) -> tuple[tuple[Live, ...], bool]:
+        """Where the robots are, and whether that was read just now."""
+        moment = time.monotonic()
+        if self._snapshot is not None and moment - self._posed < LIVE_PERIOD:
+            running = {test.id for test in state.running_tests}
+            return tuple(row for row in self._snapshot.live if row.test in running), False
+        self._posed = moment
+        return self._live(state), True
 
     def _live(self, state: RunState) -> tuple[Live, ...]:
         """Only what makes sense: a row names a running test and has a whole, finite pose."""

@@ -11,12 +11,14 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
-from ddenv.workbench.observed import Observed
+from ddenv.workbench.observed import Busy, Observed
 from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import STATUS
 
 # So many are listed on the setup screen.
 SHOWN = 40
+# What SQLite says of a file that another program keeps for itself.
+LOCKED = "database is locked"
 # So many events are read at a time, so that no thread has the machine for itself.
 BATCH = 500
 # What lies beside a run file, and goes when it does.
@@ -101,7 +103,10 @@ class RunsFolder:
     def _look(self, path: Path, stamp: tuple[int, ...], until: float) -> Recent:
         read = self._read.get(path)
         if (read is None or read.stamp != stamp) and time.monotonic() < until:
-            read = self._read[path] = _read(path, stamp, read.state if read else None)
+            last, read = read, _read(path, stamp, read.state if read else None)
+            if read.stamp != stamp and last is not None:
+                read = last
+            self._read[path] = read
         if read is None:
             return Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3])
         recent = read.recent
@@ -152,23 +157,22 @@ def _stamp(path: Path) -> tuple[int, ...]:
 
 
 def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
-    size = stamp[1] + stamp[3]
     try:
         file = Observed(path)
     except UserError as error:
-        return _Read(stamp, Recent(path, stamp[0] / 1e9, size, trouble=str(error)))
+        return _unread(path, stamp, error)
     try:
         first = file.events(0, 1)
         state = _caught_up(file, state or RunState())
     except UserError as error:
-        return _Read(stamp, Recent(path, stamp[0] / 1e9, size, trouble=str(error)))
+        return _unread(path, stamp, error)
     finally:
         file.close()
     options = settings(state)
     recent = Recent(
         path,
         state.updated_at or stamp[0] / 1e9,
-        size,
+        stamp[1] + stamp[3],
         state.status,
         options.name,
         options.algorithm,
@@ -182,6 +186,12 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
         state.reason,
     )
     return _Read(stamp, recent, None if state.ended else state)
+
+
+def _unread(path: Path, stamp: tuple[int, ...], error: UserError) -> _Read:
+    """A run that cannot be read. What another program keeps locked is read again at the next look."""
+    locked = isinstance(error, Busy) or LOCKED in str(error)
+    return _Read(() if locked else stamp, Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3], trouble=str(error)))
 
 
 def _caught_up(file: Observed, state: RunState) -> RunState:

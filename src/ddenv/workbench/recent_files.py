@@ -23,7 +23,7 @@ def recent_file() -> Path:
 
 def recent_files() -> list[Path]:
     """The files that still are there; none where the list is missing or damaged."""
-    return [path for path in _listed() if _is_file(path)]
+    return [path for path in _listed() if is_file(path)]
 
 
 def remember(path: Path) -> None:
@@ -50,7 +50,8 @@ def _listed() -> list[Path]:
     return [Path(name) for name in names if isinstance(name, str) and name][:KEPT]
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is such a file, and it can be looked at."""
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -16,9 +16,13 @@ SUFFIXES = (".yaml", ".yml")
 def scenario_path(text: str) -> Path:
     """The file that a user names, with .yaml where he left it out. Raises UserError for what cannot be one."""
     text = text.strip()
-    if not text or text.endswith("/") or "\0" in text:
+    if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
-    path = Path(text).expanduser()
+    path = Path(text)
+    try:
+        path = path.expanduser()
+    except RuntimeError:
+        raise UserError(f"{path}: there is no such user here") from None
     path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
     try:
         if path.is_dir():

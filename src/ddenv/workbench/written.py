@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
+from typing import NamedTuple
 
 from rich.cells import cell_len
+from rich.color import ColorSystem
 from rich.console import Console, RenderableType
-from rich.segment import Segment
 from rich.style import Style
 from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
 from textual.strip import Strip
@@ -17,11 +18,33 @@ from textual.strip import Strip
 GAP = 4
 # What is remembered of styles.
 MOST_STYLES = 4096
-# Takes the place of text while it is found out what stands around it.
-TEXT = "\0"
+SYSTEMS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "windows": ColorSystem.WINDOWS}
+RESET = "\x1b[0m"
+CLOSED = "\x1b]8;;\x1b\\"
+# Attributes that a blank does not show.
+UNSEEN = ("", "1", "2", "1;2")
 
-# What is written before and after text of a style.
-Pen = tuple[str, str]
+
+class Pen(NamedTuple):
+    """The codes of a style: of attributes and of the colours of text and ground, and a link. "*" is any colour of text."""
+
+    attributes: str = ""
+    fore: str = "39"
+    back: str = "49"
+    link: str = ""
+
+    @property
+    def of_blanks(self) -> Pen:
+        """What is seen of it where there is no text."""
+        return Pen("", "*", self.back) if self.attributes in UNSEEN and not self.link else self
+
+    @property
+    def hides_text(self) -> bool:
+        """Whether text looks like its ground."""
+        return self.fore == self.back.replace("48;", "38;", 1) and not self.attributes and not self.link
+
+
+PLAIN = Pen()
 
 
 @dataclass(slots=True)
@@ -43,6 +66,7 @@ class Written:
     def __init__(self) -> None:
         self._rows: dict[int, _Row] = {}
         self._pens: dict[Style | None, Pen] = {}
+        self._pen = PLAIN
 
     def forget(self) -> None:
         """Something else was written, or the terminal was resized."""
@@ -59,7 +83,8 @@ class Written:
     def sequence(self, update: ChopsUpdate | LayoutUpdate, console: Console) -> str:
         """What to write, and all of it is taken as written."""
         strips = _of_layout(update) if isinstance(update, LayoutUpdate) else _of_chops(update)
-        return "".join(part for x, y, strip in strips for part in self._changes(x, y, strip, console))
+        parts = [part for x, y, strip in strips for part in self._changes(x, y, strip, console)]
+        return "".join([*parts, self._turn(PLAIN)])
 
     def _changes(self, x: int, y: int, strip: Strip, console: Console) -> Iterator[str]:
         chars, pens, simple = self._cells(strip, console)
@@ -70,25 +95,41 @@ class Written:
         if old_chars == chars and old_pens == pens:
             return
         row.chars[x:end], row.pens[x:end] = chars, pens
-        if not simple or "" in old_chars:
-            # Terminals do not agree on what is wide: the whole piece is written, from its first cell on.
-            yield _move(x, y)
-            yield strip.render(console)
-            return
-        for first, last in _differing(old_chars, chars, old_pens, pens):
+        # Terminals do not agree on what is wide: such a piece is written as a whole, from its first cell on.
+        known = simple and "" not in old_chars
+        for first, last in _differing(old_chars, chars, old_pens, pens) if known else [(0, len(chars))]:
             yield _move(x + first, y)
             cells = zip(chars[first:last], pens[first:last], strict=True)
-            for (before, after), some in groupby(cells, key=lambda cell: cell[1]):
-                yield f"{before}{''.join(char for char, _ in some)}{after}"
+            for pen, some in groupby(cells, key=lambda cell: cell[1]):
+                yield self._turn(pen)
+                yield "".join(char for char, _ in some)
 
-    def _cells(self, strip: Strip, console: Console) -> tuple[list[str], list[Pen | None], bool]:
+    def _turn(self, pen: Pen) -> str:
+        """From the pen in use to this one."""
+        now, self._pen = self._pen, pen
+        if pen == now:
+            return ""
+        if pen == PLAIN:
+            return (CLOSED if now.link else "") + RESET
+        if pen.fore == "*":
+            self._pen = pen = Pen(pen.attributes, now.fore, pen.back, pen.link)
+        codes = [pen.fore] if pen.fore != now.fore else []
+        codes += [pen.back] if pen.back != now.back else []
+        if pen.attributes != now.attributes:
+            codes = ["0", *filter(None, [pen.attributes]), pen.fore, pen.back]
+        link = f"\x1b]8;;{pen.link}\x1b\\" if pen.link != now.link else ""
+        return link + (f"\x1b[{';'.join(codes)}m" if codes else "")
+
+    def _cells(self, strip: Strip, console: Console) -> tuple[list[str], list[Pen], bool]:
         """Characters and pens by cell, and whether each character takes just one."""
         chars: list[str] = []
-        pens: list[Pen | None] = []
+        pens: list[Pen] = []
         simple = True
         for segment in strip:
             text, width = segment.text, segment.cell_length
-            pen = self._pen(segment.style, console)
+            pen = self._pen_of(segment.style, console)
+            if pen.hides_text or not text.strip(" "):
+                text, pen = " " * width, pen.of_blanks
             if text.isascii() or (width == len(text) and all(cell_len(char) == 1 for char in set(text))):
                 chars += text
             else:
@@ -98,13 +139,12 @@ class Written:
             pens += [pen] * width
         return chars, pens, simple
 
-    def _pen(self, style: Style | None, console: Console) -> Pen:
+    def _pen_of(self, style: Style | None, console: Console) -> Pen:
         pen = self._pens.get(style)
         if pen is None:
             if len(self._pens) >= MOST_STYLES:
                 self._pens.clear()
-            before, _, after = Strip([Segment(TEXT, style)]).render(console).partition(TEXT)
-            pen = self._pens[style] = before, after
+            pen = self._pens[style] = _pen(style, SYSTEMS.get(console.color_system, ColorSystem.TRUECOLOR))
         return pen
 
 
@@ -114,6 +154,19 @@ class _Fewer(CompositorUpdate):
 
     def render_segments(self, console: Console) -> str:
         return self._written.sequence(self._update, console)
+
+
+def _pen(style: Style | None, system: ColorSystem) -> Pen:
+    if style is None:
+        return PLAIN
+    fore, back = style.color, style.bgcolor
+    attributes = style.without_color.update_link(None).render(" ")
+    return Pen(
+        attributes.removeprefix("\x1b[").partition("m")[0].strip(),
+        ";".join(fore.downgrade(system).get_ansi_codes()) if fore else PLAIN.fore,
+        ";".join(back.downgrade(system).get_ansi_codes(foreground=False)) if back else PLAIN.back,
+        style.link or "",
+    )
 
 
 def _of_layout(update: LayoutUpdate) -> Iterator[tuple[int, int, Strip]]:
@@ -134,7 +187,7 @@ def _of_chops(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
 
 
 def _differing(
-    old_chars: list[str], chars: list[str], old_pens: list[Pen | None], pens: list[Pen | None]
+    old_chars: list[str], chars: list[str], old_pens: list[Pen | None], pens: list[Pen]
 ) -> list[tuple[int, int]]:
     """From where to where cells differ."""
     found: list[tuple[int, int]] = []
@@ -142,7 +195,8 @@ def _differing(
     for place, (old_char, char, old_pen, pen) in enumerate(cells):
         if old_char == char and old_pen == pen:
             continue
-        if found and place - found[-1][1] <= GAP:
+        end = found[-1][1] if found else -GAP
+        if place - end < GAP and pens[end:place] == [pens[end - 1]] * (place - end):
             found[-1] = found[-1][0], place + 1
         else:
             found.append((place, place + 1))

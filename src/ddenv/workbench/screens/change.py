@@ -109,6 +109,8 @@ class Change(ModalScreen[dict[str, Any] | None]):
             asked = self.asked()
         except UserError as error:
             self.query_one("#wrong", Static).update(Text(str(error)))
+            # The message begins with the field that is wrong.
+            self.query_one(f"#{str(error).partition(':')[0]}", Input).focus()
             return
         self.dismiss(asked)
 

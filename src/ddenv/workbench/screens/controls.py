@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,10 @@ from ddenv.workbench.attach import attach_name
 from ddenv.workbench.guiding import GOES_ON, Ask
 from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine
+from ddenv.workbench.wording import duration, plain
+
+# An engine answers within a moment; after so long it hangs, or its machine does, s.
+PATIENCE = 5
 
 
 class Controls(Screen[None]):
@@ -24,6 +29,7 @@ class Controls(Screen[None]):
     watch: bool
     # What was asked for last: the command's id, 0 while it is being sent, and its words.
     asked = (0, "")
+    _asked_at = 0.0
     sending = 0
 
     def __init__(self) -> None:
@@ -38,14 +44,17 @@ class Controls(Screen[None]):
         id, words = self.asked
         if self.sending:
             return words
-        return words if self.snapshot.state.last_command < id and self.snapshot.engine == "alive" else ""
+        if self.snapshot.state.last_command >= id or self.snapshot.engine != "alive":
+            return ""
+        late = int(time.monotonic() - self._asked_at)
+        return words if late < PATIENCE else f"{words}: no answer for {duration(late)}"
 
     def refuse(self, why: str) -> None:
         """Says why a key does nothing."""
-        self.notify(why, severity="warning", timeout=4, markup=False)
+        self.notify(plain(why), severity="warning", timeout=4, markup=False)
 
     def say(self, what: str) -> None:
-        self.notify(what, timeout=4, markup=False)
+        self.notify(plain(what), timeout=4, markup=False)
 
     def show_status(self) -> None:
         """Shows at once what was asked for."""
@@ -69,7 +78,7 @@ class Controls(Screen[None]):
         """Asks the engine for something, without waiting for the file; `then` comes once it is written."""
         words = words or kind.replace("_", " ")
         self.sending += 1
-        self.asked = (0, words)
+        self.asked, self._asked_at = (0, words), time.monotonic()
         self.show_status()
 
         def sent(id: int, error: str) -> None:
@@ -79,7 +88,7 @@ class Controls(Screen[None]):
             else:
                 self._mine[id] = words
                 self.asked = (id, words)
-                if kind in GOES_ON:
+                if self._goes_on(kind):
                     self._due = id
                     self.go_on()
                 if then is not None:
@@ -107,10 +116,14 @@ class Controls(Screen[None]):
 
     def _send_asked(self, asked: Ask) -> None:
         """Where no engine works it is written down for the next one, which is started if the run goes on from there."""
-        starts = self.snapshot.engine == "absent" and asked.kind in GOES_ON
+        starts = self.snapshot.engine == "absent" and self._goes_on(asked.kind)
         later = "" if self.snapshot.engine != "absent" else "; kept until an engine works, space starts one"
         self.say(f"{asked.said}; an engine is started for it" if starts else f"{asked.said}{later}")
         self.send(asked.kind, **asked.data)
+
+    def _goes_on(self, kind: str) -> bool:
+        """Whether the run goes on for that where no engine works: an ended search begins anew with other pins, too."""
+        return kind in GOES_ON or (kind in ("pin", "unpin") and self.snapshot.status == "finished")
 
     def go_on(self) -> None:
         """Starts an engine for what was asked for where none works, or where the last one ended without having read it."""
@@ -134,7 +147,7 @@ class Controls(Screen[None]):
         if self.snapshot.engine == "alive":
             return True
         if self.snapshot.status == "finished":
-            self.refuse("the run is finished; u, h, c, w and o go on from there")
+            self.refuse("the run is finished; u, h, c, p, w and o go on from there")
         elif self.snapshot.status == "starting":
             self.refuse("the engine is still starting")
         else:
@@ -170,7 +183,7 @@ class Controls(Screen[None]):
         elif self.snapshot.engine == "starting":
             self.refuse("the engine is starting already")
         elif state.status == "finished":
-            self.refuse("the run is finished; u, h, c, w and o go on from there")
+            self.refuse("the run is finished; u, h, c, p, w and o go on from there")
         elif state.budget is not None and state.tests_done >= state.budget:
             self.refuse(f"the budget of {state.budget} tests is used up; c gives more")
         else:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import getpass
 import socket
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
 
 from rich.style import Style
 from rich.table import Table
-from rich.text import Text
+from rich.text import Text, TextType
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -19,7 +20,9 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Button, DirectoryTree, Input, Static
 
+from ddenv.errors import shortened
 from ddenv.workbench.processes import Scene
+from ddenv.workbench.recent_files import is_file
 from ddenv.workbench.shortcuts import Group, groups
 from ddenv.workbench.wording import plain
 
@@ -208,6 +211,9 @@ class WorldTree(DirectoryTree):
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
         return [path for path in paths if not path.name.startswith(".") and (_is_folder(path) or _fits(path))]
 
+    def process_label(self, label: TextType) -> Text:
+        return Text(plain(label))
+
 
 def _is_folder(path: Path) -> bool:
     try:
@@ -244,11 +250,15 @@ class OpenFile(ModalScreen[Path | None]):
 
     @on(Input.Submitted)
     def _typed(self, event: Input.Submitted) -> None:
-        self._take(Path(event.value.strip()).expanduser())
+        path = Path(event.value.strip())
+        with suppress(RuntimeError):
+            # Nobody knows every user's home; then the path as it is does not exist.
+            path = path.expanduser()
+        self._take(path)
 
     def _take(self, path: Path) -> None:
         wrong = self._check(path)
-        self.query_one("#wrong", Static).update(Text(wrong))
+        self.query_one("#wrong", Static).update(Text(shortened(plain(wrong))))
         if not wrong:
             self.dismiss(path)
 
@@ -262,6 +272,6 @@ def complain_about(path: Path) -> str:
         return "give the path of a file"
     if _is_folder(path):
         return f"{path}: is a folder; expected a file"
-    if not path.is_file():
+    if not is_file(path):
         return f"{path}: no such file"
     return "" if _fits(path) else f"{path.name}: expected a name that ends in {', '.join(SUFFIXES)}"

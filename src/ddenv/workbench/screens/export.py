@@ -199,7 +199,8 @@ class ExportScreen(ModalScreen[None]):
 
 def suggested(run: Path) -> tuple[str, str, str]:
     """Names for world, scenario and report of a run."""
-    return f"{run.stem}.minimal.sdf", f"{run.stem}.minimal.yaml", f"{run.stem}.html"
+    stem = "".join(char if char.isprintable() else "-" for char in run.stem)
+    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html"
 
 
 def _home(path: Path) -> Path:
@@ -230,7 +231,14 @@ def what_is_left(run: Path) -> str:
     left = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
     if state.baseline is None:
         return f"{left}: no failure is known yet, so this is the whole world."
-    return f"{left}, and no single one can be removed." if state.minimal else f"{left} so far: not minimal yet."
+    if not state.minimal:
+        return f"{left} so far: not minimal yet."
+    pinned = len(state.pinned.intersection(state.environment))
+    if not pinned:
+        return f"{left}, and no single one can be removed."
+    if pinned == len(state.environment):
+        return f"{left}, all pinned: whether they are needed was not tried."
+    return f"{left}; {pinned} pinned, and none of the others can be removed."
 
 
 def files_of(wanted: Wanted) -> Iterator[Path]:

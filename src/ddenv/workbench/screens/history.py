@@ -113,8 +113,11 @@ class History(Screen[int | None]):
         lines = self.query_one(Lines)
         made_of = decisions, lines.scrollable_content_region.width
         if made_of != self._decided and made_of[1] > 0:
+            at_end = lines.scroll_offset.y >= lines.max_scroll_y or not self._decided[1]
             self._decided = made_of
             lines.show([line for each in decisions for line in decision_lines(each, made_of[1])])
+            if at_end:
+                lines.call_after_refresh(lines.scroll_end, animate=False)
 
     def _fill(self, cursor: int) -> None:
         table = self.query_one(Tree)

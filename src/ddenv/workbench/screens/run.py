@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
 from pathlib import Path
 from typing import ClassVar
 
 from textual import on, work
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
+from textual.reactive import Reactive
+from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
@@ -16,6 +20,7 @@ from ddenv.workbench.place import place_of_run
 from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine, Scene
 from ddenv.workbench.screens.leaving import Leaving
+from ddenv.workbench.screens.run_footer import footer_words
 from ddenv.workbench.screens.run_keys import FIRST, KEYS, LOOKING, SHOWN
 from ddenv.workbench.widgets import models
 from ddenv.workbench.widgets.candidates import Candidates
@@ -32,6 +37,10 @@ from ddenv.workbench.wording import plain, shorten
 
 # How often the run file is read, s.
 PERIOD = 0.1
+# While a long run is caught up with, the next look comes after so long, and so often one of them is shown, s.
+AT_ONCE, CATCHING_UP = 0.002, 0.5
+# So long it takes until all that has the focus, or had it, asked to be drawn, s.
+TOGETHER = 0.004
 SMALLEST = (64, 18)
 # Where map, table and chart stand side by side, and where models and decisions do too.
 WIDE, HUGE = 110, 170
@@ -44,6 +53,8 @@ class RunScreen(Leaving):
     HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (SMALLEST[0], "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]
     VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (SMALLEST[1], "-low"), (23, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = KEYS
+    # What the focus changes is drawn again by the widgets themselves: the whole screen need not be.
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
     def __init__(self, run: Path, engine: Engine | None = None, watch: bool = False) -> None:
         """`engine` is the one that was just started on this run. With `watch` nothing is ever sent.
@@ -59,6 +70,9 @@ class RunScreen(Leaving):
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, told=self.log_lines.add)
         self._pane = PANES[0][0]
         self._modelled: tuple = ()
+        self._titled: tuple = ()
+        self._stale, self._coming = False, False
+        self._shown = time.monotonic()
 
     def compose(self) -> ComposeResult:
         yield Header(id="header")
@@ -96,7 +110,8 @@ class RunScreen(Leaving):
         self.query_one(Candidates).focus()
         self._look()
         self.set_interval(PERIOD, self._look)
-        self._read_world()
+        # What it needs takes long to load: the first paint comes before.
+        self.call_after_refresh(self._read_world)
 
     def on_unmount(self) -> None:
         self.scene.stop()
@@ -124,20 +139,45 @@ class RunScreen(Leaving):
             self.query_one(WorldMap).set_place(place, notice)
             self._show_models()
 
+    def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
+        self.run_worker(self._draw_together(), group="focus")
+        super().set_focus(widget, scroll_visible, from_app_focus)
+
+    async def _draw_together(self) -> None:
+        """What is in the panels would be drawn a frame before their borders: the focus moves in one."""
+        with self.app.batch_update():
+            await asyncio.sleep(TOGETHER)
+        self.check_idle()
+
     # From the run file to the screen.
 
     def _look(self) -> None:
         before, caught_up = self.snapshot, not self.poll.catching_up
         snapshot = self.poll.look()
         if snapshot is not None:
-            self.snapshot = snapshot
+            self.snapshot, self._stale = snapshot, True
             if snapshot.engine == "alive":
                 self.engine.seen_at_work()
-            self._show(snapshot)
             self.told_refusal(before)
-            self.go_on()
             if caught_up:
                 self.tell_trials(before)
+        if self.poll.catching_up and not self._coming:
+            # Soon, but after the keys that were pressed meanwhile.
+            self._coming = True
+            self.set_timer(AT_ONCE, self._look_on)
+        if not self.poll.catching_up or time.monotonic() - self._shown >= CATCHING_UP:
+            self._show_look()
+
+    def _look_on(self) -> None:
+        self._coming = False
+        self._look()
+
+    def _show_look(self) -> None:
+        """Shows the last look; of those that only catch up, not each one is."""
+        if self._stale:
+            self._stale, self._shown = False, time.monotonic()
+            self._show(self.snapshot)
+            self.go_on()
         self.query_one(Happening).show(self.snapshot, "" if self.snapshot.engine == "alive" else self.engine.trouble)
         self.show_status()
 
@@ -153,8 +193,15 @@ class RunScreen(Leaving):
             self.query_one("#log", Lines).show(self.log_lines.entries)
         if self.query_one("#decisions", Lines).items != state.decisions:
             self.query_one("#decisions", Lines).show(state.decisions)
-        self.query_one(KeyFooter).say("run.pause", _pause_words(snapshot))
+        self._tell_keys()
         self.app.title = f"ddenv {shorten(plain(state.scenario.get('name', '')), 60)}"
+
+    def _tell_keys(self) -> None:
+        if self.watch:
+            return
+        table, footer = self.query_one(Candidates), self.query_one(KeyFooter)
+        for id, words in footer_words(self.snapshot, table.under_cursor, table.following).items():
+            footer.say(id, words)
 
     def show_status(self) -> None:
         self.query_one(Status).show(self.snapshot, self.scene.url if self.scene.on else "", self.waiting_for())
@@ -185,20 +232,17 @@ class RunScreen(Leaving):
         state = self.snapshot.state
         panel = self.query_one("#round")
         if state.confirming and not state.ended:
-            panel.border_title = "Full runs of what is left"
-            panel.border_subtitle = f"{sum(test.is_finished for test in state.confirm_tests)} made"
-            return
-        panel.border_title = _round_words(state)
-        judged = (
-            ""
-            if state.round is None
-            else f"{sum(bool(c.verdict) for c in state.round.candidates)} of {len(state.round.candidates)} judged"
-        )
-        panel.border_subtitle = judged
+            title = "Full runs of what is left", f"{sum(test.is_finished for test in state.confirm_tests)} made"
+        else:
+            title = _round_words(state), _judged_words(state)
+        # Even the same words would have the panel drawn again, with all that is in it.
+        if title != self._titled:
+            self._titled = panel.border_title, panel.border_subtitle = title
 
     @on(Candidates.Chosen)
     def _row_chosen(self) -> None:
         self._show_map()
+        self._tell_keys()
 
     @on(WorldMap.SelectionChanged)
     def _selected(self) -> None:
@@ -251,13 +295,13 @@ def _round_words(state: RunState) -> str:
     return f"Round {state.round.number}{', over' if state.round.done and not state.ended else ''}"
 
 
-def _pause_words(snapshot: Snapshot) -> str:
-    """What space does now."""
-    if snapshot.status == "finished":
+def _judged_words(state: RunState) -> str:
+    if state.round is None:
         return ""
-    if snapshot.engine == "absent":
-        return "start"
-    return "resume" if snapshot.state.paused else "pause"
+    candidates = state.round.candidates
+    vetoed = sum(each.verdict == "vetoed" for each in candidates)
+    judged = sum(bool(each.verdict) for each in candidates) - vetoed
+    return f"{judged} of {len(candidates)} judged{f', {vetoed} vetoed' if vetoed else ''}"
 
 
 def _panel(id: str, title: str) -> Vertical:

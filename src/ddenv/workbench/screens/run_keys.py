@@ -56,7 +56,13 @@ KEYS = [
     Binding(
         "c", "change", "settings", id="run.change", tooltip="change pair, algorithm, iterations or budget from here on"
     ),
-    Binding("E", "export", "export", id="run.export", tooltip="export: the world that is left, the report, the tables"),
+    Binding(
+        "E",
+        "export",
+        "export",
+        id="run.export",
+        tooltip="export: the world that is left, a scenario that runs it, the report",
+    ),
     Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
     Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks what becomes of the engine"),
     _hidden("S", "step('round')", "round", "run.round", "run to the end of the round, then pause"),
@@ -80,23 +86,30 @@ KEYS = [
     _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
     _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
 ]
-# In the order of the screen, and in the order in which they are given room.
-SHOWN = tuple(binding.id for binding in KEYS if binding.show)
+# In the order of the screen, and in the order in which they are given room: on wide screens there is some for more.
+MORE = ("run.find", "run.layers", "run.copy", "run.scene", "run.runs")
+SHOWN = tuple(
+    id
+    for binding in KEYS
+    if binding.show
+    for id in ((*MORE, binding.id) if binding.id == "run.help" else (binding.id,))
+)
 FIRST = (
     "run.help",
     "run.quit",
     "run.pause",
     "run.accept",
+    "run.reject",
+    "run.step",
     "run.veto",
     "run.pin",
     "run.without",
     "run.undo",
-    "run.step",
-    "run.reject",
     "run.history",
     "run.export",
     "run.change",
     "run.only",
+    *MORE,
 )
 # What is left in the footer for who only looks.
 LOOKING = ("run.history", "run.export", "run.find", "run.copy", "run.layers", "run.help", "run.quit")

@@ -162,7 +162,7 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             self._complain("its engine is at work: open the run and stop it first")
         else:
-            words = f"Delete {plain(run.path.stem)} for good?\n\n{run.words}; its log goes, too."
+            words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log goes, too."
             self.app.push_screen(Question(words, final=True), lambda yes: self._delete(run.path) if yes else None)
 
     @work(thread=True, group="delete")
@@ -205,3 +205,11 @@ class RunsScreen(Screen[None]):
         self.remove_class("-filtering")
         self.query_one("#filter", Input).value = ""
         self.query_one(RunTable).focus()
+
+
+def _about(run: Recent) -> str:
+    """How a run stands, in a line."""
+    if not run.total:
+        return f"{run.state_words}."
+    left = f"{len(run.kept)} of {count(run.total, 'model')} left"
+    return f"{run.state_words}: {left} after {count(run.tests, 'test')}."

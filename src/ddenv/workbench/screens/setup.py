@@ -178,7 +178,7 @@ class SetupScreen(Starting):
 
     def _choose(self, path: Path) -> None:
         self._keep_places = self.chosen is not None and self.chosen.scenario is None
-        self.chosen, self.past = None, Past()
+        self.chosen, self.past, self._awaited = None, Past(), True
         self.pick("")
         self.form.tell("")
         self.tell_outcome()
@@ -217,7 +217,9 @@ class SetupScreen(Starting):
     def _preview(self, chosen: Chosen | None, place: Place, name: str, wrong: str) -> None:
         if not self.is_attached:
             return
-        self.chosen = chosen
+        self.chosen, self._awaited = chosen, False
+        # What was asked for too early is not wrong any more.
+        self.form.tell("")
         self.query_one(WorldMap).set_place(place, wrong)
         if chosen is None:
             return

@@ -21,6 +21,7 @@ from ddenv.workbench.recent_files import remember
 from ddenv.workbench.screens.picking import Picking
 from ddenv.workbench.screens.save import SaveScenario
 from ddenv.workbench.widgets.options import OptionsForm
+from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -44,6 +45,8 @@ class Starting(Picking):
 
     past = Past()
     _busy = False
+    # Whether what was chosen is still being read; so is the first file when the screen opens.
+    _awaited = True
     _saved: tuple[Path, Scenario] | None = None
     _reading: Mapping[str, Any] = {}
 
@@ -82,6 +85,8 @@ class Starting(Picking):
     def _scenario(self) -> Scenario:
         """The scenario that the form describes. Raises UserError."""
         if self.chosen is None:
+            if self._awaited:
+                raise UserError("the world is still being read: try again in a moment")
             raise UserError("choose a scenario or a world that can be read first")
         pair, algorithm = self.form.method
         return form.asked_of(self.chosen.settings, self.form.texts, pair, algorithm)
@@ -190,7 +195,7 @@ class Starting(Picking):
     def _written(self, path: Path | None) -> None:
         if path is None:
             return
-        self.notify(f"wrote {path}", timeout=5, markup=False)
+        self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
         self._load_saved(path)
 
     @work(thread=True, group="recent", exclusive=True)

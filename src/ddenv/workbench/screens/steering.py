@@ -104,7 +104,7 @@ class Steering(Controls):
     # The way back, and other settings.
 
     def action_undo(self) -> None:
-        if self.waiting_for() == "undo":
+        if self.waiting_for().startswith("undo"):
             self.refuse("the last undo is still on its way")
         else:
             self.ask(lambda: guiding.undo(self.snapshot.state))
@@ -150,6 +150,8 @@ class Steering(Controls):
 
 def _judged(trial: Trial, watch: bool) -> str:
     if trial.verdict == "similar":
-        return f"{trial.label} shows f with {count(trial.size, 'model')}" + ("" if watch else ": a adopts it")
+        return f"{trial.label} shows f with {count(trial.size, 'model')}" + (
+            "" if watch else ": a on its row adopts it"
+        )
     known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
     return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from ddenv.map.footprints import Footprint
 from ddenv.map.names import shortened
 from ddenv.runfile.state import RunState, partition_letter
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
 
 LEGEND = (
     ("S", "start"),

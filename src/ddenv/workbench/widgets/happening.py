@@ -6,7 +6,6 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.workbench.explain import Explanation, explain
-from ddenv.workbench.listings import Lines
 from ddenv.workbench.poll import Snapshot
 
 
@@ -18,6 +17,7 @@ class Happening(Widget):
         self._explanation = Explanation(None, ())
         self._snapshot: Snapshot | None = None
         self.trouble = ""
+        self._first = 0
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
@@ -33,7 +33,9 @@ class Happening(Widget):
         width, height = self.size
         words = self._sentences()
         taken = len(words.wrap(self.app.console, max(1, width)))
-        text = _window(self._explanation, width, height - taken, self.app.theme_variables["primary"])
+        room = height - taken
+        self._first = _scrolled(self._explanation, room, self._first)
+        text = _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
         return text.append_text(words)
 
     def _sentences(self) -> Text:
@@ -43,17 +45,32 @@ class Happening(Widget):
         return Text("\n").join(sentences)
 
 
-def _window(explanation: Explanation, width: int, room: int, color: str) -> Text:
-    """Up to `room` lines of the algorithm with the current one marked; at least that one, and a blank line below if it fits."""
+def _shown(explanation: Explanation, room: int) -> int:
+    """How many lines of the algorithm there is room for: at least one, and a blank line below if it fits."""
+    return max(1, min(room - 1, len(explanation.lines)))
+
+
+def _index(explanation: Explanation) -> int:
+    """The current line's place among the lines."""
+    return next((place for place, (number, _) in enumerate(explanation.lines) if number == explanation.line), 0)
+
+
+def _scrolled(explanation: Explanation, room: int, first: int) -> int:
+    """The first line to show: the one of before, as long as the current line and its neighbours are in sight with it."""
+    shown, index = _shown(explanation, room), _index(explanation)
+    beside = min(1, (shown - 1) // 2)
+    first = min(max(first, index + beside + 1 - shown), index - beside)
+    return max(0, min(first, len(explanation.lines) - shown))
+
+
+def _window(explanation: Explanation, width: int, room: int, first: int, color: str) -> Text:
+    """Lines of the algorithm with the current one marked."""
     text = Text()
-    lines: Lines = explanation.lines
     if explanation.line is None:
         return text
-    index = next((place for place, (number, _) in enumerate(lines) if number == explanation.line), 0)
-    shown = max(1, min(room - 1, len(lines)))
-    first = max(0, min(index - shown // 2, len(lines) - shown))
+    index, shown = _index(explanation), _shown(explanation, room)
     for place in range(first, first + shown):
-        number, code = lines[place]
+        number, code = explanation.lines[place]
         current = place == index
         row = Text(f"{'▶' if current else ' '}{number:>2} {code}", f"bold {color}" if current else "dim", no_wrap=True)
         row.truncate(width, overflow="ellipsis")

@@ -44,12 +44,16 @@ class Lines(ScrollView, can_focus=True):
         """Other items."""
         at_end = self.scroll_offset.y >= self.max_scroll_y
         self._items = items
+        if not self.size.width:
+            # Out of sight: the screen need not be laid out anew for each line.
+            return
         self.virtual_size = Size(0, len(items))
         if self._tail and at_end and self.is_attached:
             self.scroll_end(animate=False, immediate=True)
         self.refresh()
 
     def on_resize(self) -> None:
+        self.virtual_size = Size(0, len(self._items))
         if self._tail:
             self.scroll_end(animate=False)
 

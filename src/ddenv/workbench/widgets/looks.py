@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ddenv.map.footprints import Footprint
+from ddenv.map import arrays as np
 from ddenv.map.letters import Signs
 from ddenv.map.paint import RGB, Canvas
 from ddenv.map.raster import EMPTY
@@ -29,6 +28,9 @@ from ddenv.workbench.widgets.palette import (
     Tone,
     mixed,
 )
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
 
 GONE = ord("·")
 # A model so many times larger than the median is a floor that others stand on.

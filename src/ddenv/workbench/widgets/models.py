@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from ddenv.map.footprints import Footprint
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState, partition_letter
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
 
 # Columns behind the name: part, distance, first sensed.
 REST = 3 + 9 + 9

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
+from ddenv.map import arrays as np
 from ddenv.map.letters import Cell
 from ddenv.map.paint import Canvas, readable
 from ddenv.map.raster import View, arrow, braille, heading

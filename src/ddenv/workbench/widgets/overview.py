@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.segment import Segment
 from rich.text import Text
 from textual.geometry import Region
 from textual.strip import Strip
 
-from ddenv.map.footprints import Footprint
+from ddenv.map import arrays as np
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, fit
 from ddenv.map.spans import Outlines, pack
@@ -30,12 +29,12 @@ from ddenv.workbench.widgets.strips import strip
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
     from ddenv.runfile.guiding import Trial
 
 LAYERS = ("partitions", "removed", "pinned", "sensed", "path", "original", "failure")
 # Dots of the original path, and of the gaps in it.
 DASH = 5
-NOWHERE = np.zeros((0, 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +61,12 @@ class Overview(Panning):
         self.notice = "reading the world ..."
         self.shown_layers = frozenset(LAYERS) - {"sensed"}
         self.selection: frozenset[str] = frozenset()
-        self._outlines: Outlines = pack(())
+        self._outlines: Outlines | None = None
         self._palette: Palette | None = None
         self._seen: Seen | None = None
         self._picture: Picture | None = None
         self._canvas: Canvas | None = None
+        self._strips: dict[int, Strip] = {}
         self._paths: dict[str, tuple[array | None, np.ndarray]] = {}
         self._trails: dict[int, list[Point]] = {}
         # Each with what it was made from.
@@ -121,6 +121,11 @@ class Overview(Panning):
 
     # Which part of the world.
 
+    def refit(self) -> None:
+        # Until there is a world there is nothing to look at, and what draws it need not be loaded.
+        if not self.notice or self.place.prints:
+            super().refit()
+
     def fitting(self, columns: int, rows: int) -> View:
         path = self._path("evidence", self.snapshot.evidence)
         points = path[np.isfinite(path).all(axis=1)].tolist()
@@ -130,7 +135,7 @@ class Overview(Panning):
     def _path(self, name: str, rows: array | None) -> np.ndarray:
         """Flat rows of a motion as (N, 2) m: the same array as long as they are the same."""
         if name not in self._paths or self._paths[name][0] is not rows:
-            values = NOWHERE if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
+            values = np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
             self._paths[name] = (rows, values)
         return self._paths[name][1]
 
@@ -154,14 +159,20 @@ class Overview(Panning):
     def notify_style_update(self) -> None:
         """Another theme: every colour is mixed with its background."""
         super().notify_style_update()
-        self._palette, self._canvas = None, None
-        self.draw()
+        palette = self._mixed() if self.is_attached else None
+        # Each move of the focus comes here, too, and changes no colour.
+        if palette != self._palette:
+            self._palette, self._canvas = palette, None
+            self.draw()
+
+    def _mixed(self) -> Palette:
+        return palette_of(self.app, self.background_colors[1], self.colors[3])
 
     def draw(self) -> None:
         """Draws a new frame, and has only the lines refreshed that changed."""
         if self._view is None or not self.is_attached:
             return
-        palette = self._palette = self._palette or palette_of(self.app, self.background_colors[1], self.colors[3])
+        palette = self._palette = self._palette or self._mixed()
         drawn = self._still(self._view, palette)
         canvas, trails = drawn.canvas.copy(), self._trails if "path" in self.shown_layers else {}
         robots(canvas, self._view, drawn.written, self.snapshot, trails, palette)
@@ -169,6 +180,8 @@ class Overview(Panning):
             crosshair(canvas, self.cursor, drawn.written, palette)
         changed = canvas.changed_rows(self._canvas)
         self._canvas = canvas
+        for row in changed:
+            self._strips.pop(row, None)
         if changed:
             self.refresh(*(Region(0, row, self.size.width, 1) for row in changed))
 
@@ -234,7 +247,9 @@ class Overview(Panning):
             return self._tell(y)
         if self._canvas is None or y >= self._canvas.chars.shape[0]:
             return Strip.blank(self.size.width, self.rich_style)
-        return strip(self._canvas, y)
+        if y not in self._strips:
+            self._strips[y] = strip(self._canvas, y)
+        return self._strips[y]
 
     def _tell(self, y: int) -> Strip:
         lines = Text(plain(self.notice), justify="center").wrap(self.app.console, max(1, self.size.width))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from ddenv.map import arrays as np
 from ddenv.map.letters import Cell, place_signs
 from ddenv.map.paint import Canvas, readable
 from ddenv.map.raster import View, braille, owners, spans

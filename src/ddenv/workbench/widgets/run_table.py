@@ -44,7 +44,11 @@ def moment(time: float) -> str:
     """A Unix time, s: the clock if it was today, else the date."""
     if not time:
         return ""
-    then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
+    try:
+        then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
+    except (ValueError, OverflowError, OSError):
+        # A file system knows years that no calendar does.
+        return "?"
     return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rich.style import Style
@@ -21,6 +23,8 @@ from ddenv.workbench.settings import settings
 from ddenv.workbench.widgets.inks import ink
 from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
+# How often it is told what is left, s.
+LEFT_PERIOD = 2.0
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is said in fewer words, or not at all, until the rest has room: from the least important on.
 SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
@@ -79,6 +83,9 @@ class Status(Widget):
         self._besides = ("", "")
         self._tests: PersistentTuple[Test] = PersistentTuple()
         self._cut = 0
+        self._left: Remaining | None = None
+        self._left_of: tuple = ()
+        self._left_at = -math.inf
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
@@ -87,10 +94,19 @@ class Status(Widget):
         tests = snapshot.state.tests
         self._cut = cut_tests(tests, self._tests, self._cut)
         self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
-        now = facts(snapshot, scene, asked, self._cut)
+        now = facts(snapshot, scene, asked, self._cut, self._remaining)
         if now != self._facts:
             self._facts = now
             self.refresh()
+
+    def _remaining(self, snapshot: Snapshot) -> Remaining | None:
+        """What is left takes its time to find: within a round it is told anew now and then, not after each test."""
+        state, moment = snapshot.state, time.monotonic()
+        number = None if state.round is None else state.round.number
+        of = (snapshot.status, state.paused, state.waiting_candidate, state.budget, state.node, number)
+        if of != self._left_of or moment - self._left_at >= LEFT_PERIOD:
+            self._left, self._left_of, self._left_at = remaining(snapshot), of, moment
+        return self._left
 
     def render(self) -> Text:
         text = Text(" ", no_wrap=True, overflow="ellipsis")
@@ -140,7 +156,13 @@ def branch_of(state: RunState) -> int | None:
     return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
 
 
-def facts(snapshot: Snapshot, scene: str = "", asked: str = "", cut: int = 0) -> tuple[Fact, ...]:
+def facts(
+    snapshot: Snapshot,
+    scene: str = "",
+    asked: str = "",
+    cut: int = 0,
+    left: Callable[[Snapshot], Remaining | None] = remaining,
+) -> tuple[Fact, ...]:
     """What there is to say, in the order of the screen."""
     state = snapshot.state
     status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
@@ -156,7 +178,7 @@ def facts(snapshot: Snapshot, scene: str = "", asked: str = "", cut: int = 0) ->
         Fact("tests", tests_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(remaining(snapshot))),
+        Fact("left", left_said(left(snapshot))),
         Fact("mode", (mode, "")),
         Fact("engine", engine_said(snapshot)),
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),

@@ -1,0 +1,53 @@
+"""Writes the tables of keys in docs/workbench.md again, from what the screens themselves know.
+
+python docs/workbench_keys.py
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ddenv.workbench.keys import Action, actions, shown_key
+
+PAGE = Path(__file__).resolve().with_name("workbench.md")
+# A table is between these; the sections are the first parts of the actions' names.
+TABLE = re.compile(r"(<!-- keys: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def main() -> None:
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def filled(page: str) -> str:
+    """The page with the tables as they have to be."""
+    return TABLE.sub(lambda found: f"{found[1]}{table(found[2].split())}{found[3]}", page)
+
+
+def sections(page: str) -> list[str]:
+    """The sections that the page has tables for."""
+    return [section for found in TABLE.finditer(page) for section in found[2].split()]
+
+
+def table(sections: list[str]) -> str:
+    """The lines of a table, each with its end."""
+    rows = [row(action) for section in sections for action in actions().values() if _section(action.id) == section]
+    return "\n".join(["| key | | name |", "|---|---|---|", *rows, ""])
+
+
+def row(action: Action) -> str:
+    keys = " ".join(f"`{_typed(key)}`" for key in action.keys)
+    return f"| {keys} | {action.words} | `{action.id}` |"
+
+
+def _typed(key: str) -> str:
+    """A capital letter is typed as one."""
+    return key if len(key) == 1 else shown_key(key)
+
+
+def _section(id: str) -> str:
+    return id.partition(".")[0]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,373 @@
+"""Makes the pictures of the workbench again, docs/screens/NAME.svg: a run of the ditch, guided by hand, with Drake.
+
+    python docs/workbench_pictures.py
+
+All are made in one go. Nothing in them tells of the machine: folders, user and host have other names here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from unittest.mock import patch
+
+from textual.pilot import Pilot
+
+from ddenv.launch.programs import start_engine
+from ddenv.launch.runs import create_run
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import RunFile
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.config import Config
+from ddenv.workbench.guiding import nearest_other
+from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.widgets.map import WorldMap
+from ddenv.world.bundled import SDF
+from ddenv.world.load import find_scenario, load_scenario
+
+SCREENS = Path(__file__).resolve().parent / "screens"
+MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
+# How long anything may take, s; when a robot is far enough on its way to be looked at, simulated s.
+PATIENCE, UNDER_WAY = 120.0, 14.0
+HOME = Path(tempfile.gettempdir()) / "you"
+FLOOR = ("asphalt_near", "asphalt_far")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """`screen` is the class of what is seen; `words` say it to who does not see it."""
+
+    screen: str
+    words: str
+
+
+PICTURES = {
+    "setup": Picture("SetupScreen", "The setup screen: what to choose from, the world, the settings"),
+    "setup-small": Picture("SetupScreen", "The setup screen at 80x24: its settings"),
+    "setup-start": Picture("SetupScreen", "Picking the robot's start on the map of a world"),
+    "open": Picture("OpenFile", "Opening a file"),
+    "save": Picture("SaveScenario", "Saving the settings as a scenario"),
+    "baseline": Picture("RunScreen", "The baseline: the whole world is run ten times"),
+    "run": Picture("RunScreen", "The run screen in the middle of a round"),
+    "run-large": Picture("RunScreen", "The run screen at 200x60"),
+    "run-map": Picture("RunScreen", "The run screen at 80x24: the map"),
+    "run-table": Picture("RunScreen", "The run screen at 80x24: the table"),
+    "run-light": Picture("RunScreen", "The run screen in the light theme"),
+    "run-ansi": Picture("RunScreen", "The run screen in sixteen colours"),
+    "waiting": Picture("RunScreen", "A reduction waits to be accepted"),
+    "watch": Picture("RunScreen", "Watching a run"),
+    "log": Picture("RunScreen", "The log"),
+    "trial": Picture("RunScreen", "A selection by hand shows f, and waits to be adopted"),
+    "finished": Picture("RunScreen", "The end of a run"),
+    "tiny": Picture("RunScreen", "A terminal that is too small"),
+    "help": Picture("Help", "The keys"),
+    "palette": Picture("CommandPalette", "The list of commands"),
+    "method": Picture("Method", "How a run is reduced"),
+    "layers": Picture("Layers", "What the map shows"),
+    "copy": Picture("Copy", "What can be copied"),
+    "scene": Picture("SceneDialog", "Where the 3-D scene is"),
+    "quit": Picture("Quit", "What becomes of the engine"),
+    "choose": Picture("ChooseModels", "Choosing models by their names"),
+    "other": Picture("Question", "Taking another failure for as good as f"),
+    "change": Picture("Change", "Changing the settings on the way"),
+    "history": Picture("History", "The history, with a branch"),
+    "compare": Picture("Compare", "Two environments side by side"),
+    "export": Picture("ExportScreen", "Writing what is left"),
+    "runs": Picture("RunsScreen", "The list of runs"),
+}
+
+
+def main() -> None:
+    if HOME.exists():
+        sys.exit(f"{HOME} is in the way: remove it first")
+    shutil.rmtree(SCREENS, ignore_errors=True)
+    SCREENS.mkdir()
+    (HOME / "runs").mkdir(parents=True)
+    (HOME / "worlds").mkdir()
+    shutil.copy(SDF / "worlds/friction.sdf", HOME / "worlds/depot.sdf")
+    os.chdir(HOME / "worlds")
+    os.environ.update(HOME=str(HOME), DDENV_HOME=str(HOME), LOGNAME="you", TZ="UTC")
+    for name in ("NO_COLOR", "DDENV_CONFIG"):
+        os.environ.pop(name, None)
+    time.tzset()
+    try:
+        with patch("socket.gethostname", lambda: "robot"), patch("os.cpu_count", lambda: 2):
+            asyncio.run(make_all())
+    finally:
+        for run in (HOME / "runs").glob("*.ddenv"):
+            stop(run)
+        shutil.rmtree(HOME)
+    missing = PICTURES.keys() - {path.stem for path in SCREENS.iterdir()}
+    if missing:
+        sys.exit(f"not made: {', '.join(sorted(missing))}")
+
+
+async def make_all() -> None:
+    run = new_run("ditch")
+    start_engine(run, 1, accept_mode="ask")
+    async with opened(run) as pilot:
+        await begin(pilot, run)
+        await guide(pilot)
+        await export(pilot, run)
+        await branch(pilot)
+    await list_runs()
+    await set_up()
+
+
+# The run of the ditch.
+
+
+async def begin(pilot: Pilot, run: Path) -> None:
+    """From the baseline to the middle of a round."""
+    await until(pilot, lambda: is_under_way(pilot, tests=4))
+    await take(pilot, "baseline")
+    await until(pilot, lambda: state(pilot).status == "waiting")
+    await take(pilot, "waiting")
+    await take_dialogs(pilot)
+    async with opened(run, TINY) as other:
+        await take(other, "tiny")
+    await press(pilot, "a")
+    await take_live(pilot, "run", pilot)
+    for name, size, theme in (("run-large", LARGE, ""), ("run-light", MIDDLE, "ddenv-light")):
+        async with opened(run, size, theme) as other:
+            await take_live(other, name, pilot)
+    async with opened(run, MIDDLE, "ansi-dark") as other:
+        await take_live(other, "run-ansi", pilot)
+    async with opened(run, SMALL) as other:
+        await press(other, "1")
+        await take_live(other, "run-map", pilot)
+        await press(other, "2")
+        await take_live(other, "run-table", pilot)
+    async with opened(run, MIDDLE, watch=True) as other:
+        await take_live(other, "watch", pilot)
+
+
+async def take_dialogs(pilot: Pilot) -> None:
+    """What can be opened above a run at any time."""
+    for name, key in (("help", "question_mark"), ("method", "e"), ("layers", "l"), ("copy", "y"), ("quit", "q")):
+        await press(pilot, key)
+        await take(pilot, name)
+        await press(pilot, "escape")
+    await press(pilot, "ctrl+p", *"undo")
+    await take(pilot, "palette")
+    await press(pilot, "escape")
+    await press(pilot, "m")
+    await until(pilot, lambda: bool(run_screen(pilot).scene.url))
+    await take(pilot, "scene")
+    await press(pilot, "x")
+
+
+async def guide(pilot: Pilot) -> None:
+    """Another failure is looked at, a platform is pinned, and the platforms are tried alone: they are enough."""
+    while not (rows := others(state(pilot))):
+        await accept_if_waiting(pilot)
+        await pilot.pause(0.05)
+    await press(pilot, "space")
+    await until(pilot, lambda: state(pilot).paused)
+    await press(pilot, "2", "home", *["down"] * rows[0], "a")
+    await take(pilot, "other")
+    await press(pilot, "n", "p", *"near", "tab", "enter")
+    await until(pilot, lambda: bool(state(pilot).pinned))
+    await press(pilot, "o", *"asphalt", "tab", "down", "tab")
+    await take(pilot, "choose")
+    await press(pilot, "enter")
+    await until(pilot, lambda: bool(state(pilot).trials) and bool(state(pilot).trials[0].verdict))
+    await press(pilot, "home")
+    await take(pilot, "trial")
+    await press(pilot, "a")
+    await until(pilot, lambda: state(pilot).here.how == "adopted")
+    await press(pilot, "space")
+    await until(pilot, lambda: state(pilot).status == "finished")
+    await take(pilot, "finished")
+
+
+async def export(pilot: Pilot, run: Path) -> None:
+    await press(pilot, "L")
+    await take(pilot, "log")
+    await press(pilot, "2", "E", "ctrl+s")
+    await until(pilot, lambda: (HOME / "worlds" / f"{run.stem}.html").exists())
+    await take(pilot, "export")
+    await press(pilot, "escape")
+
+
+async def branch(pilot: Pilot) -> None:
+    """Back to the first reduction, on in another way, and both ends side by side."""
+    await press(pilot, "h", *["up"] * 9, "down", "enter", "y")
+    await until(pilot, lambda: state(pilot).node == 1 and state(pilot).paused)
+    await press(pilot, "c")
+    await take(pilot, "change")
+    pilot.app.screen.query_one("#partitioning").value = "timeseg"
+    await press(pilot, "ctrl+s")
+    await until(pilot, lambda: state(pilot).scenario["reduction"]["pair"].startswith("timeseg"))
+    nodes = len(state(pilot).nodes)
+    await press(pilot, "space")
+    while len(state(pilot).nodes) < nodes + 3:
+        await accept_if_waiting(pilot)
+        await pilot.pause(0.05)
+    await press(pilot, "space")
+    await until(pilot, lambda: state(pilot).paused)
+    await press(pilot, "u")
+    await until(pilot, lambda: state(pilot).nodes[-1].rejected)
+    await press(pilot, "h")
+    await take(pilot, "history")
+    await press(pilot, "m", "up", "up", "c")
+    await take(pilot, "compare")
+    await press(pilot, "escape", "escape")
+
+
+# Before a run, and beside it.
+
+
+async def list_runs() -> None:
+    """One run of which the engine is gone, and one at work."""
+    lost = new_run("friction")
+    engine = start_engine(lost, 1)
+    await asyncio.to_thread(wait_for_tests, lost, 12)
+    os.killpg(engine.pid, signal.SIGKILL)
+    engine.wait()
+    works = new_run("rubble")
+    start_engine(works, 1)
+    await asyncio.to_thread(wait_for_tests, works, 1)
+    async with opened(None) as pilot:
+        await press(pilot, "R")
+        await pilot.pause(1.5)
+        await take(pilot, "runs")
+    await asyncio.to_thread(stop, works)
+
+
+async def set_up() -> None:
+    async with opened(None) as pilot:
+        await pilot.pause(1.0)
+        await take(pilot, "setup")
+        await press(pilot, "f7")
+        await take(pilot, "save")
+        await press(pilot, "escape", "ctrl+o")
+        await take(pilot, "open")
+        await press(pilot, *"depot.sdf", "enter")
+        await pilot.pause(1.0)
+        await press(pilot, "f3", *["left"] * 15)
+        await take(pilot, "setup-start")
+    async with opened(None, SMALL) as pilot:
+        await pilot.pause(1.0)
+        await press(pilot, "f4")
+        await take(pilot, "setup-small")
+
+
+# What all of them need.
+
+
+@asynccontextmanager
+async def opened(
+    run: Path | None, size: tuple[int, int] = MIDDLE, theme: str = "", *, watch: bool = False
+) -> AsyncIterator[Pilot]:
+    app = Workbench(run, watch=watch, config=Config(theme=theme))
+    async with app.run_test(size=size, notifications=True) as pilot:
+        await until(pilot, lambda: not pilot.app.screen.query_one(WorldMap).notice)
+        yield pilot
+
+
+async def press(pilot: Pilot, *keys: str) -> None:
+    await pilot.press(*keys)
+    await pilot.pause(0.2)
+
+
+async def until(pilot: Pilot, is_so: Callable[[], bool]) -> None:
+    """Raises TimeoutError."""
+    deadline = time.monotonic() + PATIENCE
+    while not is_so():
+        if time.monotonic() > deadline:
+            raise TimeoutError
+        await pilot.pause(0.02)
+    pilot.app.clear_notifications()
+    await pilot.pause(0.2)
+
+
+async def take(pilot: Pilot, name: str, *, at_once: bool = False) -> None:
+    # Words that fade after a while would hide what is below them.
+    pilot.app.clear_notifications()
+    await pilot.pause(0.0 if at_once else 0.6)
+    shown = type(pilot.app.screen).__name__
+    if shown != PICTURES[name].screen:
+        raise RuntimeError(f"{name}: {shown} is shown in place of {PICTURES[name].screen}")
+    (SCREENS / f"{name}.svg").write_text(pilot.app.export_screenshot(simplify=True), encoding="utf-8")
+    print(f"wrote {name}", file=sys.stderr)
+
+
+async def take_live(pilot: Pilot, name: str, guiding: Pilot) -> None:
+    """While a robot moves, also after the picture was drawn; `guiding` accepts what waits meanwhile."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        await accept_if_waiting(guiding)
+        await pilot.pause(0.02)
+        if is_under_way(pilot):
+            await take(pilot, name, at_once=True)
+            if is_under_way(pilot):
+                return
+    raise TimeoutError(name)
+
+
+async def accept_if_waiting(pilot: Pilot) -> None:
+    if state(pilot).status == "waiting":
+        await press(pilot, "a")
+
+
+def is_under_way(pilot: Pilot, tests: int = 0) -> bool:
+    snapshot = run_screen(pilot).snapshot
+    judged = snapshot.state.round is None or any(one.verdict for one in snapshot.state.round.candidates)
+    return judged and snapshot.state.tests_done >= tests and any(row.time > UNDER_WAY for row in snapshot.live)
+
+
+def others(now: RunState) -> list[int]:
+    """The rows of candidates that are dissimilar, and showed another failure."""
+    if now.round is None or now.round.done or now.status == "waiting":
+        return []
+    judged = (one for one in now.round.candidates if one.verdict == "dissimilar")
+    return [one.index for one in judged if nearest_other(now, one) is not None]
+
+
+def run_screen(pilot: Pilot) -> RunScreen:
+    return next(screen for screen in pilot.app.screen_stack if isinstance(screen, RunScreen))
+
+
+def state(pilot: Pilot) -> RunState:
+    return run_screen(pilot).snapshot.state
+
+
+def new_run(scenario: str) -> Path:
+    run = HOME / "runs" / f"{scenario}-1.ddenv"
+    create_run(load_scenario(find_scenario(scenario)), run)
+    return run
+
+
+def wait_for_tests(run: Path, tests: int) -> None:
+    while True:
+        with RunFile(run) as file:
+            if fold(file.events()).tests_done >= tests:
+                return
+        time.sleep(0.2)
+
+
+def stop(run: Path) -> None:
+    """Ends the engine of a run, if one works."""
+    if not engine_is_alive(run):
+        return
+    with RunFile(run) as file:
+        file.send("stop")
+    deadline = time.monotonic() + PATIENCE
+    while engine_is_alive(run) and time.monotonic() < deadline:
+        time.sleep(0.1)
+
+
+if __name__ == "__main__":
+    main()

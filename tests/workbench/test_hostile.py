@@ -1,0 +1,335 @@
+"""Names, files and hands that mean no good: whatever they are, the screen stands, and the terminal is not steered."""
+
+import copy
+import html
+import random
+import sqlite3
+import sys
+import unicodedata
+from pathlib import Path
+from types import SimpleNamespace
+
+import fake_run
+import pytest
+from attached import Attached, starts
+from rich.cells import cell_len
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import Event, RunFile
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.config import read_config
+from ddenv.workbench.estimate import remaining
+from ddenv.workbench.explain import explain
+from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.recent import RunsFolder
+from ddenv.workbench.save_scenario import scenario_path
+from ddenv.workbench.screens.dialogs import WorldTree, complain_about
+from ddenv.workbench.screens.export import suggested
+from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.terminal import check_terminal
+from ddenv.workbench.widgets.rows import listed
+from ddenv.workbench.widgets.run_table import moment
+
+NAMES = [
+    "[bold]loud[/bold]",
+    "[@click=app.quit]go[/]",
+    "over\u202eride\u2066d",
+    "escape\u009b31m",
+    "字" * 40,
+    "👩‍👩‍👧 family",
+    "e\u0301\u0302" * 20,
+    "n" * 300,
+    "Crate",
+    "crate",
+    "שלום",
+    "two\u2028lines\u200b",
+]
+STEERING = {"Cc", "Cf", "Cs", "Zl", "Zp"}
+NONSENSE = [
+    None,
+    True,
+    0,
+    -1,
+    2,
+    7,
+    10**30,
+    1.5,
+    float("nan"),
+    float("inf"),
+    "",
+    "similar",
+    "ask",
+    [],
+    [1],
+    [[1]],
+    {},
+    {"a": 1},
+]
+SCENES = (fake_run.mid_round, fake_run.waiting, fake_run.guided, fake_run.confirming, fake_run.finished)
+
+
+def steering(app):
+    """The lines of the screen that would steer a terminal, or are not as wide as it."""
+    lines = ["".join(segment.text for segment in strip) for strip in app.screen._compositor.render_strips()]
+    return [
+        line
+        for line in lines
+        if cell_len(line) != app.size.width or any(unicodedata.category(char) in STEERING for char in line)
+    ]
+
+
+@pytest.mark.parametrize("size", [(120, 36), (80, 24)])
+async def test_no_name_steers_the_terminal(runs, size):
+    data = fake_run.scenario(name="evil \x1b]0;title\x07 [bold]\u202e")
+    data["description"] = "\x1b[31m\u202e\n[red]"
+    run = fake_run.FakeRun(
+        runs / "ev[il]\u202e-1.ddenv", data, fake_run.world_text([html.escape(name) for name in NAMES])
+    )
+    fake_run.guided(run)
+    run.hold()
+    async with Attached(run, size) as session:
+        session.screen._mine = {1: "veto"}
+        run.write("command_refused", command=1, why="no \x1b]0;title\x07\u202e")
+        await session.look()
+        assert "not done" in session.said()
+        for key in ("2", "4", "5", "h", "slash", "E", "R", "y", "question_mark"):
+            await session.press(key)
+            await session.pilot.pause(0.02)
+            assert steering(session.app) == []
+            while not isinstance(session.app.screen, RunScreen):
+                session.app.pop_screen()
+                await session.pilot.pause()
+        assert not any(unicodedata.category(char) in STEERING for char in session.app.title)
+    run.close()
+
+
+def test_files_are_named_without_what_steers(tmp_path):
+    assert suggested(tmp_path / "ev\u202eil.ddenv")[0] == "ev-il.minimal.sdf"
+    assert WorldTree.process_label(None, "a\x1b]0;x\x07\u202e.sdf").plain == "a�]0;x��.sdf"
+
+
+def leaves(value, path=()):
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from leaves(inner, (*path, key))
+
+
+def put(value, path, other):
+    if not path:
+        return other
+    value = copy.copy(value)
+    value[path[0]] = put(value[path[0]], path[1:], other)
+    return value
+
+
+def damaged(events, others, chance):
+    """The events with one or a few of them lost, doubled, out of order, or with nonsense in them."""
+    events = list(events)
+    for _ in range(chance.choice((1, 1, 2, 4))):
+        place = chance.randrange(len(events))
+        way = chance.randrange(5)
+        if way == 0 and len(events) > 1:
+            del events[place]
+        elif way == 1:
+            events.insert(place, chance.choice(others))
+        elif way == 2:
+            events.insert(chance.randrange(len(events)), events[place])
+        else:
+            kind, data = events[place]
+            path = chance.choice(list(leaves(data)))
+            events[place] = kind, put(data, path, copy.deepcopy(chance.choice(NONSENSE))) if path else data
+    return events
+
+
+@pytest.fixture
+def streams(runs):
+    """The events of some runs, as (kind, data)."""
+    found = []
+    for number, scene in enumerate(SCENES):
+        run = scene(fake_run.FakeRun(runs / f"scene-{number}.ddenv"))
+        found.append([(event.kind, event.data) for event in run.file.events()])
+        run.close()
+    return found
+
+
+def test_damaged_events_are_told_or_make_a_state_that_can_be_shown(streams):
+    chance = random.Random(6)
+    others = [event for stream in streams for event in stream]
+    told = 0
+    for _ in range(800):
+        state = RunState()
+        for number, (kind, data) in enumerate(damaged(chance.choice(streams), others, chance), 1):
+            try:
+                state = apply(state, Event(number, 1e9 + number, kind, data))
+            except UserError:
+                told += 1
+                break
+        for engine in ("alive", "absent"):
+            snapshot = Snapshot(state, (), engine)
+            explain(snapshot), remaining(snapshot), listed(snapshot), snapshot.focus
+        assert state.here is None or state.here.environment is not None
+    assert 200 < told < 800
+
+
+def test_a_run_is_made_once_and_rounds_go_on(run):
+    fake_run.waiting(run)
+    run.start_round(2)
+    state = RunState()
+    for event in run.file.events():
+        state = apply(state, event)
+    assert state.waiting_candidate is None
+    made = {"scenario": run.data, "elements": ["other"]}
+    again = {"round": 2, "n_partitions": 2, "environment": [0, 1], "partitions": [[0], [1]], "candidates": []}
+    for kind, data in (("created", made), ("round_started", again), ("accept_mode", {"mode": "\x1b"})):
+        with pytest.raises(UserError, match="makes no sense"):
+            apply(state, Event(99, 0.0, kind, data))
+
+
+@pytest.mark.parametrize("time", ["9e999", "-5", "1e15"])
+def test_times_that_no_calendar_has_are_damage(run, time):
+    run.created().close()
+    with sqlite3.connect(run.path) as database:
+        database.execute(f"UPDATE event SET time = {time} WHERE id = 2")
+    with RunFile(run.path) as file, pytest.raises(UserError, match="makes no sense"):
+        file.events()
+    assert RunsFolder(run.path.parent).look()[0].trouble
+    assert moment(1e15) == "?"
+
+
+def test_a_locked_run_is_read_again(run):
+    fake_run.finished(run).close()
+    folder = RunsFolder(run.path.parent)
+    other = sqlite3.connect(run.path, isolation_level=None)
+    other.execute("PRAGMA locking_mode = EXCLUSIVE")
+    other.execute("PRAGMA journal_mode = DELETE")
+    other.execute("BEGIN EXCLUSIVE")
+    before = folder.look()[0]
+    other.execute("ROLLBACK")
+    other.close()
+    assert before.trouble == "" or "lock" in before.trouble
+    assert folder.look()[0].status == "finished"
+
+
+KEYS = [
+    *(
+        "up",
+        "down",
+        "left",
+        "right",
+        "enter",
+        "space",
+        "tab",
+        "shift+tab",
+        "escape",
+        "home",
+        "end",
+        "pageup",
+        "pagedown",
+    ),
+    *(
+        "backspace",
+        "plus",
+        "minus",
+        "slash",
+        "shift+up",
+        "question_mark",
+        "left_square_bracket",
+        "right_square_bracket",
+    ),
+    *("f1", "ctrl+p", *"abcefghijklnopstuvwxyzACEGLNS0123456"),
+]
+SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
+
+
+@pytest.mark.parametrize("watch", [True, False], ids=["watch", "guide"])
+async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
+    started = starts(monkeypatch)
+    monkeypatch.setattr("ddenv.workbench.processes.Scene.start", lambda self: None)
+    fake_run.guided(run)
+    run.hold()
+    chance = random.Random(20 + watch)
+    async with Attached(run, watch=watch) as session:
+        app, pilot = session.app, session.pilot
+        for step in range(45):
+            if step % 15 == 14:
+                await pilot.resize_terminal(*chance.choice(SIZES))
+            if step % 10 == 9:
+                width, height = app.size
+                await pilot.click(offset=(chance.randrange(width), chance.randrange(height)))
+            if step % 12 == 11:
+                run.write(chance.choice(["paused", "resumed"]))
+            await pilot.press(chance.choice(KEYS))
+            assert app.is_running
+        await pilot.resize_terminal(120, 36)
+        await pilot.press(*["escape"] * 8)
+        assert isinstance(app.screen, RunScreen)
+        assert started == []
+        assert not watch or session.commands() == []
+
+
+async def test_an_engine_that_hangs_is_told(run, monkeypatch):
+    fake_run.mid_round(run)
+    run.hold()
+    async with Attached(run) as session:
+        await session.press("space")
+        assert "no answer" not in session.screen.waiting_for()
+        monkeypatch.setattr("ddenv.workbench.screens.controls.PATIENCE", 0)
+        assert session.screen.waiting_for().startswith("pause: no answer for")
+
+
+@pytest.mark.parametrize("text", ["~nobody-of-this-name/x", "x" * 5000, "a\0b", "\ud800"])
+def test_paths_that_cannot_be(text, tmp_path):
+    assert "no such file" in complain_about(Path(text))
+    with pytest.raises(UserError):
+        scenario_path(f"{text}/x")
+
+
+@pytest.mark.parametrize("text", [".", "..", "~nobody-of-this-name", " "])
+def test_names_that_no_scenario_can_have(text):
+    with pytest.raises(UserError):
+        scenario_path(text)
+
+
+async def test_a_path_that_cannot_be_is_told_in_the_dialog(scenarios):
+    app = Workbench()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("ctrl+o")
+        for text in ("~nobody-of-this-name/x.sdf", "x" * 5000):
+            app.screen.query_one("Input").value = text
+            await pilot.press("enter")
+            assert "no such file" in str(app.screen.query_one("#wrong").render())
+
+
+def test_a_date_that_no_calendar_has_is_no_setting(tmp_path, monkeypatch):
+    path = tmp_path / "config.yaml"
+    path.write_text("theme: 2024-13-45")
+    monkeypatch.setenv("DDENV_CONFIG", str(path))
+    with pytest.raises(UserError, match="quotes"):
+        read_config()
+
+
+@pytest.mark.parametrize(
+    ("terminal", "encoding", "told"),
+    [
+        ("xterm", "utf-8", ""),
+        ("dumb", "utf-8", "TERM=dumb"),
+        ("xterm", "iso8859-1", "LANG"),
+        ("", "", "needs a terminal"),
+    ],
+)
+def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encoding, told):
+    stream = SimpleNamespace(isatty=lambda: bool(encoding), encoding=encoding)
+    monkeypatch.setattr(sys, "__stdin__", stream)
+    monkeypatch.setattr(sys, "__stderr__", stream)
+    monkeypatch.setenv("TERM", terminal)
+    monkeypatch.delenv("TEXTUAL_DRIVER", raising=False)
+    if not told:
+        check_terminal()
+        return
+    with pytest.raises(UserError, match=told):
+        check_terminal()
+    monkeypatch.setenv("TEXTUAL_DRIVER", "textual.drivers.web_driver:WebDriver")
+    check_terminal()
