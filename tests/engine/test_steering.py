@@ -373,4 +373,6 @@ def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(salt, 
         assert len(finished) == len(set(finished))
         for node in state.nodes[1:]:
             assert node.parent < node.number
-            assert state.tests[node.evidence_test - 1].outcome == "similar"
+            # Another failure counts below where it was accepted.
+            assert state.tests[node.evidence_test - 1].outcome in ("similar", "other")
+        assert state.tests[state.evidence_test - 1].outcome == "similar"

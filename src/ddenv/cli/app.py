@@ -84,12 +84,16 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
     """Goes on with RUN (a name or a file) without a screen; no finished test is made again."""
     from ddenv.launch.folder import find_run
     from ddenv.launch.programs import start_engine
+    from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
 
     path = find_run(run)
-    with RunFile(path), engine_lock(path):
-        pass
+    with RunFile(path) as file, engine_lock(path):
+        # A way back that was asked for while no engine worked ends in a pause, in which nobody would be there to go on.
+        waits = any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command))
+        if waits:
+            file.send("resume")
     # Nobody is there to ask.
     return _follow(path, start_engine(path, jobs, accept_mode="automatic"), as_json, None)
 

@@ -56,7 +56,10 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
     removed = frozenset(state.elements) - frozenset(state.environment)
-    text = without(world, removed)
+    try:
+        text = without(world, removed)
+    except ValueError as error:
+        raise UserError(f"{run}: damaged run file: its world has {error}") from None
     write_file(sdf, text)
     asked = _Asked(stored)
     minimal = parse_world(text, scenario.world, scenario.reading, asked)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ddenv.runfile.fold_nodes import arrived, decision, failures_at, left_round, searched_anew
 from ddenv.runfile.fold_tests import with_outcomes
-from ddenv.runfile.guiding import Node, Trial
+from ddenv.runfile.guiding import Node, Trial, many
 from ddenv.runfile.state import Point, RunState
 from ddenv.runfile.values import Changes, Data, names, one_of
 
@@ -46,7 +46,7 @@ def trial_judged(state: RunState, data: Data, _: float) -> Changes:
 
 def adopted(state: RunState, data: Data, at: float) -> Changes:
     trial = replace(tried(state, data["trial"]), adopted=True)
-    words = f"adopted {trial.label}: {trial.size} models"
+    words = f"adopted {trial.label}: {many(trial.size)}"
     return {
         **_with_trial(state, trial),
         **arrived(state, data, at, "adopted", trial.label),
@@ -82,7 +82,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
     else:
         last = nodes[_node(state, undone)]
         nodes[last.number] = replace(last, rejected=True)
-        words = f"took back {last.what}: {len(node.environment)} models again"
+        words = f"took back {last.what}: {many(len(node.environment))} again"
     # What is not there cannot stay.
     gone = state.pinned.difference(node.environment)
     if gone:
@@ -109,7 +109,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
 def changed(state: RunState, data: Data, at: float) -> Changes:
     settings = dict(data["settings"])
     before = dict(state.scenario["reduction"])
-    words = ", ".join(f"{key} {before.get(key, 'none')} to {value}" for key, value in settings.items())
+    words = ", ".join(f"{key} {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
     scenario = {**state.scenario, "reduction": before | settings}
     # A search goes the same way whatever its budget is.
     anew = {} if set(settings) == {"budget"} else searched_anew(state)
@@ -142,9 +142,13 @@ def told(models: Sequence[str]) -> str:
 
 def place(node: Node) -> str:
     """A node in words."""
-    size = len(node.environment)
-    models = f"{size} model{'s' * (size != 1)}"
+    models = many(len(node.environment))
     return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+
+
+def _limit(value: object) -> object:
+    """A setting in words: a budget may be none."""
+    return "no limit" if value is None else value
 
 
 def _with_trial(state: RunState, trial: Trial) -> Changes:

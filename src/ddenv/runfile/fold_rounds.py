@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.runfile.fold_nodes import arrived, decision, waits_no_more
+from ddenv.runfile.guiding import many
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Candidate, Point, Round, RunState, Split
 from ddenv.runfile.values import Changes, Data, names, number, one_of
@@ -108,7 +109,7 @@ def reduced(state: RunState, data: Data, at: float) -> Changes:
 
 
 def _told(state: RunState, candidate: Candidate) -> str:
-    return f"{candidate.label} of round {state.round.number} ({candidate.size} models)"
+    return f"{candidate.label} of round {state.round.number} ({many(candidate.size)})"
 
 
 def round_finished(state: RunState, _: Data, __: float) -> Changes:

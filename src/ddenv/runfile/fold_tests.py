@@ -8,7 +8,7 @@ from ddenv.runfile.failures import as_now
 from ddenv.runfile.fold_rounds import tried, with_candidate
 from ddenv.runfile.guiding import Trial
 from ddenv.runfile.state import Baseline, Point, RunState, Test
-from ddenv.runfile.values import Changes, Data, moments, names, number, vector
+from ddenv.runfile.values import Changes, Data, chance, moments, names, number, vector
 
 
 def test_started(state: RunState, data: Data, _: float) -> Changes:
@@ -61,12 +61,12 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
     baseline = Baseline(
         runs=int(data["runs"]),
         failures=int(data["failures"]),
-        rate=number(data["rate"]),
-        low=number(data["low"]),
-        high=number(data["high"]),
+        rate=chance(data["rate"]),
+        low=chance(data["low"]),
+        high=chance(data["high"]),
         failure_test=int(data["failure_test"]),
         position=vector(data["position"], 3),
-        miss_chance=number(data["miss_chance"]),
+        miss_chance=chance(data["miss_chance"]),
         iterations_95=int(data["iterations_95"]),
     )
     compared = with_outcomes(state, data)

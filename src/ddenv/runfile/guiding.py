@@ -63,3 +63,8 @@ class Decision:
     node: int
     kind: str
     words: str
+
+
+def many(models: int) -> str:
+    """1 model, 2 models."""
+    return f"{models} model{'s' * (models != 1)}"

@@ -22,6 +22,14 @@ def number(value: Any) -> float:
     return finite
 
 
+def chance(value: Any) -> float:
+    """A number from 0 to 1."""
+    part = number(value)
+    if not 0 <= part <= 1:
+        raise ValueError(value)
+    return part
+
+
 def moment(value: Any) -> float:
     """A Unix time, s, that a calendar can show."""
     time = number(value)

@@ -123,7 +123,7 @@ def _moment(state: RunState) -> tuple[_Moment, int]:
     taken = now.winner if now.winner is not None else state.waiting_candidate
     if now.done or taken is not None:
         n = now.n_partitions + (taken is None or method.growth == "paper")
-        size = size if taken is None else now.candidates[taken].size - len(now.split.pinned)
+        size = size if taken is None or now.done else now.candidates[taken].size - len(now.split.pinned)
         return _Moment(method, whole, size, n, least, now.number), 0
     judged = next((each.index for each in now.candidates if not each.verdict), len(now.candidates))
     done = _finished(state, islice(now.candidates, judged, judged + method.jobs + 1))

@@ -15,7 +15,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import Candidate, RunState
 from ddenv.workbench.place import place_of_run
 from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine, Scene
@@ -39,6 +39,8 @@ from ddenv.workbench.wording import plain, shorten
 PERIOD = 0.1
 # While a long run is caught up with, the next look comes after so long, and so often one of them is shown, s.
 AT_ONCE, CATCHING_UP = 0.002, 0.5
+# So long the map stays at least with a candidate, s.
+CALM = 3.0
 # So long it takes until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004
 SMALLEST = (64, 18)
@@ -71,6 +73,7 @@ class RunScreen(Leaving):
         self._pane = PANES[0][0]
         self._modelled: tuple = ()
         self._titled: tuple = ()
+        self._following: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
         self._stale, self._coming = False, False
         self._shown = time.monotonic()
 
@@ -207,8 +210,20 @@ class RunScreen(Leaving):
         self.query_one(Status).show(self.snapshot, self.scene.url if self.scene.on else "", self.waiting_for())
 
     def _show_map(self) -> None:
-        self.query_one(WorldMap).show(self.snapshot, self.query_one(Candidates).chosen or self.snapshot.focus)
+        self.query_one(WorldMap).show(self.snapshot, self.query_one(Candidates).chosen or self._followed())
         self.show_legend()
+
+    def _followed(self) -> Candidate | None:
+        """The candidate that all is about. Where they take turns fast the map stays with one for a while, to be looked at."""
+        state, focus, moment = self.snapshot.state, self.snapshot.focus, time.monotonic()
+        round, index, until = self._following
+        now = (state.node, state.round.number) if state.round and not state.round.done else None
+        waits = state.waiting_candidate is not None
+        if now is not None and now == round and moment < until and not waits and self.snapshot.engine == "alive":
+            return state.round.candidates[index]
+        if focus is not None and (now, focus.index) != (round, index):
+            self._following = now, focus.index, moment + CALM
+        return focus
 
     def show_legend(self) -> None:
         """The lines below the map."""

@@ -12,6 +12,7 @@ from textual.widget import Widget
 
 from ddenv.runfile.state import Point
 from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.widgets.changed import changed_lines
 from ddenv.workbench.widgets.inks import ink
 from ddenv.workbench.wording import count
 
@@ -46,6 +47,7 @@ class Chart(Widget):
         super().__init__(id=id)
         self._course = Course()
         self._shown: tuple = ()
+        self._text = Text("")
 
     def show(self, snapshot: Snapshot) -> None:
         """The run as it is now."""
@@ -56,9 +58,15 @@ class Chart(Widget):
             self._shown = shown
             decided = tuple(decision.tests for decision in state.decisions)
             self._course = Course(state.history, state.tests_done, state.lower_bound, decided)
-            self.refresh()
+            before, self._text = self._text, self._drawn()
+            if regions := changed_lines(before, self._text, self.size.width):
+                self.refresh(*regions)
 
     def render(self) -> Text:
+        self._text = self._drawn()
+        return self._text
+
+    def _drawn(self) -> Text:
         colors = self.app.theme_variables
         top = ink(colors, "primary")
         # The terminal's own colours have no darker one of each.

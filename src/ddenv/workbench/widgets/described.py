@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 LEGEND = (
     ("S", "start"),
     ("G", "goal"),
-    ("×", "f"),
+    ("×", "end of f"),
+    ("·", "removed"),
     ("⠒", "path"),
     ("↗", "robot"),
-    ("·", "removed"),
     ("#", "protected"),
 )
 LONGEST_NAME = 40

@@ -7,6 +7,7 @@ from textual.widget import Widget
 
 from ddenv.workbench.explain import Explanation, explain
 from ddenv.workbench.poll import Snapshot
+from ddenv.workbench.widgets.changed import changed_lines
 
 
 class Happening(Widget):
@@ -18,6 +19,7 @@ class Happening(Widget):
         self._snapshot: Snapshot | None = None
         self.trouble = ""
         self._first = 0
+        self._text = Text("")
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
@@ -27,16 +29,24 @@ class Happening(Widget):
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
             self._explanation, self.trouble = explanation, trouble
-            self.refresh()
+            before, self._text = self._text, self._drawn()
+            if regions := changed_lines(before, self._text, self.size.width):
+                self.refresh(*regions)
 
     def render(self) -> Text:
+        self._text = self._drawn()
+        return self._text
+
+    def _drawn(self) -> Text:
         width, height = self.size
         words = self._sentences()
-        taken = len(words.wrap(self.app.console, max(1, width)))
-        room = height - taken
+        wrapped = words.wrap(self.app.console, max(1, width))
+        room = height - len(wrapped)
         self._first = _scrolled(self._explanation, room, self._first)
         text = _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
-        return text.append_text(words)
+        for line in wrapped:
+            text.append_text(line).append("\n")
+        return text
 
     def _sentences(self) -> Text:
         sentences = [Text(sentence) for sentence in self._explanation.sentences]
