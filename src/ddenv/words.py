@@ -48,7 +48,8 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
     match kind:
         case "engine_started":
             resumed = " again" if before.tests else ""
-            return f"engine started{resumed} with {after.jobs} workers; {len(after.elements)} models can be removed"
+            workers, models = count(after.jobs, "worker"), count(len(after.elements), "model")
+            return f"engine started{resumed} with {workers}; {models} can be removed"
         case "baseline_finished":
             return baseline(after)
         case "round_started":

@@ -26,7 +26,7 @@ from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.recent import RunsFolder
 from ddenv.workbench.save_scenario import scenario_path
 from ddenv.workbench.screens.dialogs import WorldTree, complain_about
-from ddenv.workbench.screens.export import suggested
+from ddenv.workbench.screens.export import Wanted, suggested, write
 from ddenv.workbench.screens.run import RunScreen
 from ddenv.workbench.terminal import check_terminal
 from ddenv.workbench.widgets.rows import listed
@@ -333,3 +333,25 @@ def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encodin
         check_terminal()
     monkeypatch.setenv("TEXTUAL_DRIVER", "textual.drivers.web_driver:WebDriver")
     check_terminal()
+
+
+@pytest.mark.parametrize("key", ["o", "y", "l", "h"])
+async def test_dialogs_survive_terminals_without_room(run, key):
+    fake_run.guided(run)
+    async with Attached(run) as session:
+        await session.press(key)
+        for size in ((1, 1), (4, 4), (9, 2)):
+            await session.pilot.resize_terminal(*size)
+            await session.press("down")
+        assert session.app.is_running and not isinstance(session.app.screen, RunScreen)
+
+
+def test_models_that_the_world_does_not_have_are_told(runs, tmp_path):
+    run = fake_run.FakeRun(runs / "crates-1.ddenv")
+    run.elements[0] = "nobody"
+    run.created().baseline()
+    run.start_round(2)
+    run.reduce(1, run.elements[6:], run.similar(1))
+    run.close()
+    with pytest.raises(UserError, match="damaged run file"):
+        list(write(run.path, Wanted(tmp_path / "world.sdf", None, None)))

@@ -100,7 +100,7 @@ def other_failure(state: RunState, row: Candidate | Trial, test: Test) -> str:
 
 
 def _position(pose: tuple[float, ...] | None) -> str:
-    return "an unknown place" if pose is None else f"({pose[0]:.2f}, {pose[1]:.2f}) m"
+    return "an unknown place" if pose is None else "({:.2f}, {:.2f}, {:.2f}) m".format(*pose[:3])
 
 
 def veto(state: RunState, row: Candidate | Trial | None) -> Ask:

@@ -33,6 +33,9 @@ def beginning(options: Settings, models: int) -> str:
 def follows(options: Settings, last: Round) -> str:
     """What the last round means for the next one, or ""."""
     if last.winner is None:
+        # The user changed something in the middle of it.
+        if not all(one.verdict for one in last.candidates):
+            return ""
         reason = "Nothing showed f in the last round"
         if options.algorithm not in SMALLER:
             return f"{reason}."

@@ -38,7 +38,7 @@ LIGHT = Theme(
     surface="#ffffff",
     panel="#e9eef5",
     dark=False,
-    variables={"footer-key-foreground": "#0a58b0", "primary-muted": "#b9d4f3"},
+    variables={"footer-key-foreground": "#0a58b0", "primary-muted": "#b9d4f3", "panel-lighten-2": "#a9b6c8"},
 )
 # The terminal's own sixteen colours: for terminals that have no more, and for people who chose them well.
 ANSI = "ansi-dark"

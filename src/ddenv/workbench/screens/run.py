@@ -40,7 +40,7 @@ PERIOD = 0.1
 # While a long run is caught up with, the next look comes after so long, and so often one of them is shown, s.
 AT_ONCE, CATCHING_UP = 0.002, 0.5
 # So long the map stays at least with a candidate, s.
-CALM = 3.0
+CALM = 4.0
 # So long it takes until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004
 SMALLEST = (64, 18)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import time
+
 from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.workbench.explain import Explanation, explain
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.widgets.changed import changed_lines
+
+
+# How often what goes on within a round is told anew, s.
+PERIOD = 1.0
 
 
 class Happening(Widget):
@@ -18,6 +25,8 @@ class Happening(Widget):
         self._explanation = Explanation(None, ())
         self._snapshot: Snapshot | None = None
         self.trouble = ""
+        self._matter: tuple = ()
+        self._told = -math.inf
         self._first = 0
         self._text = Text("")
 
@@ -25,10 +34,16 @@ class Happening(Widget):
         """`trouble` comes first: what went wrong with the engine itself."""
         if snapshot is self._snapshot and trouble == self.trouble:
             return
-        self._snapshot = snapshot
+        matter, moment = _matter(snapshot), time.monotonic()
+        if matter == self._matter and trouble == self.trouble and moment - self._told < PERIOD:
+            # Runs follow each other faster than anybody reads: the next look tells of the one that is then made.
+            return
+        self._snapshot, self._matter, self._told = snapshot, matter, moment
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
             self._explanation, self.trouble = explanation, trouble
+            if not self.size.width:
+                return
             before, self._text = self._text, self._drawn()
             if regions := changed_lines(before, self._text, self.size.width):
                 self.refresh(*regions)
@@ -53,6 +68,13 @@ class Happening(Widget):
         if self.trouble:
             sentences.insert(0, Text(self.trouble, self.app.theme_variables["text-error"]))
         return Text("\n").join(sentences)
+
+
+def _matter(snapshot: Snapshot) -> tuple:
+    """What is told at once when it changes."""
+    state = snapshot.state
+    number = None if state.round is None else (state.round.number, state.round.done)
+    return snapshot.status, snapshot.error, state.paused, state.waiting_candidate, state.confirming, state.node, number
 
 
 def _shown(explanation: Explanation, room: int) -> int:
