@@ -75,7 +75,7 @@ def main() -> None:
     options = parser.parse_args()
     effort = QUICK if options.quick else FULL
     with tempfile.TemporaryDirectory() as name:
-        folder, environment = Path(name), os.environ | {"DDENV_HOME": name}
+        folder, environment = Path(name), os.environ | {"DDENV_HOME": name} | installed(name)
         recorded, large = folder / "recorded.ddenv", {}
         with simulations(recorded, environment):
             loaded = figures(recorded, environment, effort)
@@ -90,6 +90,11 @@ def main() -> None:
         if not options.quick:
             told = hour(recorded, environment, options.hour)
             print(f"| memory at 10 / 50 / 100 % of an hour, MB | {told} | | | flat |")
+
+
+def installed(folder: str) -> dict[str, str]:
+    """What makes a program start as an installed one does: from compiled files, also where none are to be written."""
+    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": f"{folder}/compiled"}
 
 
 def figures(run: Path, environment: dict[str, str], effort: Effort) -> Figures:

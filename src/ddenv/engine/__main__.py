@@ -85,8 +85,9 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
-    journal.lose_running()
+    # First, since until the last event before it another engine worked.
     journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__)
+    journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
         journal.record("accept_mode", mode=accept_mode)
 

@@ -35,7 +35,7 @@ class Workbench(App[int]):
 
     TITLE = "ddenv"
     # Notifications leave the status line and the keys free.
-    CSS = "ToastRack { margin-bottom: 3; } SearchIcon { display: none; }"
+    CSS = "ToastRack { margin-bottom: 3; } SearchIcon { display: none; } CommandList { min-width: 8; }"
     ENABLE_COMMAND_PALETTE = True
     COMMANDS: ClassVar[set[Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
@@ -189,11 +189,13 @@ class Workbench(App[int]):
 
 
 def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None, *, watch: bool = False) -> int:
-    """Runs the workbench until it is left; returns the exit code. Raises UserError if `run` is no run file."""
+    """Runs the workbench until it is left; returns the exit code. Raises UserError for what is no run file, or no terminal."""
     from ddenv.workbench.config import read_config
+    from ddenv.workbench.terminal import check_terminal
 
     config = read_config()
     app = Workbench(run, reading, watch=watch, config=config)
+    check_terminal()
     if not config.theme:
         app.theme = fitting(app.console.color_system)
     result = app.run()

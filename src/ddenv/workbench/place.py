@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddenv.workbench.observed import Observed
+from ddenv.workbench.observed import Busy, Observed
 from ddenv.workbench.widgets.map import Place
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
     from ddenv.world.scenario import Scenario
+
+# How long a run that another program writes is asked again, s.
+PATIENCE = 10.0
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:
@@ -31,6 +35,14 @@ def place_of_run(path: Path) -> Place:
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
     from ddenv.launch.runs import read_parts
 
-    with Observed(path) as run:
-        scenario, world, _ = read_parts(run)
-    return place_of(world, scenario)
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            with Observed(path) as run:
+                scenario, world, _ = read_parts(run)
+            return place_of(world, scenario)
+        except Busy:
+            # The world is asked for once: what another program writes now is done soon.
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.1)

@@ -43,6 +43,7 @@ class Snapshot:
     `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path
     in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the
     run file cannot be read. `gone` says that it was deleted or replaced: all else is what was read last.
+    `behind` says that there is more in it than was read yet.
     """
 
     state: RunState = field(default_factory=RunState)
@@ -53,6 +54,7 @@ class Snapshot:
     error: str = ""
     original: array | None = None
     gone: bool = False
+    behind: bool = False
 
     @property
     def older_engine(self) -> str:
@@ -65,7 +67,7 @@ class Snapshot:
         """The state's status, or "starting" or "lost" where the engine's own state tells more."""
         if self.engine == "starting":
             return "starting"
-        if self.state.ended or self.engine == "alive" or self.state.status == "created":
+        if self.state.ended or self.behind or self.engine == "alive" or self.state.status == "created":
             return self.state.status
         return "lost"
 
@@ -196,7 +198,7 @@ class Poll:
             snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
         self._behind = more or not due
         self._catching_up = more
-        return snapshot
+        return replace(snapshot, behind=more)
 
     def _left(self, why: str) -> Snapshot:
         """What was read last of a file that is not there any more."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import time
 
+from rich.containers import Lines
 from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.workbench.explain import Explanation, explain
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.widgets.changed import changed_lines
-
 
 # How often what goes on within a round is told anew, s.
 PERIOD = 1.0
@@ -28,7 +28,7 @@ class Happening(Widget):
         self._matter: tuple = ()
         self._told = -math.inf
         self._first = 0
-        self._text = Text("")
+        self._lines = Text("")
 
     def show(self, snapshot: Snapshot, trouble: str = "") -> None:
         """`trouble` comes first: what went wrong with the engine itself."""
@@ -44,24 +44,28 @@ class Happening(Widget):
             self._explanation, self.trouble = explanation, trouble
             if not self.size.width:
                 return
-            before, self._text = self._text, self._drawn()
-            if regions := changed_lines(before, self._text, self.size.width):
+            before, self._lines = self._lines, self._drawn()
+            if regions := changed_lines(before, self._lines, self.size.width):
                 self.refresh(*regions)
 
     def render(self) -> Text:
-        self._text = self._drawn()
-        return self._text
+        self._lines = self._drawn()
+        return self._window(self._wrapped()).append_text(self._sentences())
 
     def _drawn(self) -> Text:
+        """All lines as they stand on the screen."""
+        wrapped = self._wrapped()
+        return self._window(wrapped).append_text(Text("\n").join(wrapped))
+
+    def _wrapped(self) -> Lines:
+        return self._sentences().wrap(self.app.console, max(1, self.size.width))
+
+    def _window(self, sentences: Lines) -> Text:
+        """As many lines of the algorithm as there is room for above the sentences."""
         width, height = self.size
-        words = self._sentences()
-        wrapped = words.wrap(self.app.console, max(1, width))
-        room = height - len(wrapped)
+        room = height - len(sentences)
         self._first = _scrolled(self._explanation, room, self._first)
-        text = _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
-        for line in wrapped:
-            text.append_text(line).append("\n")
-        return text
+        return _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
 
     def _sentences(self) -> Text:
         sentences = [Text(sentence) for sentence in self._explanation.sentences]

@@ -28,6 +28,7 @@ __all__ = ["LAYERS", "Place", "WorldMap"]
 class WorldMap(Overview, can_focus=True):
     """Top-down map. Give it a `Place`, then snapshots. While it is `picking`, enter and clicks choose places, not models."""
 
+    HELP = "click: select a model or not   wheel: closer, farther   drag: move the map"
     BINDINGS: ClassVar = [
         Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
         Binding("right", "move(1, 0)", "move", show=False, id="map.right", tooltip="crosshair to the right"),
