@@ -40,7 +40,7 @@ PROBE = (
     f"atexit.register(lambda: pathlib.Path(os.environ['{NAMES}']).write_text(' '.join(sys.modules))); main()"
 )
 # A reduction that goes on longer than all that is measured beside it.
-SIMULATIONS = ("run", "ditch", "--jobs", "2", "--iterations", "15")
+SIMULATIONS = ("run", "ditch", "--jobs", "2", "--iterations", "200")
 LARGE_TESTS = 10_000
 
 
