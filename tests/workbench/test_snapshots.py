@@ -25,6 +25,8 @@ def shown(theme="ddenv", *keys):
         await settled(pilot)
         for key in keys:
             await pilot.press(key)
+            await pilot.pause()
+        if keys:
             await settled(pilot)
 
     return run_before

@@ -55,6 +55,7 @@ class RunScreen(Leaving):
     HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (SMALLEST[0], "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]
     VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (SMALLEST[1], "-low"), (23, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = KEYS
+    AUTO_FOCUS = "#candidates"
     # What the focus changes is drawn again by the widgets themselves: the whole screen need not be.
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
@@ -110,7 +111,6 @@ class RunScreen(Leaving):
 
     def on_mount(self) -> None:
         self.add_class(f"-pane-{self._pane}")
-        self.query_one(Candidates).focus()
         self._look()
         self.set_interval(PERIOD, self._look)
         # What it needs takes long to load: the first paint comes before.

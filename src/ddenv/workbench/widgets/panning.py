@@ -112,10 +112,8 @@ class Panning(Widget):
     def on_resize(self) -> None:
         self.refit()
 
-    def on_focus(self) -> None:
-        self.draw()
-
-    def on_blur(self) -> None:
+    def watch_has_focus(self, focused: bool) -> None:
+        super().watch_has_focus(focused)
         self.draw()
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
