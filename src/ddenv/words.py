@@ -1,7 +1,8 @@
-"""The words for what happens in a run, one line each."""
+"""The words for what happens in a run, one line each; and how all views word numbers."""
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections import Counter
 from collections.abc import Sequence
@@ -126,3 +127,23 @@ def first_of(names: Sequence[str], most: int) -> str:
     """a, b and 3 more: not more than `most` of them by name."""
     left = len(names) - most
     return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
+
+
+def duration(seconds: float) -> str:
+    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
+    whole = max(0, round(seconds)) if math.isfinite(seconds) else 0
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
+
+
+def percent(part: float) -> str:
+    """A fraction as a whole percentage that is never rounded to certainty."""
+    value = round(100 * part)
+    if value == 0 and part > 0:
+        return "<1 %"
+    if value == 100 and part < 1:
+        return ">99 %"
+    return f"{value} %"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from ddenv.errors import printable
+from ddenv.map.frame import Frame
 from ddenv.map.labels import HEIGHT, Label, Spot, place_labels, spot
 from ddenv.map.names import shortened
 from ddenv.map.paint import RGB, blend, packed, readable
@@ -34,28 +34,6 @@ BLACK: RGB = (0, 0, 0)
 INK, FAINT, GRID = "#24292f", "#6e7781", "#e7eaee"
 START, GOAL = "#1f6feb", "#1a7f37"
 FONT = "font-family=\"Inter, 'Segoe UI', Helvetica, Arial, 'DejaVu Sans', sans-serif\""
-# Nothing farther outside can be seen, and some viewers fail on large numbers.
-FAR = 1e5
-
-
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """The rectangle of the world that is drawn: `low` and `high` in m, `scale` in pixels for one m."""
-
-    low: np.ndarray
-    high: np.ndarray
-    scale: float
-
-    @property
-    def box(self) -> np.ndarray:
-        """Left, top, right and bottom, pixels."""
-        width, height = (self.high - self.low) * self.scale
-        return np.array([LEFT, TOP, LEFT + width, TOP + height])
-
-    def pixels(self, points: np.ndarray) -> np.ndarray:
-        """(N, 2) m to (N, 2) pixels, y downwards."""
-        away = (points - (self.low[0], self.high[1])) * (self.scale, -self.scale)
-        return np.clip(away, -FAR, FAR) + np.array([LEFT, TOP])
 
 
 def svg_map(
@@ -90,7 +68,7 @@ def svg_map(
     return "\n".join(lines) + "\n"
 
 
-def _frame(models: Sequence[Drawn], points: Sequence[tuple[float, float]]) -> _Frame:
+def _frame(models: Sequence[Drawn], points: Sequence[tuple[float, float]]) -> Frame:
     low, high = extent([each.outline for each in models], points)
     margin = max(0.3, 0.04 * float(max(high - low)))
     # A single crate does not fill the page.
@@ -100,7 +78,7 @@ def _frame(models: Sequence[Drawn], points: Sequence[tuple[float, float]]) -> _F
     # A long and narrow world gets a frame that has room for its title.
     sides = np.maximum(high - low, np.array([NARROWEST, NARROWEST / 3]) / scale)
     center = (low + high) / 2
-    return _Frame(center - sides / 2, center + sides / 2, float(scale))
+    return Frame(center - sides / 2, center + sides / 2, float(scale), LEFT, TOP)
 
 
 def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
@@ -114,7 +92,7 @@ def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
     yield f'<text x="{LEFT:.0f}" y="56" font-size="13" fill="{FAINT}">{" · ".join(told)}</text>'
 
 
-def _axes(frame: _Frame) -> Iterator[str]:
+def _axes(frame: Frame) -> Iterator[str]:
     """Grid lines with their numbers, and what the axes are."""
     left, top, right, bottom = frame.box
     step = tick_step(max(frame.high - frame.low), 16)
@@ -138,7 +116,7 @@ def _grid(value: float) -> str:
     return "#c4cad1" if value == 0 else GRID
 
 
-def _model(each: Drawn, frame: _Frame) -> str:
+def _model(each: Drawn, frame: Frame) -> str:
     fill = _fill(each)
     edge = blend(fill, BLACK, 0.45)
     dashes = "" if each.model.static else ' stroke-dasharray="5 3"'
@@ -148,7 +126,7 @@ def _model(each: Drawn, frame: _Frame) -> str:
     return f"<g {style}><title>{_tooltip(each)}</title>{_drawn(each, frame)}</g>"
 
 
-def _drawn(each: Drawn, frame: _Frame) -> str:
+def _drawn(each: Drawn, frame: Frame) -> str:
     """One path with all its polygons; a model that fills nothing is a small cross."""
     polygons = [_path(frame.pixels(polygon)) for polygon in each.outline.polygons]
     if polygons:
@@ -158,7 +136,7 @@ def _drawn(each: Drawn, frame: _Frame) -> str:
     return f'<path d="{ends}" stroke="{INK}" stroke-width="1.5"/>'
 
 
-def _cross(each: Drawn, frame: _Frame) -> np.ndarray:
+def _cross(each: Drawn, frame: Frame) -> np.ndarray:
     """The corners around the sign of a model without shapes, pixels."""
     return frame.pixels(np.array([each.outline.center])) + CROSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
@@ -181,7 +159,7 @@ def _tooltip(each: Drawn) -> str:
     return f"{_text(each.model.name)}\n{words}"
 
 
-def _labels(models: Sequence[Drawn], frame: _Frame, points: Sequence[tuple[float, float]]) -> Iterator[str]:
+def _labels(models: Sequence[Drawn], frame: Frame, points: Sequence[tuple[float, float]]) -> Iterator[str]:
     spots = [_spot(each, frame) for each in models]
     names = [shortened(each.model.name, LONGEST_LABEL) for each in models]
     largest = sorted(range(len(models)), key=lambda index: -models[index].outline.area)[:MOST_LABELS]
@@ -193,7 +171,7 @@ def _labels(models: Sequence[Drawn], frame: _Frame, points: Sequence[tuple[float
     yield "</g>"
 
 
-def _spot(each: Drawn, frame: _Frame) -> Spot:
+def _spot(each: Drawn, frame: Frame) -> Spot:
     if not each.outline.polygons:
         return spot(_cross(each, frame), frame.box, False)
     return spot(frame.pixels(convex_hull(np.vstack(each.outline.polygons))), frame.box, each.floor)
@@ -213,7 +191,7 @@ def _label(label: Label, each: Drawn) -> str:
     )
 
 
-def _marks(frame: _Frame, spawn, goal) -> Iterator[str]:
+def _marks(frame: Frame, spawn, goal) -> Iterator[str]:
     if spawn is not None:
         x, y = frame.pixels(np.array([spawn[:2]]))[0]
         yield (
@@ -234,7 +212,7 @@ def _badge(sign: str, color: str) -> str:
     )
 
 
-def _foot(frame: _Frame, models: Sequence[Drawn]) -> Iterator[str]:
+def _foot(frame: Frame, models: Sequence[Drawn]) -> Iterator[str]:
     """The scale bar, and what the outlines mean."""
     left, _, right, bottom = frame.box
     y = bottom + 68

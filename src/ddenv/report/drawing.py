@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Any
 
 import numpy as np
 
+from ddenv.map.frame import FAR, Frame
 from ddenv.map.labels import HEIGHT, Spot, place_labels, spot
 from ddenv.map.names import shortened
 from ddenv.map.plan import Drawn
@@ -37,33 +37,7 @@ MOST_LABELS, LONGEST_LABEL, MOST_AVOIDED = 24, 26, 1000
 MOST_POINTS = 500
 # With more polygons in all, each model is drawn as one outline around it.
 MOST_POLYGONS = 20_000
-# Nothing farther outside can be seen, and some viewers fail on large numbers.
-FAR = 1e5
 CROSS = 4.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """The rectangle of the world that is drawn: `low` and `high` in m, `scale` in pixels for one m."""
-
-    low: np.ndarray
-    high: np.ndarray
-    scale: float
-
-    @property
-    def box(self) -> np.ndarray:
-        """Left, top, right and bottom, pixels."""
-        width, height = (self.high - self.low) * self.scale
-        return np.array([LEFT, TOP, LEFT + width, TOP + height])
-
-    def holds(self, point: tuple[float, float] | None) -> bool:
-        """Whether a place is on the map."""
-        return point is not None and bool((self.low <= point).all() and (point <= self.high).all())
-
-    def pixels(self, points: np.ndarray) -> np.ndarray:
-        """(N, 2) m to (N, 2) pixels, y downwards."""
-        away = (points - (self.low[0], self.high[1])) * (self.scale, -self.scale)
-        return np.clip(away, -FAR, FAR) + np.array([LEFT, TOP])
 
 
 def picture(record: Record, models: Sequence[Drawn]) -> str:
@@ -85,7 +59,7 @@ def close_up(record: Record, models: Sequence[Drawn]) -> str:
     return _picture(record, models, frame, "near")
 
 
-def _picture(record: Record, models: Sequence[Drawn], frame: _Frame, name: str) -> str:
+def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str) -> str:
     """`name` tells pictures of one page apart."""
     start, goal, end = (point if frame.holds(point) else None for point in _places(record))
     points = [point for point in (start, goal, end) if point is not None]
@@ -143,7 +117,7 @@ def _sort(record: Record, name: str) -> str:
 
 def _frame(
     models: Sequence[Drawn], points: Sequence[tuple[float, float]], least: float, most: float = HIGHEST
-) -> _Frame:
+) -> Frame:
     low, high = extent([each.outline for each in models], points)
     margin = np.maximum(max(0.3, 0.03 * float(max(high - low))), (least - (high - low)) / 2)
     low, high = low - margin, high + margin
@@ -152,10 +126,10 @@ def _frame(
     # The map is as wide as the page, and never a mere strip.
     sides = np.maximum(high - low, np.array([across, LEAST_HIGH]) / scale)
     center = (low + high) / 2
-    return _Frame(center - sides / 2, center + sides / 2, scale)
+    return Frame(center - sides / 2, center + sides / 2, scale, LEFT, TOP)
 
 
-def _axes(frame: _Frame) -> Iterator[str]:
+def _axes(frame: Frame) -> Iterator[str]:
     """Grid lines with their numbers, and what the axes are."""
     left, top, right, bottom = frame.box
     step = tick_step(float(max(frame.high - frame.low)), 12)
@@ -172,7 +146,7 @@ def _axes(frame: _Frame) -> Iterator[str]:
     yield f'<text class="tick" transform="translate(13 {y:.1f}) rotate(-90)" text-anchor="middle">y, m</text>'
 
 
-def _model(each: Drawn, sort: str, frame: _Frame, coarse: bool) -> str:
+def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
     flat = " floor" if each.floor else ""
     told = {"kept": "left", "gone": "removed", "still": "always there", "whole": "can be removed"}[sort]
     title = f"<title>{_text(each.model.name)} ({told})</title>"
@@ -191,7 +165,7 @@ def _closed(corners: np.ndarray) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in corners) + "Z"
 
 
-def _way(samples: array | None, frame: _Frame) -> str:
+def _way(samples: array | None, frame: Frame) -> str:
     """The robot's way, or "" where none is known."""
     if not samples:
         return ""
@@ -202,7 +176,7 @@ def _way(samples: array | None, frame: _Frame) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in frame.pixels(chosen))
 
 
-def _near(record: Record, frame: _Frame, goal: Any, end: Any) -> Iterator[str]:
+def _near(record: Record, frame: Frame, goal: Any, end: Any) -> Iterator[str]:
     """Around the goal where it is reached, and around f's end where a similar run ends, seen from above."""
     scenario = record.state.scenario
     pairs = ((goal, section(scenario, "goal").get("tolerance", 0.5), "reach"),)
@@ -213,7 +187,7 @@ def _near(record: Record, frame: _Frame, goal: Any, end: Any) -> Iterator[str]:
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 
 
-def _labels(models: Sequence[Drawn], sorts: dict[str, str], frame: _Frame, points: Sequence) -> Iterator[str]:
+def _labels(models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence) -> Iterator[str]:
     """Names of the models that are left, the largest first; of a world that is whole, of all."""
     # What was removed is so faint that a name may stand on it.
     seen = [each for each in models if sorts[each.model.name] != "gone"][-MOST_AVOIDED:]
@@ -234,14 +208,14 @@ def _labels(models: Sequence[Drawn], sorts: dict[str, str], frame: _Frame, point
         )
 
 
-def _spot(each: Drawn, frame: _Frame) -> Spot:
+def _spot(each: Drawn, frame: Frame) -> Spot:
     if each.outline.polygons:
         return spot(frame.pixels(convex_hull(np.vstack(each.outline.polygons))), frame.box, each.floor)
     around = CROSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     return spot(frame.pixels(np.array([each.outline.center])) + around, frame.box, False)
 
 
-def _marks(frame: _Frame, start: Any, goal: Any, end: Any) -> Iterator[str]:
+def _marks(frame: Frame, start: Any, goal: Any, end: Any) -> Iterator[str]:
     for point, sign in ((start, "start"), (goal, "goal"), (end, "end")):
         if point is not None:
             x, y = frame.pixels(np.array([point]))[0]

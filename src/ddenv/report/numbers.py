@@ -2,30 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-
-def percent(part: float) -> str:
-    """A fraction as a whole percentage that is never rounded to certainty."""
-    value = round(100 * part)
-    if value == 0 and part > 0:
-        return "<1 %"
-    if value == 100 and part < 1:
-        return ">99 %"
-    return f"{value} %"
-
-
-def duration(seconds: float) -> str:
-    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
-    whole = max(0, round(seconds)) if math.isfinite(seconds) else 0
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
+from ddenv.words import duration as duration
+from ddenv.words import percent as percent
 
 
 def moment(time: float) -> str:

@@ -7,6 +7,9 @@ from typing import Any
 
 from ddenv.runfile.failures import DEEDS
 from ddenv.runfile.state import Test
+from ddenv.words import count as count
+from ddenv.words import duration as duration
+from ddenv.words import percent as percent
 
 # Every status and verdict has a sign of its own, so that nothing is told by colour alone.
 STATUS = {
@@ -55,21 +58,6 @@ def shorten(text: str, width: int) -> str:
     return text if len(text) <= width else f"{text[: max(0, width - 1)]}…"
 
 
-def count(number: int, noun: str) -> str:
-    """1 model, 2 models."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def duration(seconds: float) -> str:
-    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
-    whole = max(0, round(seconds))
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
-
-
 def brief(seconds: float) -> str:
     """`seconds` in at most seven characters: 0.4 s, 312 s, 25 min, 3 h."""
     if seconds < 9.95:
@@ -98,13 +86,3 @@ def metres(value: Any, digits: int = 1) -> str:
     if not isinstance(value, (int, float)) or not math.isfinite(value):
         return ""
     return f"{value:.{digits}f} m"
-
-
-def percent(part: float) -> str:
-    """A fraction as a whole percentage that is never rounded to certainty."""
-    value = round(100 * part)
-    if value == 0 and part > 0:
-        return "<1 %"
-    if value == 100 and part < 1:
-        return ">99 %"
-    return f"{value} %"
