@@ -43,6 +43,10 @@ _OURS: dict[str, dict[str, str]] = {
     },
 }
 
+# Algorithms of other packages are taken to use both parts of the pair.
+BOTH: tuple[Kind, ...] = ("partitioning", "prioritization")
+_USES: dict[str, tuple[Kind, ...]] = {"ddmin": (), "probdd": (), "splitting": ("prioritization",)}
+
 
 def names(kind: Kind) -> tuple[str, ...]:
     """All known names, ours first."""
@@ -53,6 +57,11 @@ def pairs() -> tuple[str, ...]:
     """All pairs of a partitioning with a prioritization, written `model2model/failure-proximal`."""
     orders = names("prioritization")
     return tuple(f"{partitioning}/{order}" for partitioning in names("partitioning") for order in orders)
+
+
+def uses(algorithm: str) -> tuple[Kind, ...]:
+    """The parts of the pair that the algorithm looks at."""
+    return _USES.get(algorithm, BOTH)
 
 
 def split_pair(pair: str) -> tuple[str, str]:

@@ -15,12 +15,12 @@ from attached import Attached, starts
 from rich.cells import cell_len
 
 from ddenv.errors import UserError
+from ddenv.forecast.estimate import remaining
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import read_config
-from ddenv.workbench.estimate import remaining
 from ddenv.workbench.explain import explain
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.recent import RunsFolder
@@ -169,7 +169,7 @@ def test_damaged_events_are_told_or_make_a_state_that_can_be_shown(streams):
                 break
         for engine in ("alive", "absent"):
             snapshot = Snapshot(state, (), engine)
-            explain(snapshot), remaining(snapshot), listed(snapshot), snapshot.focus
+            explain(snapshot), remaining(state, engine == "alive"), listed(snapshot), snapshot.focus
         assert state.here is None or state.here.environment is not None
     assert 200 < told < 800
 

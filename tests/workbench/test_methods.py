@@ -2,8 +2,8 @@
 
 import pytest
 
-from ddenv.schemas import names
-from ddenv.workbench.methods import KINDS, labels, note, paragraph, uses
+from ddenv.schemas import names, uses
+from ddenv.workbench.methods import KINDS, labels, note, paragraph
 
 EVERY = [(kind, name) for kind in KINDS for name in names(kind)]
 

@@ -91,7 +91,7 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
 
 def _tests(models: int, scenario: Scenario, jobs: int, past: Past) -> tuple[int, int, int]:
     """Least, expected and most tests, with the baseline's."""
-    from ddenv.workbench.estimate import expect
+    from ddenv.forecast.estimate import expect
 
     reduction = scenario.reduction
     rate = past.rate if past.rate is not None else 1.0

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ddenv.runfile.failures import DEEDS, deed
+from ddenv.runfile.settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.workbench.explain_hand import arrival, by_hand, last_reduction, older_engine, out_of_budget, to_adopt
 from ddenv.workbench.listings import DDENV, Lines, Step, is_sweep, listing
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.rounds import GROUPS, beginning, follows, fruitless
-from ddenv.workbench.settings import Settings, settings
 from ddenv.workbench.wording import count, metres, percent, plain
 
 # A list of kept models longer than this is cut, so that the sentence stays one.

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ddenv.runfile.guiding import Node, Trial
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.workbench.guiding import named
 from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import count, plain
 
 HOW = {

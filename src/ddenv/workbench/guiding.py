@@ -10,9 +10,9 @@ from ddenv.errors import UserError
 from ddenv.map.names import shortened
 from ddenv.runfile.failures import deed
 from ddenv.runfile.guiding import Node, Trial
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.words import first_of
-from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import count, metres, plain
 
 # These go on from somewhere else: where no engine works, one is started for them.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ddenv.schemas import uses
 from ddenv.workbench.form import Field
-from ddenv.workbench.methods import uses
 from ddenv.workbench.wording import count, plain
 
 # In place of what the scenario's model says, where a choice needs more words than it has.

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from ddenv.schemas import Kind, explanation, names
+from ddenv.schemas import BOTH, Kind, explanation, names, uses
 from ddenv.workbench.wording import plain
 
 KINDS: tuple[Kind, ...] = ("algorithm", "partitioning", "prioritization")
-# Algorithms of other packages are taken to use both.
-BOTH: tuple[Kind, ...] = ("partitioning", "prioritization")
-USES: dict[str, tuple[Kind, ...]] = {"ddmin": (), "probdd": (), "splitting": ("prioritization",)}
-
-
-def uses(algorithm: str) -> tuple[Kind, ...]:
-    """The parts of the pair that the algorithm looks at."""
-    return USES.get(algorithm, BOTH)
 
 
 def chosen(algorithm: str, pair: str) -> dict[Kind, str]:

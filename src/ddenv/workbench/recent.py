@@ -10,9 +10,9 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.workbench.observed import Busy, Observed
-from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import STATUS
 
 # So many are listed on the setup screen.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ddenv.runfile.settings import Settings
 from ddenv.runfile.state import Round
 from ddenv.workbench.listings import is_sweep
 from ddenv.workbench.methods import chosen
-from ddenv.workbench.settings import Settings
 from ddenv.workbench.wording import count, plain
 
 # These leave out one group of models a round, and each model in turn at the end.

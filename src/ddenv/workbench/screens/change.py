@@ -13,10 +13,10 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Select, Static
 
 from ddenv.errors import UserError
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.workbench.methods import KINDS, note, paragraph
-from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import count, plain
 
 MEANINGS = {

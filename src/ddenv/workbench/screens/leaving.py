@@ -7,11 +7,11 @@ from pathlib import Path
 from rich.text import Text
 from textual import work
 
+from ddenv.runfile.settings import settings
 from ddenv.workbench.attach import attach_name
 from ddenv.workbench.processes import Scene
 from ddenv.workbench.screens.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.screens.steering import Steering
-from ddenv.workbench.settings import settings
 from ddenv.workbench.widgets.map import LAYERS, WorldMap
 
 

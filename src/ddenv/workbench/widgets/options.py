@@ -15,10 +15,10 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, Label, Select, Static
 
 from ddenv.errors import UserError
-from ddenv.schemas import Kind
+from ddenv.schemas import Kind, uses
 from ddenv.workbench import form
 from ddenv.workbench.meanings import Circumstances, cost, meaning, not_used
-from ddenv.workbench.methods import chosen, note, paragraph, uses
+from ddenv.workbench.methods import chosen, note, paragraph
 from ddenv.workbench.widgets.schema import Explained, SchemaSelect
 from ddenv.workbench.wording import plain
 

@@ -8,9 +8,9 @@ from itertools import takewhile
 
 from ddenv.map.names import shortened
 from ddenv.runfile.guiding import Trial
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import Candidate, Test
 from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.settings import settings
 from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain
 
 # Of a model's name so many columns, behind a sign and a space.

@@ -11,15 +11,15 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.forecast.estimate import Remaining, remaining
 from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.version import __version__
 from ddenv.workbench.branches import path
-from ddenv.workbench.estimate import Remaining, remaining
 from ddenv.workbench.methods import labels
 from ddenv.workbench.poll import Snapshot
 from ddenv.workbench.rounds import GROUPS
-from ddenv.workbench.settings import settings
 from ddenv.workbench.widgets.inks import ink
 from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
@@ -105,7 +105,7 @@ class Status(Widget):
         number = None if state.round is None else state.round.number
         of = (snapshot.status, state.paused, state.waiting_candidate, state.budget, state.node, number)
         if of != self._left_of or moment - self._left_at >= LEFT_PERIOD:
-            self._left, self._left_of, self._left_at = remaining(snapshot), of, moment
+            self._left, self._left_of, self._left_at = remaining(state, snapshot.engine == "alive"), of, moment
         return self._left
 
     def render(self) -> Text:
@@ -161,7 +161,7 @@ def facts(
     scene: str = "",
     asked: str = "",
     cut: int = 0,
-    left: Callable[[Snapshot], Remaining | None] = remaining,
+    left: Callable[[Snapshot], Remaining | None] = lambda now: remaining(now.state, now.engine == "alive"),
 ) -> tuple[Fact, ...]:
     """What there is to say, in the order of the screen."""
     state = snapshot.state

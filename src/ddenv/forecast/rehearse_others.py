@@ -1,4 +1,4 @@
-"""The other algorithms played on numbers alone, see `ddenv.workbench.rehearse`."""
+"""The other algorithms played on numbers alone, see `ddenv.forecast.rehearse`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from ddenv.workbench.rehearse import MOST_ROUNDS, Play, running_sum
+from ddenv.forecast.rehearse import MOST_ROUNDS, Play, running_sum
 
 # How many needed models are expected in each e-fold of the rank (as in `ddenv.reduction.chance`).
 DENSITY = 0.5

@@ -1,12 +1,11 @@
 """What a reduction is expected to take: held against real ones without a robot, and against what runs say on their way."""
 
-import fake_run
 import pytest
 
 import ddenv
+from ddenv.forecast.estimate import expect, remaining
 from ddenv.runfile.fold import fold
-from ddenv.workbench.estimate import expect, remaining
-from ddenv.workbench.poll import Snapshot
+from tests.workbench import fake_run
 
 NEAR = "model2model/failure-proximal"
 # Of the table in the README: models, and mean tests with a failure that always shows and with one that shows in 80 % of the runs.
@@ -47,14 +46,25 @@ def test_complements_alone_take_fewer_tests():
     assert 0 < expect(43, "ddenv", NEAR, 3, candidates="complements").tests < expect(43, "ddenv", NEAR, 3).tests
 
 
-def snapshot(run, engine="alive"):
-    return Snapshot(fold(run.file.events()), tuple(run.file.live()), engine)
+@pytest.fixture
+def run(tmp_path):
+    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
+    yield made
+    made.close()
+
+
+def state_of(run):
+    return fold(run.file.events())
+
+
+def left(run, at_work=True):
+    return remaining(state_of(run), at_work)
 
 
 def play(run, needed, iterations=3):
     """A run whose failure needs some models, written as an engine would; gives what was left to expect, and what was left."""
     run.created().baseline(4)
-    told, state = [], snapshot(run).state
+    told, state = [], state_of(run)
     rounds, tests, verdicts = [], 0, []
 
     def shows(kept):
@@ -83,12 +93,12 @@ def play(run, needed, iterations=3):
             partitions=numbers,
             candidates=[[one.kind, one.partition, None] for one in round.candidates],
         )
-        told.append((at, remaining(snapshot(run)).tests))
+        told.append((at, left(run).tests))
         tests = len(verdicts)
         kept = next((one for one in round.candidates if needed <= one.models), None)
         if kept is not None:
-            left = sorted(run.elements.index(name) for name in kept.models)
-            run.write("reduced", candidate=round.candidates.index(kept), environment=left, evidence_test=1)
+            numbers = sorted(run.elements.index(name) for name in kept.models)
+            run.write("reduced", candidate=round.candidates.index(kept), environment=numbers, evidence_test=1)
         run.write("round_finished")
     assert state.baseline is not None
     return [(low, tests - at, high) for at, (low, _, high) in told]
@@ -101,9 +111,9 @@ def test_what_is_left_is_in_the_interval_in_most_rounds(run, needed):
 
 
 def test_what_is_left_grows_less_with_every_test(run):
-    before = remaining(snapshot(fake_run.mid_round(run)))
+    before = left(fake_run.mid_round(run))
     run.finish(11, "pass")
-    after = remaining(snapshot(run))
+    after = left(run)
     assert after.tests[1] == before.tests[1] - 1
     # 2 s a test on 2 workers that are busy for most of the time.
     assert before.seconds[1] == pytest.approx(before.tests[1] * 2 / 1.9)
@@ -111,31 +121,29 @@ def test_what_is_left_grows_less_with_every_test(run):
 
 def test_no_time_is_told_while_nothing_runs(run):
     fake_run.mid_round(run)
-    assert remaining(snapshot(run, "absent")).seconds is None
+    assert left(run, at_work=False).seconds is None
     run.write("paused")
-    assert remaining(snapshot(run)).seconds is None
+    assert left(run).seconds is None
 
 
-def test_nothing_is_left_of_what_did_not_begin_or_has_ended(runs):
-    run = fake_run.FakeRun(runs / "new.ddenv")
-    assert remaining(snapshot(run)) is None
+def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
+    assert left(run) is None
     fake_run.confirming(run)
-    assert remaining(snapshot(run)) is None
+    assert left(run) is None
     run.write("finished", minimal=True, reason="")
-    assert remaining(snapshot(run)) is None
-    run.close()
+    assert left(run) is None
 
 
 def test_a_budget_ends_it(run):
-    state = snapshot(fake_run.mid_round(run)).state
+    state = state_of(fake_run.mid_round(run))
     scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": 13}}
-    assert max(remaining(Snapshot(state.changed(scenario=scenario), (), "alive")).tests) <= 3
+    assert max(remaining(state.changed(scenario=scenario), True).tests) <= 3
 
 
 @pytest.mark.parametrize("value", ["x", None, float("inf"), float("nan"), -3, 10**30, True])
 def test_settings_that_make_no_sense_do_no_harm(run, value):
-    state = snapshot(fake_run.mid_round(run)).state
+    state = state_of(fake_run.mid_round(run))
     reduction = dict.fromkeys(("iterations", "baseline_runs", "n_partitions", "budget", "pair", "growth"), value)
     for odd in (state, state.changed(baseline=None), state.changed(round=None), state.changed(pinned=frozenset("x"))):
-        left = remaining(Snapshot(odd.changed(scenario={"reduction": reduction}), (), "alive"))
-        assert left.tests[0] <= left.tests[1] <= left.tests[2]
+        told = remaining(odd.changed(scenario={"reduction": reduction}), True)
+        assert told.tests[0] <= told.tests[1] <= told.tests[2]

@@ -1,12 +1,12 @@
-"""The settings of a run's scenario that the workbench shows, as the run's first event recorded them."""
+"""The settings of a run's scenario that views show, as the run's first event recorded them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+from ddenv.errors import printable
 from ddenv.runfile.state import RunState
-from ddenv.workbench.wording import plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +29,10 @@ def settings(state: RunState) -> Settings:
     reduction, failure = _section(scenario, "reduction"), _section(scenario, "failure")
     standard = Settings()
     return Settings(
-        name=plain(scenario.get("name", standard.name)),
-        algorithm=plain(reduction.get("algorithm", standard.algorithm)),
-        pair=plain(reduction.get("pair", standard.pair)),
-        growth=plain(reduction.get("growth", standard.growth)),
+        name=_plain(scenario.get("name", standard.name)),
+        algorithm=_plain(reduction.get("algorithm", standard.algorithm)),
+        pair=_plain(reduction.get("pair", standard.pair)),
+        growth=_plain(reduction.get("growth", standard.growth)),
         iterations=_number(reduction, "iterations", standard.iterations),
         baseline_runs=_number(reduction, "baseline_runs", standard.baseline_runs),
         epsilon=_number(failure, "epsilon", standard.epsilon),
@@ -48,3 +48,7 @@ def _section(data: dict[str, Any], key: str) -> dict[str, Any]:
 def _number(data: dict[str, Any], key: str, standard: Any) -> Any:
     value = data.get(key, standard)
     return value if isinstance(value, (int, float)) else standard
+
+
+def _plain(value: Any) -> str:
+    return printable(" ".join(str(value).split()))

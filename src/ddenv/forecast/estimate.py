@@ -10,11 +10,10 @@ from itertools import islice
 from random import Random
 from typing import Any
 
+from ddenv.forecast.rehearse import Begun, Method, Play, ddenv, running_sum
+from ddenv.forecast.rehearse_others import ddmin, splitting
+from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.rehearse import Begun, Method, Play, ddenv, running_sum
-from ddenv.workbench.rehearse_others import ddmin, splitting
-from ddenv.workbench.settings import settings
 
 # How likely one, two, ... models are needed of a world of up to so many; more in a larger one.
 NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
@@ -78,16 +77,18 @@ def expect(
     return Expected(math.floor(low), round(middle), math.ceil(high))
 
 
-def remaining(snapshot: Snapshot) -> Remaining | None:
-    """What is left of the run; None before it began, when it ended, and while what is left is confirmed."""
-    state = snapshot.state
+def remaining(state: RunState, at_work: bool) -> Remaining | None:
+    """What is left of a run; None before it began, when it ended, and while what is left is confirmed.
+
+    Without an engine `at_work` nothing runs, and nobody can tell how long it will take.
+    """
     if state.ended or state.confirming or state.status == "created" or not state.environment:
         return None
     moment, done = _moment(state)
     left = _played(moment, DURING)
     if left is None:
         return None
-    running = len(snapshot.running)
+    running = len(state.running_tests) if at_work else 0
     tests = [max(running, part * wider - done) for part, wider in zip(left, WIDER, strict=True)]
     if state.baseline is None:
         runs = _whole(settings(state).baseline_runs, 0, 10)
@@ -95,7 +96,7 @@ def remaining(snapshot: Snapshot) -> Remaining | None:
     if state.budget is not None:
         tests = [min(each, max(0, state.budget - state.tests_done)) for each in tests]
     low, middle, high = math.floor(tests[0]), math.floor(tests[1] + 0.5), math.ceil(tests[2])
-    return Remaining((low, middle, high), _seconds(snapshot, (low, middle, high)))
+    return Remaining((low, middle, high), _seconds(state, at_work, (low, middle, high)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,9 +257,8 @@ def _needed(random: Random, moment: _Moment) -> int:
     return min(moment.size, max(1, moment.least))
 
 
-def _seconds(snapshot: Snapshot, tests: Sequence[int]) -> Three | None:
-    state = snapshot.state
-    if snapshot.engine != "alive" or state.paused or state.waiting_candidate is not None:
+def _seconds(state: RunState, at_work: bool, tests: Sequence[int]) -> Three | None:
+    if not at_work or state.paused or state.waiting_candidate is not None:
         return None
     finished = (test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished)
     times = [each for each in islice(finished, LATEST) if each > 0]
