@@ -18,6 +18,7 @@ from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
+from ddenv.engine.shared import SharingPool, simulator, tests_of_others
 from ddenv.errors import UserError
 from ddenv.launch.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.launch.runs import read_parts
@@ -31,6 +32,7 @@ def main() -> int:
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument("--share", type=Path, help="folder of other runs; tests that they have made are taken over")
     parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -60,6 +62,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         _begin(journal, jobs, options.accept_mode)
         control = Control(journal, terminated, options.since)
         pool = Pool(scenario, world, robot, jobs)
+        if options.share is not None:
+            pool = SharingPool(pool, tests_of_others(file, scenario, options.share))
         try:
             Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
         finally:
@@ -86,7 +90,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     # First, since until the last event before it another engine worked.
-    journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__)
+    journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__, simulator=simulator())
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
         journal.record("accept_mode", mode=accept_mode)

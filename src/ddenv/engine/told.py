@@ -17,7 +17,7 @@ def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[s
     `failures` are f, and what the user took for as good; the nearest one counts.
     `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None. `cut` says that it
-    was ended before its time because the robot was stuck for good.
+    was ended before its time because the robot was stuck for good, `taken` from which other run it was taken over.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
@@ -28,6 +28,7 @@ def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[s
         judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
     pose = [float(value) for value in result.end_pose]
+    taken = {"taken": result.taken} if result.taken else {}
     return {
         "outcome": outcome,
         "failure": result.failure,
@@ -38,6 +39,7 @@ def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[s
         "first_sensed": _to_ms(result.first_sensed),
         "first_touched": _to_ms(result.first_touched),
         "cut": result.cut,
+        **taken,
     }
 
 

@@ -6,12 +6,19 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from ddenv.errors import UserError
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.store import RunFile
 
 # How the engine's own lines in its log begin, among whatever libraries print there; and its first one.
 ENGINE_SAYS = "ddenv engine:"
 ENGINE_STARTED = "started"
+# How long engines that were asked to stop may take to write their last event, s.
+STOP_WAIT = 15.0
 # The last line of a traceback.
 PYTHON_SAYS = re.compile(r"[\w.]*(Error|Exception)(:|$)")
 
@@ -21,11 +28,26 @@ def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
 
     Its output goes to a log beside the run file. `options` become `--name value` on its command line.
     """
-    words = [sys.executable, "-m", "ddenv.engine", str(run), "--jobs", str(jobs), "--since", repr(time.time())]
-    for name, value in options.items():
-        words += [f"--{name.replace('_', '-')}", str(value)]
+    words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--since", repr(time.time())]
+    # What begins with a dash is a name all the same.
+    words += [*(f"--{name.replace('_', '-')}={value}" for name, value in options.items()), "--", str(run)]
     with run.with_name(f"{run.name}.log").open("ab") as log:
         return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+
+
+def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen]]) -> None:
+    """Asks all of them to stop, and waits until they have; what was tested stays in their runs."""
+    for file, engine in engines:
+        try:
+            file.send("stop")
+        except UserError:
+            engine.terminate()
+    deadline = time.monotonic() + STOP_WAIT
+    for file, engine in engines:
+        while engine.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.05)
+        if engine.poll() is None and engine_is_alive(file.path):
+            engine.terminate()
 
 
 def last_words(run: Path) -> str:

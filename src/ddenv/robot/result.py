@@ -24,6 +24,7 @@ class RunResult:
     `first_sensed` and `first_touched` tell by name when (s) the robot first had a model in view or touched it, and when it
     first touched it; models that it never did are absent. Every model that was touched was sensed by then.
     `cut` says that the run was ended before its time because the robot was stuck for good.
+    `taken` names the run that it was taken over from, "" where it was made.
     """
 
     outcome: str
@@ -36,6 +37,7 @@ class RunResult:
     first_sensed: dict[str, float] = field(default_factory=dict)
     first_touched: dict[str, float] = field(default_factory=dict)
     cut: bool = False
+    taken: str = ""
 
     @property
     def end_pose(self) -> tuple[float, ...]:

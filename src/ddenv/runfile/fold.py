@@ -3,12 +3,13 @@
 The kinds of events, with their data (models are numbers into the run's `elements`):
 
     created              scenario {...}, elements [names]
-    engine_started       pid, jobs, version (of ddenv, absent in older files)
+    engine_started       pid, jobs, version (of ddenv), simulator (what computes); both absent in older files
     test_started         test, phase, round, candidate, run, seed; where phase is "confirm" also without: model or null,
                          where it is "hand" trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]] (both absent in files of version 1),
-                         cut (absent before version 3); trajectories beside it
+                         cut (absent before version 3), taken: the run that it was taken over from (absent where it was
+                         made); trajectories beside it
     test_lost            test: it was running when the engine died
     baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
     leg_started          round: the number of the next one, n_partitions: a new search begins after the user changed something
@@ -101,6 +102,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "confirming": False,
         "jobs": int(data["jobs"]),
         "engine_version": str(data.get("version", "")),
+        "simulator": str(data.get("simulator", "")),
         "started_at": at,
         "working_seconds": state.working_seconds + spent,
     }

@@ -49,6 +49,7 @@ def test_finished(state: RunState, data: Data, _: float) -> Changes:
         "first_sensed": moments(state.elements, data.get("first_sensed", ())),
         "first_touched": moments(state.elements, data.get("first_touched", ())),
         "cut": bool(data.get("cut", False)),
+        "taken": bool(data.get("taken", "")),
     }
     return _with_test(state, int(data["test"]), values)
 

@@ -18,18 +18,24 @@ def _lock_path(run: Path) -> Path:
 @contextmanager
 def engine_lock(run: Path):
     """Holds the run's lock. Raises UserError while another engine has it."""
+    taken = f"{run}: another engine works on this run; attach to it with 'ddenv open {run}'"
+    with held(_lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder of yours"):
+        yield
+
+
+@contextmanager
+def held(lock: Path, taken: str, refused: str, instead: str):
+    """Holds the file `lock`. Raises UserError: `taken` while another process has it, `refused` where it cannot be made."""
     try:
-        handle = os.open(_lock_path(run), os.O_RDWR | os.O_CREAT, 0o644)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
-        raise UserError(
-            f"{run}: no engine can work here: {error.strerror}; copy the run to a folder of yours"
-        ) from None
+        raise UserError(f"{refused}: {error.strerror}; {instead}") from None
     try:
         # A viewer that looks whether an engine is at work holds the lock for an instant.
         deadline = time.monotonic() + 1.0
         while not _try(handle, fcntl.LOCK_EX):
             if time.monotonic() > deadline:
-                raise UserError(f"{run}: another engine works on this run; attach to it with 'ddenv open {run}'")
+                raise UserError(taken)
             time.sleep(0.02)
         yield
     finally:

@@ -25,7 +25,7 @@ class Test:
     the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see
     `ddenv.runfile.failures`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the
     simulated time it was first so, s; empty in files of version 1. `cut` says that it was ended before its time because the
-    robot was stuck for good.
+    robot was stuck for good, `taken` that it was taken over from another run that had made it.
     """
 
     id: int
@@ -45,6 +45,7 @@ class Test:
     cut: bool = False
     without: str | None = None
     trial: int | None = None
+    taken: bool = False
 
     @property
     def is_finished(self) -> bool:
@@ -178,6 +179,7 @@ class RunState:
     `trials` are the user's own selections, `decisions` all that the user decided. The ends of `failures`
     (tests) count as f in this node.
     `lower_bound`: at least so many models are needed, as far as f shows wherever all that it needs is there.
+    `engine_version` is that of the ddenv that worked on it last, `simulator` what it computed with.
     `refusal` is the last command that the engine could not obey, with its reason.
     `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how
     long engines have worked on it up to their ends, s; `started_at` (Unix time, s) is set while one works.
@@ -212,6 +214,7 @@ class RunState:
     last_command: int = 0
     refusal: tuple[int, str] = (0, "")
     engine_version: str = ""
+    simulator: str = ""
     jobs: int = 0
     working_seconds: float = 0.0
     started_at: float | None = None

@@ -73,6 +73,8 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
     os.close(handle)
     try:
         connection = sqlite3.connect(name, isolation_level=None)
+        # It has another name until all of it is on the disk: no step on the way has to be.
+        connection.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
         connection.executescript(_SCHEMA)
         connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
         first = (time.time(), "created", json.dumps(created, allow_nan=False))
@@ -80,6 +82,8 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         connection.close()
+        with Path(name).open("rb") as file:
+            os.fsync(file.fileno())
         # As any new file: temporary ones are for their owner alone.
         os.umask(mask := os.umask(0))
         Path(name).chmod(0o666 & ~mask)

@@ -1,0 +1,172 @@
+"""Tests that other runs have made already, of the same models with the same seed in the same simulator: they are taken over.
+
+A simulation is deterministic to the last bit, so that a test which is taken over is the test that would be made. Simulators and
+controllers that are not ours may not be, and nothing is taken over of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.pool import Broken, Pool
+from ddenv.errors import UserError
+from ddenv.launch.folder import SUFFIX
+from ddenv.robot.result import RunResult
+from ddenv.runfile.state import Test
+from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.version import __version__
+from ddenv.world.scenario import Scenario
+
+OURS = ("straight", "costmap")
+# What the physics, the noise and the navigation are computed with.
+PACKAGES = ("drake", "numpy", "scipy")
+
+Key = tuple[Keep, int, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a test is written down: a finished one of a run file."""
+
+    path: Path
+    test: Test
+
+
+def simulator() -> str:
+    """What a test is computed with, so far as its bits may depend on it."""
+    told = []
+    for name in PACKAGES:
+        try:
+            told.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            told.append(f"no {name}")
+    return ", ".join(told)
+
+
+def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key, Place]:
+    """What the other runs in `folder` have tested, by models, seed, and whether it is a run to the end."""
+    if scenario.oracle is not None or scenario.controller.use not in OURS:
+        return {}
+    known: dict[Key, Place] = {}
+    for path in sorted(folder.glob(f"*{SUFFIX}")):
+        if path.resolve() == run.path.resolve():
+            continue
+        try:
+            with RunFile(path) as other:
+                known |= dict(_tests_of(other)) if _is_alike(run, other) else {}
+        except UserError:
+            # What cannot be read is of no use.
+            continue
+    return known
+
+
+def _tests_of(other: RunFile) -> Iterator[tuple[Key, Place]]:
+    journal = Journal(other)
+    for (keep, _, full), number in journal.ledger.items():
+        test = journal.state.tests[number - 1]
+        if test.outcome in ("pass", "similar", "other", "failed"):
+            yield (keep, test.seed, full), Place(other.path, test)
+
+
+def _is_alike(run: RunFile, other: RunFile) -> bool:
+    """Whether tests of the same models and the same seed are the same in both runs."""
+    first, second = ([event.data for event in file.events(most=1)] for file in (run, other))
+    if not first or not second:
+        return False
+    (first,), (second,) = first, second
+    asked, elements = _asked(first.get("scenario")), first.get("elements")
+    if asked is None or asked != _asked(second.get("scenario")) or elements != second.get("elements"):
+        return False
+    if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
+        return False
+    engines = [event.data for event in other.events() if event.kind == "engine_started"]
+    return {(data.get("version"), data.get("simulator")) for data in engines} == {(__version__, simulator())}
+
+
+def _asked(scenario: Any) -> Any:
+    """A scenario without how its world is reduced, and without where its files are: what they hold is compared."""
+    if not isinstance(scenario, dict):
+        return None
+    kept = {
+        key: value
+        for key, value in scenario.items()
+        if key not in ("name", "description", "reduction", "world", "folder")
+    }
+    robot = kept.get("robot")
+    if not isinstance(robot, dict):
+        return None
+    return kept | {"robot": {key: value for key, value in robot.items() if key != "model"}}
+
+
+class SharingPool:
+    """`pool` for what is new; what is `known` has its result at once, and takes no worker."""
+
+    def __init__(self, pool: Pool, known: dict[Key, Place]) -> None:
+        self._pool = pool
+        self._known = known
+        self._ready: list[tuple[int, RunResult | Broken]] = []
+
+    @property
+    def idle(self) -> int:
+        """How many more tests can start now."""
+        return self._pool.idle
+
+    @property
+    def busy(self) -> int:
+        return self._pool.busy + len(self._ready)
+
+    def submit(self, test: int, keep: Keep, seed: int, full: bool = True) -> None:
+        """Takes the test over, or starts it on an idle worker."""
+        result = _result(self._known.pop((keep, seed, full), None))
+        if result is None:
+            self._pool.submit(test, keep, seed, full)
+        else:
+            self._ready.append((test, result))
+
+    def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
+        """Tests that have ended, waiting at most `seconds` for one."""
+        ready, self._ready = self._ready, []
+        return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
+
+    def live(self) -> list[Live]:
+        """The running tests that have begun to move."""
+        return self._pool.live()
+
+    def close(self) -> None:
+        """Kills what runs."""
+        self._pool.close()
+
+
+def _result(place: Place | None) -> RunResult | None:
+    """What came of a test; None where that cannot be read any more."""
+    if place is None:
+        return None
+    test = place.test
+    try:
+        with RunFile(place.path) as other:
+            motions = {name: np.array(rows).reshape(-1, COLUMNS) for name, rows in other.motions(test.id).items()}
+    except UserError:
+        return None
+    trajectory = motions.pop(ROBOT, None)
+    if trajectory is None or not len(trajectory):
+        return None
+    return RunResult(
+        outcome="pass" if test.outcome == "pass" else "failed",
+        failure=test.failure,
+        trajectory=trajectory,
+        motions=motions,
+        simulated_seconds=test.simulated_seconds,
+        wall_seconds=test.wall_seconds,
+        seed=test.seed,
+        first_sensed=dict(test.first_sensed),
+        first_touched=dict(test.first_touched),
+        cut=test.cut,
+        taken=place.path.stem,
+    )
