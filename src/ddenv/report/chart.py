@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from ddenv.map.ticks import tick_step, tick_text, ticks
 from ddenv.runfile.state import Point, RunState
@@ -21,8 +22,9 @@ def chart(state: RunState) -> str:
     last = max(1, state.tests_done, *(point.tests for point in state.history))
     most = max(1, *(point.models for point in state.history))
     points = _thinned(state.history)
-    models = _steps([(point.tests, point.models) for point in points], last)
-    needed = _steps([(point.tests, point.needed) for point in points], last)
+    points = [*points, replace(points[-1], tests=last)]
+    models = steps([(point.tests, point.models) for point in points])
+    needed = steps([(point.tests, point.needed) for point in points])
 
     def at(tests: float, number: float) -> tuple[float, float]:
         x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
@@ -33,7 +35,7 @@ def chart(state: RunState) -> str:
     bound = "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*each) for each in needed))
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}">',
-        *_axes(at, last, most),
+        *axes(at, last, most),
         f'<path class="area" d="M{first:.1f} {floor:.1f}L{line}L{end:.1f} {floor:.1f}Z"/>',
         f'<path class="steps" d="M{line}"/>',
     ]
@@ -49,17 +51,18 @@ def _thinned(history: Sequence[Point]) -> list[Point]:
     return [*history[:-1:step], *history[-1:]]
 
 
-def _steps(points: Sequence[tuple[int, int]], last: int) -> Steps:
+def steps(points: Sequence[tuple[int, int]]) -> Steps:
     """Corners: each number holds until the next one."""
     corners: Steps = []
     for tests, number in points:
         if corners:
             corners.append((tests, corners[-1][1]))
         corners.append((tests, number))
-    return [*corners, (last, corners[-1][1])]
+    return corners
 
 
-def _axes(at, last: int, most: int) -> Iterator[str]:
+def axes(at: Callable[[float, float], tuple[float, float]], last: int, most: int) -> Iterator[str]:
+    """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and of models, pixels."""
     step = max(1.0, tick_step(most, 6))
     for value in ticks(0, most, step):
         left, y = at(0, value)

@@ -40,10 +40,10 @@ MOST_POLYGONS = 20_000
 CROSS = 4.0
 
 
-def picture(record: Record, models: Sequence[Drawn]) -> str:
-    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`."""
+def picture(record: Record, models: Sequence[Drawn], name: str = "all") -> str:
+    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` tells maps of one page apart."""
     points = [point for point in _places(record) if point is not None]
-    return _picture(record, models, _frame(models, points, LEAST), "all")
+    return _picture(record, models, _frame(models, points, LEAST), name)
 
 
 def close_up(record: Record, models: Sequence[Drawn]) -> str:
