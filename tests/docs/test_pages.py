@@ -70,7 +70,7 @@ def test_the_guide_has_the_defaults(key: str, section: type[Section]):
     assert float(re.match(r"[\d.]+", row.split(" | ")[-1]).group()) == default
 
 
-@pytest.mark.parametrize("name", ["run", "test"])
+@pytest.mark.parametrize("name", ["run", "test", "study"])
 def test_the_guide_names_every_option(name):
     options = {
         option for parameter in app.commands[name].params for option in parameter.opts if option.startswith("--")

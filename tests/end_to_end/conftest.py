@@ -1,9 +1,11 @@
-"""What all end-to-end tests need: terminals that are closed again."""
+"""What all end-to-end tests need: terminals that are closed again, and engines that are stopped."""
 
 import shutil
 
 import pytest
 
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.store import RunFile
 from tests.end_to_end.terminal import Terminal
 
 
@@ -22,3 +24,8 @@ def terminal(tmp_path):
         # Shown where the test failed.
         print(each.screen())
         each.kill()
+    # An engine outlives its terminal.
+    for path in tmp_path.rglob("*.ddenv"):
+        if engine_is_alive(path):
+            with RunFile(path) as run:
+                run.send("stop")

@@ -14,9 +14,10 @@ from typing import Any
 import click
 
 from ddenv.cli.config import config_command
-from ddenv.cli.options import JOBS, reading_options, reduction_options, scenario_options
+from ddenv.cli.options import JOBS, method_options, reading_options, scenario_options, search_options
 from ddenv.cli.schemas import schemas_command
 from ddenv.cli.serve import serve_command
+from ddenv.cli.study import study_command
 from ddenv.cli.world import world_group
 from ddenv.errors import UserError, printable
 from ddenv.version import __version__
@@ -51,7 +52,8 @@ def app(context: click.Context, **reading) -> None:
 @click.argument("scenario")
 @scenario_options
 @reading_options
-@reduction_options
+@method_options
+@search_options
 @click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Tests at the same time.")
 @click.option("--name", help="Name of the run.")
 @click.option(
@@ -303,11 +305,12 @@ app.add_command(world_group)
 app.add_command(schemas_command)
 app.add_command(config_command)
 app.add_command(serve_command)
+app.add_command(study_command)
 
 
 def main() -> None:
     # A terminal that lacks a letter of a model's name shows its number instead.
-    for stream in (sys.stdout, sys.stderr):
+    for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="backslashreplace")
     try:
         code = app(standalone_mode=False)

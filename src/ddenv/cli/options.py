@@ -75,14 +75,25 @@ def reading_options(command):
     return command
 
 
-def reduction_options(command):
-    """How the world is reduced, in place of what the scenario says: what is left out stays the scenario's."""
+def method_options(command):
+    """By which method one world is reduced, in place of what the scenario says."""
     for option in reversed(
         (
             click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal."),
             click.option("--algorithm", help="How the environment is searched; 'ddenv schemas' lists all."),
-            click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure."),
             click.option("--budget", type=click.IntRange(0), help="The most tests in all; 0: any number."),
+            click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def search_options(command):
+    """How candidates are tried and judged, in place of what the scenario says: what is left out stays the scenario's."""
+    for option in reversed(
+        (
+            click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure."),
             click.option("--baseline-runs", type=int, help="Runs of the whole world before the first round."),
             click.option("--n-partitions", type=int, help="Partitions in the first round."),
             click.option("--delta", type=float, help="Change of the angular velocity where trajectoryseg cuts, rad/s."),
@@ -106,7 +117,6 @@ def reduction_options(command):
                 default=None,
                 help="End a test when the robot is stuck for good; full runs confirm what is left.",
             ),
-            click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i."),
         )
     ):
         command = option(command)

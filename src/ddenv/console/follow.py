@@ -10,16 +10,13 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import UserError, printable
-from ddenv.launch.programs import last_words
+from ddenv.launch.programs import last_words, stop_engines
 from ddenv.runfile.fold import apply, fold
-from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.words import headline, news
 
 POLL = 0.2
-# How long an engine that was asked to stop may take to write its last event, s.
-STOP_WAIT = 15.0
 
 
 class Interrupted(Exception):
@@ -44,7 +41,7 @@ def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
                 time.sleep(POLL)
         except KeyboardInterrupt:
             with contextlib.suppress(KeyboardInterrupt):
-                _stop(file, engine)
+                stop_engines([(file, engine)])
             state = _update(file, state, view)
             view.close()
             raise Interrupted(state) from None
@@ -61,18 +58,6 @@ def follow(path: Path, engine: subprocess.Popen, out: TextIO) -> RunState:
 
 def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
-
-
-def _stop(file: RunFile, engine: subprocess.Popen) -> None:
-    try:
-        file.send("stop")
-    except UserError:
-        engine.terminate()
-    deadline = time.monotonic() + STOP_WAIT
-    while engine.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.05)
-    if engine.poll() is None and engine_is_alive(file.path):
-        engine.terminate()
 
 
 def _update(file: RunFile, state: RunState, view: _Line | _Plain) -> RunState:

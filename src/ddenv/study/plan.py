@@ -1,0 +1,184 @@
+"""What a study consists of: cells, each one reduction of a scenario by an algorithm with a pair, from one seed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from ddenv import schemas
+from ddenv.errors import UserError
+from ddenv.launch.scenarios import with_options
+from ddenv.world.load import find_scenario, load_scenario
+from ddenv.world.scenario import Scenario
+
+# The scenarios and the pairs of the paper's Tables II to IV, in their order.
+SCENARIOS = ("ditch", "rubble", "friction")
+PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
+# A seed is less.
+MOST_SEED = 2**31
+# What would not do in the name of a file.
+NO_NAME = re.compile(r"[^\w-]+")
+# Bytes of a scenario's name in the names of files.
+LONGEST_NAME = 80
+# What is asked of the search where neither the scenario nor the user says otherwise, as in the library: fewer tests, and the
+# same end. With "paper" and "known" it is the paper's algorithm to the letter.
+FEWER_TESTS = {"growth": "steady", "skip": "implied"}
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """An algorithm with the parts of the pair that it looks at."""
+
+    algorithm: str
+    pair: str
+
+    @property
+    def parts(self) -> tuple[str, str]:
+        """The partitioning and the prioritization, "" for what the algorithm does not look at."""
+        parts = dict(zip(schemas.BOTH, self.pair.split("/"), strict=True))
+        partitioning, prioritization = (parts[k] if k in schemas.uses(self.algorithm) else "" for k in schemas.BOTH)
+        return partitioning, prioritization
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The names of those that it looks at."""
+        return tuple(filter(None, self.parts))
+
+    @property
+    def label(self) -> str:
+        """In short: the pair of `ddenv`, or the algorithm's name with what it looks at."""
+        words = "/".join(self.used)
+        if self.algorithm == "ddenv":
+            return words
+        return f"{self.algorithm} {words}".strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One reduction. `seed` is that of its first run; `scenario` has all that is asked for, the seed and the method included."""
+
+    scenario: Scenario
+    method: Method
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """The name of its run file, without the ending."""
+        words = (self.method.algorithm, *self.method.used, f"seed-{self.seed}")
+        return "_".join((file_name(self.scenario), *(NO_NAME.sub("-", word) for word in words)))
+
+    @property
+    def label(self) -> str:
+        """Its name for people, without its seed."""
+        return f"{self.scenario.name} {self.method.label}"
+
+
+def file_name(scenario: Scenario) -> str:
+    """A scenario's name as a part of files' names: as much of it as file systems take beside the rest."""
+    return NO_NAME.sub("-", scenario.name.encode()[:LONGEST_NAME].decode(errors="ignore"))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A whole study: `scenarios` as they are in their files, `methods` in the order of the tables, so many `seeds` each."""
+
+    scenarios: tuple[Scenario, ...]
+    methods: tuple[Method, ...]
+    seeds: int
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """All cells in the order of the tables."""
+        return tuple(
+            _cell(scenario, method, number)
+            for scenario in self.scenarios
+            for method in self.methods
+            for number in range(self.seeds)
+        )
+
+
+def make_plan(
+    scenarios: Sequence[str] = (), pairs: str = "paper", algorithms: str = "ddenv", seeds: int = 1, **options: Any
+) -> Plan:
+    """The study that these words ask for; each may hold several names separated by commas. Raises UserError.
+
+    `options` are those of `ddenv.launch.scenarios.with_options` for all of it.
+    """
+    names = _names("--scenarios", ",".join(scenarios)) if scenarios else SCENARIOS
+    chosen_pairs, chosen_algorithms = _pairs(pairs), _algorithms(algorithms)
+    loaded = tuple(_loaded(name, options) for name in names)
+    for number, scenario in enumerate(loaded):
+        if scenario.name in (other.name for other in loaded[:number]):
+            raise UserError(f"--scenarios: two of them are called '{scenario.name}'; give each a name of its own")
+    plan = Plan(loaded, tuple(_methods(chosen_algorithms, chosen_pairs)), seeds)
+    if len({cell.name for cell in plan.cells}) < len(plan.cells):
+        raise UserError("--scenarios: the names of two of them make the same file names; give each a name of its own")
+    return plan
+
+
+def _loaded(name: str, options: dict[str, Any]) -> Scenario:
+    scenario = load_scenario(find_scenario(name))
+    said = scenario.reduction.model_fields_set
+    unsaid = {key: value for key, value in FEWER_TESTS.items() if key not in said}
+    given = {key: value for key, value in options.items() if value is not None}
+    return with_options(scenario, **{**unsaid, **given})
+
+
+def _names(option: str, words: str) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(word.strip() for word in words.split(",") if word.strip()))
+    if not names:
+        raise UserError(f"{option}: expected names separated by commas; found '{words}'")
+    return names
+
+
+def _pairs(words: str) -> tuple[str, ...]:
+    given = _names("--pairs", words)
+    named = {"paper": PAIRS, "all": schemas.pairs()}
+    pairs = tuple(dict.fromkeys(pair for name in given for pair in named.get(name, (name,))))
+    for pair in pairs:
+        try:
+            schemas.split_pair(pair)
+        except UserError as error:
+            raise UserError(f"--pairs: {error}; or give 'paper' or 'all'") from None
+    return pairs
+
+
+def _algorithms(words: str) -> tuple[str, ...]:
+    given = _names("--algorithms", words)
+    algorithms = tuple(dict.fromkeys(name for each in given for name in _all_if_asked(each)))
+    for algorithm in algorithms:
+        try:
+            schemas.check("algorithm", algorithm)
+        except UserError as error:
+            raise UserError(f"--algorithms: {error}; or give 'all'") from None
+    return algorithms
+
+
+def _all_if_asked(algorithm: str) -> tuple[str, ...]:
+    return schemas.names("algorithm") if algorithm == "all" else (algorithm,)
+
+
+def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method]:
+    """Each that differs in what it looks at."""
+    seen = set()
+    for algorithm in algorithms:
+        for pair in pairs:
+            method = Method(algorithm, pair)
+            if (algorithm, method.used) not in seen:
+                seen.add((algorithm, method.used))
+                yield method
+
+
+def _cell(scenario: Scenario, method: Method, number: int) -> Cell:
+    """Seeds are so far apart that no two cells of a scenario share a run but where they share all."""
+    reduction = scenario.reduction
+    seed = reduction.seed + number * max(reduction.baseline_runs, 1 + reduction.iterations)
+    if seed >= MOST_SEED:
+        raise UserError(
+            f"--seeds: the last seed of {scenario.name} would be {seed}; it has to be less than {MOST_SEED}"
+        )
+    asked = reduction.model_copy(update={"algorithm": method.algorithm, "pair": method.pair, "seed": seed})
+    return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)

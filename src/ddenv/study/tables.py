@@ -1,0 +1,149 @@
+"""The section of a scenario: the paper's table with its own numbers beside ours, what is behind them, and the figures."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from ddenv.report.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Table, plain, say
+from ddenv.report.numbers import percent
+from ddenv.study.figure import chart
+from ddenv.study.found import Found
+from ddenv.study.paper import TABLES, theirs
+from ddenv.study.plan import file_name
+from ddenv.study.rows import Group, Row, spread
+from ddenv.study.worlds import worlds
+from ddenv.words import count
+
+# So many models that are left are named.
+MOST_NAMES = 8
+# What is behind the numbers of more methods than this is told in a sentence for each set of models that is left.
+MOST_ROWS = 12
+# So many cells with the same problem are named.
+MOST_CELLS = 3
+
+
+def section(folder: Path, group: Group) -> Section:
+    """All about one scenario."""
+    name = plain(group.scenario.name)
+    number = TABLES.get(name)
+    models = f", {count(group.models, 'model')}" if group.models else ""
+    title = f"{name}{models}" + (f" (Table {number} of the paper)" if number and _has_theirs(group) else "")
+    blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
+    blocks.append(numbers(group))
+    blocks += _problems(group)
+    if group.minimal:
+        blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
+        told = "Models left after each test, a line for each method (the paper's Figure 2):"
+        blocks += [say(told), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), told)]
+    blocks += worlds(folder, group, file_name(group.scenario))
+    return Section(title, tuple(blocks))
+
+
+def numbers(group: Group) -> Table:
+    """Tests, reduction and minutes, with the paper's where it has some."""
+    beside = _has_theirs(group)
+    head: tuple[str, ...] = ("partitioning, prioritization", "tests", "% reduction", "minutes")
+    if beside:
+        head = (head[0], "tests", "paper", "% reduction", "paper", "minutes", "paper")
+    rows = tuple(_numbers(row, beside) for row in group.rows)
+    return Table(head, rows, frozenset(range(1, len(head))))
+
+
+def _numbers(row: Row, beside: bool) -> tuple[Cell, ...]:
+    minimal = row.minimal
+    tests = spread([each.tests for each in minimal], _whole)
+    smaller = spread([each.smaller for each in minimal], percent)
+    minutes = spread([each.seconds / 60 for each in minimal], _minutes)
+    if not beside:
+        return row.method.label, tests, smaller, minutes
+    paper = theirs(row.found[0].cell)
+    beside_it = ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
+    return row.method.label, tests, beside_it[0], smaller, beside_it[1], minutes, beside_it[2]
+
+
+def _whole(value: float) -> str:
+    return f"{value:.0f}" if value == int(value) else f"{value:.1f}"
+
+
+def _minutes(value: float) -> str:
+    return f"{value:.1f}"
+
+
+def _has_theirs(group: Group) -> bool:
+    return any(theirs(row.found[0].cell) is not None for row in group.rows)
+
+
+def behind(group: Group) -> Table:
+    """What the numbers rest on: re-runs, how often the whole world fails, what is left, and what came of trying that again."""
+    head = ("method", "re-runs", "f in the whole world", "models left", "left out once more", "least tests")
+    return Table(head, tuple(_behind(row) for row in group.rows), frozenset({1, 2, 5}))
+
+
+def _in_short(group: Group) -> Iterator[Paragraph]:
+    """The same of many methods, a sentence for each set of models that is left."""
+    sets: dict[tuple[str, ...], list[Found]] = {}
+    for each in group.minimal:
+        sets.setdefault(each.left, []).append(each)
+    for left, cells in sets.items():
+        reruns = spread([each.reruns / each.tests for each in cells], percent)
+        words = f" are left in {len(cells)} of {count(len(group.minimal), 'cell')}; re-runs {reruns} of the tests; "
+        yield say(*_names(left), f"{words}left out once more: {_again(tuple(cells))}.")
+
+
+def _behind(row: Row) -> tuple[Cell, ...]:
+    minimal = row.minimal
+    reruns = spread([each.reruns / each.tests for each in minimal if each.tests], percent)
+    bound = "–" if row.bound is None else f"{row.bound:g}"
+    return row.method.label, reruns, _rate(row), _left(minimal), _again(minimal), bound
+
+
+def _rate(row: Row) -> str:
+    runs = sum(each.baseline_runs for each in row.found)
+    return f"{sum(each.baseline.failures for each in row.found if each.baseline)} of {runs}" if runs else "–"
+
+
+def _left(minimal: tuple[Found, ...]) -> Cell:
+    """Each set of models that is left, the most frequent first."""
+    if not minimal:
+        return "–"
+    sets = Counter(each.left for each in minimal)
+    words: list[Part] = []
+    for left, times in sets.most_common():
+        words += ["; " if words else "", *_names(left)]
+        words += [f" ({times} of {len(minimal)})"] if len(sets) > 1 else []
+    return tuple(words)
+
+
+def _names(left: tuple[str, ...]) -> Iterator[Part]:
+    if not left:
+        yield "none"
+    for number, name in enumerate(left[:MOST_NAMES]):
+        yield ", " if number else ""
+        yield Name(name)
+    if len(left) > MOST_NAMES:
+        yield f" and {len(left) - MOST_NAMES} more"
+
+
+def _again(minimal: tuple[Found, ...]) -> str:
+    """f with all that is left, and without each, with new seeds."""
+    checks = [each.check for each in minimal if each.check is not None]
+    if not checks:
+        return "–"
+    shown, runs = sum(check.shown for check in checks), sum(check.runs for check in checks)
+    without = sum(sum(check.without.values()) for check in checks)
+    of_them = sum(check.runs * len(check.without) for check in checks)
+    return f"f in {without} of {of_them}; with all in {shown} of {runs}"
+
+
+def _problems(group: Group) -> Iterator[Paragraph]:
+    """What has no minimal environment, and why: said, not hidden."""
+    cells: dict[str, list[str]] = {}
+    for row in group.rows:
+        for each in row.found:
+            if problem := plain(each.trouble).rstrip("."):
+                cells.setdefault(problem, []).append(f"{row.method.label}, seed {each.cell.seed}")
+    for problem, names in cells.items():
+        which = "; ".join(names) if len(names) <= MOST_CELLS else count(len(names), "cell")
+        yield say(f"{which}: {problem}.", notice=True)

@@ -1,0 +1,190 @@
+"""Makes the cells of a study: so many at the same time, each by an engine of its own, and goes on with what is there."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from ddenv.errors import UserError
+from ddenv.launch.programs import STOP_WAIT, last_words, start_engine, stop_engines
+from ddenv.launch.runs import create_run
+from ddenv.runfile.fold import fold
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import RunFile
+from ddenv.study.check import read_check, start_check, write_check
+from ddenv.study.folder import check_path, run_path
+from ddenv.study.plan import Cell
+from ddenv.study.same import difference
+
+POLL = 0.2
+# More workers than this mostly run ahead of one reduction in vain.
+PER_CELL = 2
+
+
+@dataclass
+class Work:
+    """A cell in work, with so many `workers`. `engine` is None while one works on it that another study started.
+
+    `problem` says why it could not be brought to its end this time. Before, `made_before` tests were made, and its last event was
+    number `known`.
+    """
+
+    cell: Cell
+    path: Path
+    workers: int
+    file: RunFile
+    state: RunState = field(default_factory=RunState)
+    engine: subprocess.Popen | None = None
+    check: tuple[subprocess.Popen, IO[str]] | None = None
+    problem: str = ""
+    made_before: int = 0
+    known: int = 0
+
+
+Look = Callable[[Sequence[Work], Sequence[Cell], Sequence[Work]], None]
+
+
+def is_done(folder: Path, cell: Cell) -> bool:
+    """Whether nothing is left to do for a cell. Raises UserError where its run file is of something else."""
+    path = run_path(folder, cell)
+    if not path.exists():
+        return False
+    try:
+        with RunFile(path) as file:
+            state = fold(file.events())
+            other = difference(file, cell)
+    except UserError as error:
+        raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
+    if other:
+        raise UserError(f"{path}: was made of {other}; choose another folder with -o, or delete {path.parent}")
+    if state.status != "finished" or _is_in_vain(state) or engine_is_alive(path):
+        return False
+    return not state.minimal or read_check(folder, cell, state.environment) is not None
+
+
+def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
+    """Makes `cells` with `jobs` workers in all; cells that take long should come first.
+
+    `look(running, waiting, ended)` is called several times a second. On KeyboardInterrupt the engines are stopped, and it
+    is raised again. Raises UserError where a run file cannot be made; the engines are stopped then, too.
+    """
+    waiting, running, ended = list(cells), [], []
+    # What is ignored stays so: a study under nohup outlives its terminal.
+    asked = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN]
+    before = [(each, signal.signal(each, _interrupt)) for each in asked]
+    try:
+        while waiting or running:
+            while waiting and (free := jobs - sum(each.workers for each in running)) > 0:
+                # What is left is shared out among the cells that are left.
+                workers = max(min(PER_CELL, free), free // len(waiting))
+                running.append(_begin(folder, waiting.pop(0), workers))
+            for each in tuple(running):
+                if _has_ended(folder, each):
+                    running.remove(each)
+                    ended.append(each)
+                    each.file.close()
+            look(running, waiting, ended)
+            if running:
+                time.sleep(POLL)
+    finally:
+        _stop(running)
+        # The terminal may be what is gone.
+        with contextlib.suppress(OSError):
+            look(running, waiting, ended)
+        for each in running:
+            each.file.close()
+        for each, handler in before:
+            signal.signal(each, handler)
+
+
+def _interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _begin(folder: Path, cell: Cell, workers: int) -> Work:
+    path = run_path(folder, cell)
+    if path.exists():
+        with RunFile(path) as file:
+            in_vain = _is_in_vain(fold(file.events()))
+        if in_vain:
+            path.unlink()
+    if not path.exists():
+        # What an earlier run of this name came to is not this one's.
+        check_path(folder, cell).unlink(missing_ok=True)
+        create_run(cell.scenario, path)
+    each = Work(cell, path, workers, RunFile(path))
+    each.state = fold(each.file.events())
+    each.made_before = made(each.state)
+    each.known = each.state.revision
+    if not engine_is_alive(path) and each.state.status != "finished":
+        each.engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
+    return each
+
+
+def _has_ended(folder: Path, each: Work) -> bool:
+    """Takes in what is new of a cell, and goes on to its check when its reduction has ended."""
+    if each.check is not None:
+        return _check_has_ended(folder, each)
+    # Asked before the events are read: what is written in between is not missed. An engine that a killed study has left may have
+    # begun just before ours, which then gave up.
+    at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
+    each.state = fold(each.file.events(each.state.revision), each.state)
+    if at_work:
+        return False
+    if each.state.status != "finished":
+        # An engine that died before it wrote anything has left the reason of the one before.
+        told = each.state.ended and each.state.revision > each.known
+        each.problem = each.state.reason if told else last_words(each.path)
+        return True
+    if not each.state.minimal or read_check(folder, each.cell, each.state.environment) is not None:
+        return True
+    each.check = start_check(each.path, each.cell, each.workers)
+    return False
+
+
+def _check_has_ended(folder: Path, each: Work) -> bool:
+    program, told = each.check
+    if program.poll() is None:
+        return False
+    try:
+        write_check(folder, each.cell, told)
+    except UserError as error:
+        each.problem = str(error)
+    told.close()
+    return True
+
+
+def _is_in_vain(state: RunState) -> bool:
+    """Whether the simulator broke in all baseline runs: it may have been mended since."""
+    broke = all(test.outcome in ("error", "timeout") for test in state.finished_tests)
+    return state.status == "finished" and state.baseline is None and broke
+
+
+def made(state: RunState) -> int:
+    """How many tests were made in a run, and not taken over from another one."""
+    return state.tests_done - sum(test.taken for test in state.tests)
+
+
+def _stop(running: Sequence[Work]) -> None:
+    """Engines write down that they stop; the runs of a check are made again another time."""
+    for each in running:
+        if each.check is not None:
+            each.check[0].terminate()
+    # Those without one are worked on by an engine that an earlier, killed study has left.
+    left = [each for each in running if each.check is None and each.engine is None and engine_is_alive(each.path)]
+    for each in left:
+        with contextlib.suppress(UserError):
+            each.file.send("stop")
+    stop_engines([(each.file, each.engine) for each in running if each.engine is not None])
+    deadline = time.monotonic() + STOP_WAIT
+    while time.monotonic() < deadline and any(engine_is_alive(each.path) for each in left):
+        time.sleep(POLL)
+    for each in running:
+        each.state = fold(each.file.events(each.state.revision), each.state)

@@ -1,0 +1,96 @@
+"""A study's folder is its own: anything else is refused in one line, and so is a second study."""
+
+import json
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.study.folder import ABOUT, RUNS, Sitting, machine, opened, sittings, versions, write_sittings
+from ddenv.version import __version__
+
+TIMES = (
+    Sitting(1.5e9, 12.5, 2, 40, "ddenv 1", "a machine, 2 cores"),
+    Sitting(1.6e9, 0.0, 4, 0, "ddenv 2", "\u05e9"),
+)
+
+
+def refused(folder):
+    with pytest.raises(UserError) as error, opened(folder):
+        pass
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_it_is_made_with_all_above_it_and_opened_again(tmp_path):
+    folder = tmp_path / "a" / "b"
+    for _ in range(2):
+        with opened(folder):
+            assert (folder / RUNS).is_dir()
+
+
+def test_one_that_was_killed_before_it_wrote_anything_is_opened_again(tmp_path):
+    with opened(tmp_path / "study"):
+        assert not (tmp_path / "study" / ABOUT).exists()
+    with opened(tmp_path / "study"):
+        pass
+
+
+def test_a_file_is_refused(tmp_path):
+    (tmp_path / "study").write_text("mine")
+    assert refused(tmp_path / "study") == f"{tmp_path}/study: is a file; give the name of a folder"
+    assert (tmp_path / "study").read_text() == "mine"
+
+
+def test_a_folder_of_something_else_is_refused_and_not_touched(tmp_path):
+    (tmp_path / "thesis.tex").touch()
+    assert "holds other files; give the name of a new or an empty folder" in refused(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone" / "too")
+    for folder in (tmp_path / "file" / "study", tmp_path / "nowhere", tmp_path / ("x" * 300)):
+        assert f"{folder}: cannot be written: " in refused(folder)
+    # Whoever runs the tests may be allowed to write everywhere.
+    monkeypatch.setattr("os.access", lambda *_: False)
+    assert "cannot be written: no permission; choose another folder with -o" in refused(tmp_path / "study")
+
+
+def test_a_second_study_in_it_is_refused_until_the_first_one_is_over(tmp_path):
+    with opened(tmp_path / "study"):
+        assert "another study works in this folder; wait for it" in refused(tmp_path / "study")
+    with opened(tmp_path / "study"):
+        pass
+
+
+def test_times_are_read_as_they_were_written(tmp_path):
+    assert sittings(tmp_path) == ()
+    write_sittings(tmp_path, TIMES)
+    assert sittings(tmp_path) == TIMES
+
+
+RIGHT = {"begun": 1.0, "seconds": 1.0, "jobs": 1, "tests": 1, "versions": "", "machine": ""}
+DAMAGED = {
+    "empty": "",
+    "cut short": '{"sittings": [',
+    "no object": "[]",
+    "nested": "[" * 100_000,
+    "no list": '{"sittings": 3}',
+    "no sitting": '{"sittings": ["begun"]}',
+    "no machine": json.dumps({"sittings": [{key: RIGHT[key] for key in RIGHT if key != "machine"}]}),
+    "no number": json.dumps({"sittings": [RIGHT | {"begun": "noon"}]}),
+    "no end": json.dumps({"sittings": [RIGHT | {"jobs": float("inf")}]}),
+}
+
+
+@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED.keys())
+def test_a_damaged_list_of_times_is_one_line(tmp_path, text):
+    (tmp_path / ABOUT).write_text(text)
+    with pytest.raises(UserError, match=rf"{ABOUT}: makes no sense; delete it \(the runs beside it are not touched\)"):
+        sittings(tmp_path)
+
+
+def test_what_made_the_numbers_has_a_name():
+    assert versions().startswith(f"ddenv {__version__}, Python 3.") and ", drake " in versions()
+    assert "core" in machine() and "\n" not in machine()

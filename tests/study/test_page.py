@@ -1,0 +1,199 @@
+"""What is written of a study: a page, Markdown with figures, and a table, of whatever its cells came to and are called."""
+
+import csv
+import io
+import re
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+from ddenv.study.folder import Sitting, run_path
+from ddenv.study.write import write_study
+from tests.report.test_report import EVIL, Page
+from tests.study.made import LONGEST, checked, crates, never_failed, plan_of, reduced
+from tests.workbench import fake_run
+
+SITTINGS = (
+    Sitting(1.6e9, 90.0, 2, 30, "ddenv 1", "<b>first</b> machine"),
+    Sitting(1.7e9, 30.0, 4, 9, "ddenv 2", "second machine"),
+)
+
+
+def written(plan, folder, sittings=SITTINGS):
+    """The page, the Markdown and the rows of the table."""
+    page, _ = write_study(plan, folder, sittings)
+    rows = list(csv.DictReader(io.StringIO((folder / "study.csv").read_text())))
+    return Page(page.read_text()), (folder / "study.md").read_text(), rows
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Two methods with three seeds each: the second one failed never, is a matter of chance, and is not made."""
+    folder = tmp_path_factory.mktemp("study")
+    plan = plan_of(crates(folder), seeds=3)
+    one, two, three, never, chance, _ = plan.cells
+    reduced(folder, one, vain=2)
+    reduced(folder, two, vain=3)
+    reduced(folder, three, ["crate_03"], vain=1)
+    checked(folder, one, 4, {"crate_00": 0, "crate_01": 0})
+    checked(folder, two, 4, {"crate_00": 0, "crate_01": 0})
+    checked(folder, three, 3, {"crate_03": 0})
+    never_failed(folder, never)
+    reduced(folder, chance, ["crate_03", "crate_07"])
+    checked(folder, chance, 4, {"crate_03": 0, "crate_07": 1})
+    return (*written(plan, folder), folder, plan)
+
+
+def test_several_seeds_are_told_as_median_and_range(study):
+    page, text, *_ = study
+    row = "13 (9 to 17) | 82 % (82 % to 91 %) | 0.4 (0.3 to 0.6)"
+    assert f"| model2model/failure-proximal | {row} |" in text
+    assert row.replace(" |", "") in page.text
+    # Behind it: re-runs, f in the whole world, what is left, that left out once more, and the bound.
+    left = "`crate_00`, `crate_01` (2 of 3); `crate_03` (1 of 3)"
+    again = "f in 0 of 20; with all in 11 of 12"
+    assert f"| model2model/failure-proximal | 46 % (33 % to 53 %) | 9 of 12 | {left} | {again} | 13 |" in text
+
+
+def test_what_went_wrong_is_told_with_its_seed(study):
+    page, text, rows, *_ = study
+    assert "3 cells without a world that is shown to be minimal: the tables say why." in page.text
+    for words in (
+        "model2model/sequential, seed 0: there is no failure to reduce.",
+        "model2model/sequential, seed 4: with other seeds f showed also without crate_07: it is a matter of chance there.",
+        "model2model/sequential, seed 8: not made yet.",
+    ):
+        assert words in page.text
+        assert f"> {words.replace('_', chr(92) + '_')}" in text
+    doubt = "with other seeds f showed also without crate_07: it is a matter of chance there"
+    assert [row["problem"] for row in rows] == ["", "", "", "there is no failure to reduce", doubt, "not made yet"]
+    assert page.text.startswith("ddenv study") and "3 of 6 worlds are minimal: 85 % smaller on average" in page.text
+
+
+def test_the_table_for_programs_has_a_row_for_each_cell(study):
+    *_, rows, folder, plan = study
+    assert len(rows) == len(plan.cells)
+    first = rows[0]
+    assert {key: first[key] for key in ("scenario", "algorithm", "partitioning", "prioritization", "seed")} == {
+        "scenario": "crates",
+        "algorithm": "ddenv",
+        "partitioning": "model2model",
+        "prioritization": "failure-proximal",
+        "seed": "0",
+    }
+    assert (first["minimal"], first["models"], first["left"], first["names"]) == (
+        "True",
+        "11",
+        "2",
+        "crate_00 crate_01",
+    )
+    assert (first["tests"], first["reruns"], first["seconds"], first["reduction"]) == ("13", "6", "26.0", "0.8182")
+    assert (first["baseline_runs"], first["baseline_f"], first["check_runs"], first["check_f"]) == ("4", "3", "4", "4")
+    assert (first["check_without"], first["check_without_f"], first["paper_tests"]) == ("8", "0", "")
+    assert (first["least_to_show"], first["least_to_find"]) == ("13", "17")
+    assert all((folder / row["run"]).is_file() for row in rows[:5])
+    assert (rows[3]["minimal"], rows[3]["baseline_runs"], rows[3]["least_to_show"]) == ("False", "", "")
+
+
+def test_the_page_needs_nothing_else_and_runs_nothing(study):
+    page, *_ = study
+    assert not page.tags & {"script", "link", "img", "iframe", "a", "object"}
+    assert not page.attributes & {"src", "href", "onload", "onclick"}
+    assert {"svg", "table"} <= page.tags
+
+
+def test_the_markdown_shows_files_that_are_there(study):
+    _, text, _, folder, _ = study
+    shown = [unquote(name) for name in re.findall(r"\]\((.*?)\)", text)]
+    # The models by test, and a map of each world that is left.
+    assert len(shown) == len(set(shown)) == 4
+    assert {folder / name for name in shown} == set(folder.glob("*.svg"))
+    for name in shown:
+        assert ElementTree.fromstring((folder / name).read_text()).tag.endswith("svg")
+
+
+def test_each_minimal_world_is_drawn_once_those_found_most_first(study):
+    page, *_ = study
+    first = "The minimal world (the paper's Figure 3), the end of 2 of 4 cells: crate_00, crate_01."
+    assert page.text.index(first) < page.text.index("the end of 1 of 4 cells: crate_03.")
+
+
+def test_where_and_when_it_was_made_is_told(study):
+    page, *_ = study
+    assert "2020-09-13 12:26:40 UTC 1 min 30 s 2 30 <b>first</b> machine ddenv 1" in page.text
+    assert "with 2 to 4 workers, 39 made 2 min 00 s" in page.text
+    assert "seeds 0, 4, 8" in page.text
+
+
+def test_written_again_it_is_the_same(study):
+    *_, folder, plan = study
+    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    write_study(plan, folder, SITTINGS)
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
+
+
+def test_a_study_of_which_nothing_is_made_yet(tmp_path):
+    page, _, rows = written(plan_of(crates(tmp_path)), tmp_path, ())
+    assert "None of 2 worlds is minimal yet" in page.text
+    assert [row["problem"] for row in rows] == ["not made yet"] * 2
+    assert "svg" not in page.tags
+
+
+def test_files_that_are_damaged_hide_no_other_cell(tmp_path):
+    plan = plan_of(crates(tmp_path))
+    one, two = plan.cells
+    run_path(tmp_path, one).parent.mkdir()
+    run_path(tmp_path, one).write_text("no run file")
+    reduced(tmp_path, two)
+    checked(tmp_path, two, 4, {"crate_00": 0, "crate_01": 0})
+    page, _, rows = written(plan, tmp_path)
+    assert "is no ddenv run file" in rows[0]["problem"] and rows[1]["minimal"] == "True"
+    assert "is no ddenv run file" in page.text and "1 of 2 worlds are minimal" in page.text
+
+
+def evil(folder: Path) -> Path:
+    """A scenario whose names and words try everything."""
+    file = crates(folder, '<i>&x</i> | `y` "')
+    data = yaml.safe_load(file.read_text())
+    data |= {"description": "</p><script>alert(1)</script> # *x*", "protected": []}
+    file.write_text(yaml.safe_dump(data))
+    names = [name.translate({ord("<"): "&lt;", ord("&"): "&amp;", ord('"'): "&quot;"}) for name in EVIL]
+    (folder / "crates.sdf").write_bytes(fake_run.world_text(names))
+    return file
+
+
+def test_names_are_shown_as_they_are_and_do_nothing(tmp_path):
+    (cell,) = (plan := plan_of(evil(tmp_path), pairs="model2model/random")).cells
+    left = reduced(tmp_path, cell, EVIL).left
+    checked(tmp_path, cell, 1, dict.fromkeys(left, 1))
+    page, text, (row,) = written(plan, tmp_path)
+    assert not page.tags & {"script", "i", "b"}
+    for name in EVIL[:2] + EVIL[3:5]:
+        assert name in page.text
+    assert "\u202e" not in page.text + text
+    bare = re.sub(r"(?<![\\`])(`+)(?!`).*?(?<!`)\1(?!`)", "", text, flags=re.S)
+    assert not re.search(r"(?<![\\`])<(script|i|b)\b", bare)
+    assert row["scenario"] == '<i>&x</i> | `y` "' and row["names"] == " ".join(left)
+    assert len(list(tmp_path.glob("*.svg"))) == text.count(".svg)") == 2
+
+
+def test_the_longest_names_make_files(tmp_path):
+    plan = plan_of(crates(tmp_path, LONGEST), pairs="model2model/random")
+    reduced(tmp_path, *plan.cells)
+    page, *_ = written(plan, tmp_path)
+    assert LONGEST in page.text
+
+
+def test_no_figure_takes_the_place_of_another(tmp_path):
+    """One scenario left two worlds; another one is called as the first of them might be."""
+    plan = plan_of(crates(tmp_path, "crates"), crates(tmp_path, "crates-1"))
+    one, two, three, _ = plan.cells
+    reduced(tmp_path, one)
+    reduced(tmp_path, two, ["crate_03"])
+    reduced(tmp_path, three)
+    _, text, _ = written(plan, tmp_path)
+    shown = re.findall(r"\]\((.*?\.svg)\)", text)
+    assert len(shown) == len(set(shown)) == 5

@@ -1,0 +1,157 @@
+"""Which cells a study consists of, and what is told of names that make no sense."""
+
+import pytest
+
+from ddenv import schemas
+from ddenv.errors import UserError
+from ddenv.study.folder import check_path, run_path
+from ddenv.study.paper import theirs
+from ddenv.study.plan import PAIRS, make_plan
+from tests.study.made import LONGEST, crates, plan_of
+
+LONGEST_FILE_NAME = 255
+
+
+def test_by_default_it_is_the_papers_three_by_three_in_its_order():
+    cells = make_plan().cells
+    assert [(cell.scenario.name, cell.method.pair) for cell in cells] == [
+        (scenario, pair) for scenario in ("ditch", "rubble", "friction") for pair in PAIRS
+    ]
+    assert PAIRS == (
+        "model2model/failure-proximal",
+        "model2model/avg-trajectory-proximal",
+        "timeseg/avg-trajectory-proximal",
+    )
+    assert {cell.method.algorithm for cell in cells} == {"ddenv"}
+    # Tests, % reduction and minutes of each row of Tables II to IV.
+    paper = [theirs(cell) for cell in cells]
+    assert [(each.tests, round(100 * each.smaller), each.minutes) for each in paper] == [
+        *((268, 84, 420), (82, 95, 108), (359, 84, 487)),
+        *((179, 81, 274), (178, 78, 277), (162, 89, 231)),
+        *((727, 44, 1098), (116, 76, 183), (430, 68, 641)),
+    ]
+
+
+def test_a_cell_has_all_that_is_asked_for(tmp_path):
+    plan = plan_of(crates(tmp_path, seed=40), seeds=2, iterations=2, epsilon=0.7)
+    first, second = plan.cells[:2]
+    assert (first.scenario.reduction.pair, first.scenario.reduction.seed) == ("model2model/failure-proximal", 40)
+    assert (first.scenario.reduction.iterations, first.scenario.failure.epsilon) == (2, 0.7)
+    assert (second.method, second.scenario.reduction.seed) == (first.method, second.seed)
+    assert plan.cells[2].method.pair == "model2model/sequential"
+
+
+def test_names_come_in_lists_and_count_once(tmp_path):
+    files = [str(crates(tmp_path, name)) for name in ("one", "two", "three")]
+    plan = make_plan((f"{files[1]}, {files[0]}", files[2]), "timeseg/random,paper, timeseg/random", "ddenv,ddenv")
+    assert [scenario.name for scenario in plan.scenarios] == ["two", "one", "three"]
+    assert [method.pair for method in plan.methods] == ["timeseg/random", *PAIRS]
+
+
+def test_the_same_file_twice_is_one_scenario(tmp_path):
+    file = str(crates(tmp_path))
+    assert len(make_plan((file, f"{file},{file}"), PAIRS[0]).cells) == 1
+
+
+def test_all_is_all_that_is_installed(tmp_path):
+    plan = plan_of(crates(tmp_path), pairs="all", algorithms="all")
+    assert [each.pair for each in plan.methods if each.algorithm == "ddenv"] == list(schemas.pairs())
+    assert {each.algorithm for each in plan.methods} == set(schemas.names("algorithm"))
+
+
+def test_methods_that_differ_only_in_what_is_not_looked_at_are_one(tmp_path):
+    plan = plan_of(crates(tmp_path), pairs="all", algorithms="ddmin,splitting,ddenv")
+    labels = [method.label for method in plan.methods]
+    assert labels[0] == "ddmin"
+    assert labels[1:7] == [f"splitting {name}" for name in schemas.names("prioritization")]
+    assert labels[7:] == list(schemas.pairs())
+    assert [cell.name for cell in plan.cells[:2]] == [
+        "crates_ddmin_seed-0",
+        "crates_splitting_failure-proximal_seed-0",
+    ]
+
+
+def test_what_makes_fewer_tests_is_asked_for_where_nobody_says_otherwise(tmp_path):
+    plain, said = crates(tmp_path), crates(tmp_path, "said", growth="paper", skip="known")
+
+    def asked(file, **options):
+        reduction = plan_of(file, **options).cells[0].scenario.reduction
+        return reduction.growth, reduction.skip
+
+    assert asked(plain) == ("steady", "implied")
+    assert asked(said) == ("paper", "known")
+    assert asked(said, growth="steady") == ("steady", "known")
+    assert asked(plain, growth="paper", skip=None) == ("paper", "implied")
+
+
+@pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (2, 6), (1, 0)])
+def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterations):
+    plan = plan_of(
+        crates(tmp_path, baseline_runs=baseline_runs, iterations=iterations, seed=7), pairs=PAIRS[0], seeds=4
+    )
+    used = [cell.seed + run for cell in plan.cells for run in range(max(baseline_runs, 1 + iterations))]
+    assert len(used) == len(set(used))
+    assert used[0] == 7
+
+
+HOSTILE = {
+    "long": LONGEST,
+    "path": "a b/../c\\d",
+    "option": "-rf ~",
+    "turned": "\u202eabc\n",
+    "up": "..",
+    "marks": ":|?*",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE.keys())
+def test_the_names_of_files_are_files_names(tmp_path, name):
+    plan = plan_of(crates(tmp_path, name), pairs="all", algorithms="all", seeds=2)
+    assert len({cell.name for cell in plan.cells}) == len(plan.cells)
+    for cell in plan.cells:
+        assert run_path(tmp_path, cell).parent == check_path(tmp_path, cell).parent == tmp_path / "runs"
+        # Beside it lie its log and its lock, and for a moment what is being written.
+        assert len(f".{cell.name}.ddenv.scene.log.01234567".encode()) <= LONGEST_FILE_NAME
+        assert cell.name.isprintable() and not set(cell.name) & set("/\\ .:|?*~")
+
+
+WRONG = {
+    "scenario": (
+        {"scenarios": ("dich",)},
+        r"no scenario 'dich' \(did you mean ditch\?\); bundled are ditch, friction, rub",
+    ),
+    "no scenario": ({"scenarios": (" , ",)}, r"--scenarios: expected names separated by commas; found ' , '"),
+    "missing file": ({"scenarios": ("gone.yaml",)}, r"gone.yaml: no such file"),
+    "pair": (
+        {"pairs": "model2model"},
+        r"--pairs: 'model2model' is no pair \(did you mean model2model/.*or give 'paper'",
+    ),
+    "part": (
+        {"pairs": "paper,timeseg/failur-proximal"},
+        r"--pairs: no prioritization 'failur-proximal' \(did you mean failure-proximal\?\).*; or give 'paper' or 'all'",
+    ),
+    "no pair": ({"pairs": ","}, r"--pairs: expected names separated by commas"),
+    "algorithm": (
+        {"algorithms": "ddmni"},
+        r"--algorithms: no algorithm 'ddmni' \(did you mean ddmin\?\).*; or give 'all'",
+    ),
+    "no algorithm": ({"algorithms": ""}, r"--algorithms: expected names separated by commas"),
+    "option": ({"growth": "fast"}, r"options: reduction.growth: 'fast' is not allowed"),
+}
+
+
+@pytest.mark.parametrize(("words", "told"), WRONG.values(), ids=WRONG.keys())
+def test_names_that_make_no_sense_get_one_line_with_the_nearest(words, told):
+    with pytest.raises(UserError, match=told):
+        make_plan(**words)
+
+
+def test_two_scenarios_of_one_name_are_refused(tmp_path):
+    with pytest.raises(UserError, match="--scenarios: two of them are called 'crates'; give each a name of its own"):
+        plan_of(crates(tmp_path), crates(tmp_path))
+
+
+def test_names_that_make_the_same_file_names_are_refused(tmp_path):
+    for one, two in (("a b", "a?b"), (LONGEST, LONGEST[:-1])):
+        with pytest.raises(UserError, match="the names of two of them make the same file names"):
+            plan_of(crates(tmp_path, one), crates(tmp_path, two))

@@ -1,0 +1,110 @@
+"""`ddenv study` as it is typed, on a simulator of a few lines: killed, interrupted, and at its end the same as undisturbed."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.store import RunFile
+from ddenv.study.folder import run_path, sittings
+from tests.robot.external.own import wait_until
+from tests.study.made import plan_of, wall
+from tests.study.quick import Lab
+from tests.study.test_work import fails, study, told
+
+# Counts its runs, and waits before each unless it may go on: so many at a time.
+ROBOT = """
+echo >> made
+while [ $(wc -l < made) -gt $(cat most) ]; do sleep 0.05; done
+echo 0,0,0,0,0,0,0,1
+echo 1,2,0,0,0,0,0,1
+grep -q 'model name="deck"' $1 && grep -q 'model name="wall"' $1 && exit 1
+exit 0
+"""
+WORDS = ("--pairs", "model2model/sequential", "--algorithms", "splitting", "--jobs", "1", "-o", "study")
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts the study; nothing of it is left in the end."""
+    started = []
+
+    def begin():
+        words = [sys.executable, "-m", "ddenv", "study", "--scenarios", "wall.yaml", *WORDS]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        started.append(subprocess.Popen(words, cwd=tmp_path, **pipes))
+        return started[-1]
+
+    yield begin
+    (tmp_path / "most").write_text("1000")
+    for each in started:
+        each.kill()
+        each.communicate()
+
+
+def engine_of(run):
+    """The process of the engine that was started last."""
+    with RunFile(run) as file:
+        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"][-1]
+
+
+def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, monkeypatch):
+    (tmp_path / "robot.sh").write_text(ROBOT)
+    made, most = tmp_path / "made", tmp_path / "most"
+    plan = plan_of(wall(tmp_path, oracle="sh robot.sh {world}"), pairs=WORDS[1], algorithms=WORDS[3])
+    folder, run = tmp_path / "study", run_path(tmp_path / "study", plan.cells[0])
+
+    def stands_at(number):
+        """The next test waits."""
+        wait_until(lambda: made.exists() and len(made.read_text()) > number, 300)
+
+    # Killed, its engine lives on, until it is killed as well.
+    most.write_text("2")
+    first = start()
+    stands_at(2)
+    first.kill()
+    first.wait()
+    assert engine_is_alive(run)
+    os.kill(engine_of(run), signal.SIGKILL)
+    wait_until(lambda: not engine_is_alive(run))
+
+    # Interrupted, it stops its engine and writes what it has.
+    most.write_text("6")
+    second = start()
+    stands_at(6)
+    second.send_signal(signal.SIGINT)
+    said, complained = second.communicate(timeout=300)
+    assert (second.returncode, complained) == (130, "interrupted; the same command goes on where it was\n")
+    assert "0 of 1 cell minimal; wrote study/study.html" in said
+    assert (folder / "study.html").exists() and not engine_is_alive(run)
+
+    # Nothing in its way any more.
+    most.write_text("1000")
+    third = start()
+    said, complained = third.communicate(timeout=300)
+    assert (third.returncode, complained) == (0, "")
+    assert "1 of 1 cell minimal; wrote study/study.html" in said
+    assert len(sittings(folder)) == 3
+
+    # Of the tests that were in flight nothing is left, and no other one was made twice.
+    (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())
+    checks = int(row["check_runs"]) + int(row["check_without"])
+    assert len(made.read_text()) == int(row["tests"]) + checks + 2
+    assert (row["check_f"], row["check_without_f"]) == (row["check_runs"], "0")
+
+    Lab(monkeypatch, fails)
+    assert study(tmp_path / "alone", plan, jobs=1)[0] == 0
+    assert told(folder) == told(tmp_path / "alone")
+
+
+def test_a_mistake_gets_one_line(tmp_path):
+    (tmp_path / "file").touch()
+    wall(tmp_path)
+    words = [sys.executable, "-m", "ddenv", "study", "--scenarios", "wall.yaml", "-o", "file"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "ddenv: file: is a file; give the name of a folder\n"

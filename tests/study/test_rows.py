@@ -1,0 +1,182 @@
+"""The tables of a study from what its cells came to: the paper's numbers, medians and ranges, and which method is best where."""
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from ddenv.report.blocks import Strong, Table
+from ddenv.runfile.state import Baseline
+from ddenv.study.best import best
+from ddenv.study.check import APART, Check
+from ddenv.study.content import content
+from ddenv.study.figure import chart
+from ddenv.study.found import Found
+from ddenv.study.plan import PAIRS, make_plan
+from ddenv.study.rows import groups, spread
+from ddenv.study.tables import behind, numbers
+from tests.study.made import crates, plan_of
+
+MODELS = tuple(f"m{number}" for number in range(16))
+FIVE = "model2model/random,model2model/sequential,model2model/timestep,timeseg/random,timeseg/sequential"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def found(cell, tests, left=1, **other):
+    """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each."""
+    values = {
+        "ended": True,
+        "minimal": True,
+        "problem": "",
+        "elements": MODELS,
+        "left": MODELS[:left],
+        "tests": tests,
+        "reruns": tests // 2,
+        "seconds": 3.0 * tests,
+        "baseline": Baseline(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1),
+        "baseline_runs": 10,
+        "sizes": ((10, 16), (tests, left)),
+        "check": Check(cell.seed + APART, 4, 4, dict.fromkeys(MODELS[:left], 0)),
+    }
+    return Found(cell, **(values | other))
+
+
+def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
+    """The groups of two scenarios; `tests` are those of each cell in the order of the tables, None where there is no end."""
+    plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
+    made = [Found(cell) if each is None else found(cell, each) for cell, each in zip(plan.cells, tests, strict=True)]
+    return plan, made, groups(plan, made)
+
+
+def test_the_papers_numbers_stand_beside_ours():
+    plan = make_plan(("ditch",))
+    (group,) = groups(plan, [found(cell, 60, left=2) for cell in plan.cells])
+    table = numbers(group)
+    assert table.head == (
+        "partitioning, prioritization",
+        *("tests", "paper", "% reduction", "paper", "minutes", "paper"),
+    )
+    assert table.rows[0] == (PAIRS[0], "60", "268", "88 %", "84 %", "3.0", "420")
+    assert table.rows[1] == (PAIRS[1], "60", "82", "88 %", "95 %", "3.0", "108")
+
+
+def test_what_the_paper_does_not_have_stands_alone():
+    plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin")
+    (group,) = groups(plan, [found(cell, 60) for cell in plan.cells])
+    table = numbers(group)
+    assert [(row[0], row[2]) for row in table.rows] == [("timeseg/random", "–"), (PAIRS[0], "268"), ("ddmin", "–")]
+
+
+def test_the_claim_counts_what_is_better_than_the_paper():
+    plan = make_plan(("ditch",))
+    # Of 84, 95 and 84 % and of 268, 82 and 359 tests.
+    made = [found(cell, tests, left=2) for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)]
+    report = content(plan, made, (), Path("nowhere"))
+    told = " ".join(part for each in report.lead for part in each.parts)
+    assert (
+        "the same 3 cells of the paper: at least as much removed in 2, not more tests in 2. They took 17 hours" in told
+    )
+    assert report.verdict == "Every world is minimal: 88 % smaller on average"
+
+
+def test_seeds_of_a_method_make_one_row(tmp_path):
+    _, _, (one, two) = cells(tmp_path, 40, 30, 50, 20, 21, None, pairs="model2model/random", seeds=3)
+    assert numbers(one).rows == (("model2model/random", "40 (30 to 50)", "94 %", "2.0 (1.5 to 2.5)"),)
+    assert numbers(two).rows == (("model2model/random", "20.5 (20 to 21)", "94 %", "1.0 (1.0 to 1.1)"),)
+    assert behind(two).rows[0][:3] == ("model2model/random", "49 % (48 % to 50 %)", "18 of 20")
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [([], "–"), ([3], "3"), ([3, 3], "3"), ([1, 9, 2], "2 (1 to 9)"), ([1.2, 1.4, 1.3], "1")],
+)
+def test_one_value_or_the_median_with_the_range(values, told):
+    assert spread(values, lambda value: f"{value:.0f}") == told
+
+
+def test_what_could_not_be_tried_again_does_not_count_as_tried(tmp_path):
+    plan, made, _ = cells(tmp_path, 40, 30, 50, 20, pairs="model2model/random", seeds=2)
+    made[1:] = [replace(each, check=None) for each in made[1:]]
+    one, two = groups(plan, made)
+    assert behind(one).rows[0][4] == "f in 0 of 4; with all in 4 of 4"
+    assert behind(two).rows[0][4] == "–"
+
+
+def ranking(section):
+    (table,) = (block for block in section.blocks if isinstance(block, Table))
+    return table.rows
+
+
+def test_which_is_best_where(tmp_path):
+    """In the first scenario the last method needs the fewest tests, on the whole the second one does."""
+    _, _, both = cells(tmp_path, 40, 20, 30, 90, 19, *(40, 20, 30, 90, 80))
+    rows = ranking(best(both))
+    # The baseline's four, f once, and the model left out in vain; log2(16) bits, of which a test that costs 1 or 4 tells 0.46.
+    assert [row[1:] for row in rows[:2]] == [("9", "9", "1.0"), ("13", "13", "–")]
+    assert [row[0] for row in rows[2:]] == [
+        *(
+            "model2model/sequential",
+            "model2model/timestep",
+            "timeseg/sequential",
+            "model2model/random",
+            "timeseg/random",
+        )
+    ]
+    assert rows[2][1:] == ("20", Strong("20 ◂"), "2.2")
+    assert rows[4][1:] == (Strong("19 ◂"), "80", "4.3")
+
+
+def test_what_is_not_minimal_everywhere_comes_last(tmp_path):
+    _, _, both = cells(tmp_path, 40, 20, 30, 90, 10, *(40, 20, 30, 90, None))
+    rows = ranking(best(both))
+    assert rows[-1] == ("timeseg/sequential", Strong("10 ◂"), "not made yet", "–")
+
+
+def test_seeds_without_an_end_are_told_in_the_ranking(tmp_path):
+    pairs = FIVE.rpartition(",")[0]
+    _, _, both = cells(tmp_path, *(40, None), *(20, 22), *(30, 30), *(90, 90), *([50] * 8), pairs=pairs, seeds=2)
+    rows = {row[0]: row for row in ranking(best(both))}
+    assert rows["model2model/random"][1] == "40 (1 of 2 seeds)"
+    assert rows["model2model/sequential"][1] == Strong("21 ◂")
+
+
+def test_of_few_methods_or_none_with_an_end_nothing_is_ranked(tmp_path):
+    assert best(cells(tmp_path, *([20] * 6), pairs=",".join(PAIRS))[2]) is None
+    assert best(cells(tmp_path, *([None] * 10))[2]) is None
+
+
+def test_the_figure_has_a_line_for_each_method(tmp_path):
+    plan, _, (one, two) = cells(tmp_path, 40, 20, 30, 90, None, *([None] * 5))
+    root = ElementTree.fromstring(chart(one))
+    lines = [path for path in root.iter(f"{SVG}path") if path.find(f"{SVG}title") is not None]
+    assert [path.find(f"{SVG}title").text for path in lines] == [f"{cell.label}, seed 0" for cell in plan.cells[:4]]
+    # From the end of the baseline on, at the top, down to one model; each size holds until the next one.
+    places = [[tuple(map(float, at.split())) for at in path.get("d")[1:].split("L")] for path in lines]
+    assert all(start[1] == middle[1] < end[1] and middle[0] == end[0] for start, middle, end in places)
+    longest = places[3]
+    assert all(each[-1][0] < longest[-1][0] and each[0] == longest[0] for each in places[:3])
+    words = [text.text for text in root.iter(f"{SVG}text")]
+    assert "model2model/sequential: 1 model left after 20 tests" in words
+    assert not any("timeseg/sequential" in word for word in words)
+    assert not two.minimal
+
+
+def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
+    plan = make_plan(("ditch",), "all")
+    (group,) = groups(plan, [found(cell, 100 - number) for number, cell in enumerate(plan.cells)])
+    words = [text.text for text in ElementTree.fromstring(chart(group)).iter(f"{SVG}text")]
+    named = [word.partition(":")[0] for word in words if "left after" in word]
+    labels = [method.label for method in plan.methods]
+    assert (sorted(named[:3]), named[3:]) == (sorted(PAIRS), labels[:-4:-1])
+    assert f"{len(labels) - 6} other methods" in words
+
+
+def test_a_world_of_which_all_is_needed_is_drawn_too(tmp_path):
+    plan, made, _ = cells(tmp_path, 20, 20, pairs="model2model/random")
+    made = [replace(each, elements=("m0",), left=("m0",), sizes=((10, 1), (14, 1))) for each in made]
+    for group in groups(plan, made):
+        text = chart(group)
+        ElementTree.fromstring(text)
+        assert "nan" not in text and "inf" not in text
+    assert content(plan, made, (), tmp_path).verdict == "Every world is minimal: 0 % smaller on average"
