@@ -11,17 +11,14 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
-from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.study.plan import Method, make_plan
 from ddenv.words import first_of
-from ddenv.workbench.methods import chosen, uses
 
-PAPER = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
 HEADER = (
     "algorithm",
     "pair",
@@ -47,57 +44,23 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2, help="tests at the same time")
     options = parser.parse_args()
     try:
-        methods = list(methods_of(algorithms_of(options.algorithms), pairs_of(options.pairs)))
+        methods = make_plan([options.scenario], options.pairs, options.algorithms).methods
     except UserError as error:
         parser.error(str(error))
     header = " | ".join(HEADER).replace("pair", f"pair, {options.jobs} jobs")
     print(f"| {header} |\n|{'---|' * len(HEADER)}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        for number, (algorithm, pair) in enumerate(methods):
-            cells = row(options.scenario, algorithm, pair, options.jobs, Path(folder) / f"{number}.ddenv")
+        for number, method in enumerate(methods):
+            cells = row(options.scenario, method, options.jobs, Path(folder) / f"{number}.ddenv")
             print(f"| {' | '.join(cells)} |", flush=True)
 
 
-def pairs_of(words: str) -> tuple[str, ...]:
-    """The pairs that an option names. Raises UserError."""
-    if words == "paper":
-        return PAPER
-    if words == "all":
-        return schemas.pairs()
-    chosen_pairs = tuple(words.split(","))
-    for pair in chosen_pairs:
-        schemas.split_pair(pair)
-    return chosen_pairs
-
-
-def algorithms_of(words: str) -> tuple[str, ...]:
-    """The algorithms that an option names. Raises UserError."""
-    if words == "all":
-        return schemas.names("algorithm")
-    algorithms = tuple(words.split(","))
-    for algorithm in algorithms:
-        schemas.check("algorithm", algorithm)
-    return algorithms
-
-
-def methods_of(algorithms: tuple[str, ...], pairs: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Each (algorithm, pair) that differs in what is used; "" is the scenario's own pair."""
-    for algorithm in algorithms:
-        seen = set()
-        for pair in pairs:
-            used = tuple(chosen(algorithm, pair)[kind] for kind in uses(algorithm))
-            if used not in seen:
-                seen.add(used)
-                yield algorithm, pair if used else ""
-
-
-def row(scenario: str, algorithm: str, pair: str, jobs: int, path: Path) -> list[str]:
+def row(scenario: str, method: Method, jobs: int, path: Path) -> list[str]:
     """The cells of one reduction; what went wrong if there was none."""
-    words = ["run", scenario, "--algorithm", algorithm, "--jobs", str(jobs), "--output", str(path), "--json"]
-    words += ["--pair", pair] if pair else []
+    words = ["run", scenario, "--algorithm", method.algorithm, "--pair", method.pair]
+    words += ["--jobs", str(jobs), "--output", str(path), "--json"]
     done = subprocess.run([sys.executable, "-m", "ddenv", *words], capture_output=True, text=True)
-    shown = pair if len(uses(algorithm)) != 1 else f"-/{chosen(algorithm, pair)['prioritization']}"
-    first = [algorithm, shown or "-"]
+    first = [method.algorithm, "/".join(method.used) or "-"]
     if not done.stdout:
         return [*first, done.stderr.strip().rpartition("\n")[2], *[""] * (len(HEADER) - 3)]
     return [*first, *_results(json.loads(done.stdout), path)]

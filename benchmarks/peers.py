@@ -1,0 +1,236 @@
+"""Other reducers on the same work as ddenv: picire's ddmin, and leaving out one model after another.
+
+    python benchmarks/peers.py [--scenarios ditch,rubble,friction] [--reducers WORDS] [--jobs 2] [--seed 0]
+        [--shuffle N] [--early-stop]
+
+All ask the same oracle: the same simulator, the same f from the same baseline runs, the same seeds for the first run and the
+re-runs of a candidate, as many tests at the same time. All that a reducer does counts: the time from the start of its program on,
+with the building of the simulator; the baseline; what was run ahead of time and not needed after all. "+ n stopped" are tests
+that were ended halfway. 1-minimal: each model that is left was left out once, with all re-runs, and f did not show; what a
+reducer did not test of that is tested after its time was taken.
+
+ddenv searches as in a study (n grows steadily, what is implied is skipped). What is not the same: it writes a run file that can be
+watched and resumed, ends a test that takes too long, and with --early-stop makes full runs of what is left, which the others do
+not. It knows where the models stand and where the robot drove; the others know the names alone, in the order of the file. How
+many tests they need hangs on that order: in the ditch the two models that are needed stand first. With --shuffle they get a random
+order; N is its seed. Needs `pip install '.[bench]'`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+from peers_reducers import REDUCERS, reduce_in_process
+from peers_tests import Counts, counts
+
+from ddenv.engine.spawn import DrakeContext
+from ddenv.errors import UserError
+from ddenv.launch.scenarios import with_options
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.study.plan import FEWER_TESTS, PAIRS
+from ddenv.words import first_of
+from ddenv.world.load import find_scenario, load_scenario
+from ddenv.world.scenario import Scenario
+
+HEADER = ("reducer", "tests", "of which re-runs", "time, s", "models left", "1-minimal", "names left")
+# As in a study.
+SEARCH = [word for key, value in FEWER_TESTS.items() for word in (f"--{key}", value)]
+OURS = {f"ddenv, {pair}": ["--pair", pair, *SEARCH] for pair in PAIRS} | {
+    "ddenv, splitting": ["--algorithm", "splitting"]
+}
+# So many of the models that are left are named.
+MOST_NAMES = 6
+# How often is told how many tests there are, and how long ddenv may take to stop, s.
+LOOK = 1.0
+STOP = 20.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One scenario as its name and as it is reduced, and where what is written goes."""
+
+    name: str
+    scenario: Scenario
+    jobs: int
+    shuffle: int | None
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Result:
+    counts: Counts
+    seconds: float
+    kept: tuple[str, ...]
+    minimal: bool
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--scenarios", default="ditch,rubble,friction", help="bundled names or YAML files")
+    parser.add_argument("--reducers", default="", help="words of their names; all by default")
+    parser.add_argument("--jobs", type=int, default=2, help="tests at the same time")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first run")
+    parser.add_argument("--shuffle", type=int, help="seed of a random order of the models, for the other reducers")
+    parser.add_argument("--early-stop", action="store_true", help="end a test when the robot is stuck for good")
+    options = parser.parse_args()
+    if options.jobs < 1:
+        parser.error("--jobs: must be at least 1")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        changes = {"seed": options.seed, "early_stop": options.early_stop}
+        reducers = reducers_of(options.reducers)
+        scenarios = {
+            name: with_options(load_scenario(find_scenario(name)), **changes) for name in options.scenarios.split(",")
+        }
+        with tempfile.TemporaryDirectory() as folder:
+            for number, (name, scenario) in enumerate(scenarios.items()):
+                place = Path(folder) / str(number)
+                place.mkdir()
+                table(Asked(name, scenario, options.jobs, options.shuffle, place), reducers)
+    except UserError as error:
+        parser.error(str(error))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def reducers_of(words: str) -> list[str]:
+    """The reducers with one of these words in their names. Raises UserError."""
+    names = [*OURS, *REDUCERS]
+    asked = [word.strip() for word in words.split(",")]
+    for word in asked:
+        if not any(word in name for name in names):
+            raise UserError(f"--reducers: '{word}' is in no name; there are: {'; '.join(names)}")
+    return [name for name in names if any(word in name for word in asked)]
+
+
+def table(asked: Asked, reducers: list[str]) -> None:
+    reduction = asked.scenario.reduction
+    early = ", early stop" if asked.scenario.failure.early_stop else ""
+    order = "" if asked.shuffle is None else f", order {asked.shuffle}"
+    first = f"{asked.scenario.name}, seed {reduction.seed}, {asked.jobs} jobs{order}{early}"
+    print(f"\n| {' | '.join((first, *HEADER[1:]))} |\n|{'---|' * len(HEADER)}", flush=True)
+    for reducer in reducers:
+        print(f"| {' | '.join([reducer, *cells(asked, reducer)])} |", flush=True)
+
+
+def cells(asked: Asked, reducer: str) -> list[str]:
+    """What is told of one reduction; what went wrong if there was none."""
+
+    def tell(tests: int) -> None:
+        print(f"\r{asked.name}: {reducer}: {tests} tests  ", end="", file=sys.stderr, flush=True)
+
+    tell(0)
+    try:
+        result = ours(asked, reducer, tell) if reducer in OURS else theirs(asked, reducer, tell)
+    except UserError as error:
+        return [str(error), *[""] * (len(HEADER) - 2)]
+    finally:
+        print("\r\x1b[K" if sys.stderr.isatty() else "\n", end="", file=sys.stderr, flush=True)
+    made = result.counts
+    return [
+        f"{made.tests}" + (f" + {made.stopped} stopped" if made.stopped else ""),
+        str(made.reruns),
+        f"{result.seconds:.0f}",
+        str(len(result.kept)),
+        "yes" if result.minimal else "no",
+        first_of(result.kept, MOST_NAMES),
+    ]
+
+
+def ours(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
+    """One reduction by ddenv. Raises UserError."""
+    path = asked.folder / f"{list(OURS).index(reducer)}.ddenv"
+    words = [sys.executable, "-m", "ddenv", "run", asked.name, *OURS[reducer], "--json", "--output", str(path)]
+    words += ["--jobs", str(asked.jobs), "--seed", str(asked.scenario.reduction.seed)]
+    words += ["--early-stop" if asked.scenario.failure.early_stop else "--no-early-stop"]
+    started = time.perf_counter()
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as log:
+        # In a session of its own it hears of Ctrl+c once, from here.
+        program = subprocess.Popen(words, stdout=out, stderr=log, start_new_session=True)
+        try:
+            while not _ended(program):
+                tell(_tests_in(path))
+            seconds = time.perf_counter() - started
+        except KeyboardInterrupt:
+            program.send_signal(signal.SIGINT)
+            program.wait(STOP)
+            raise
+        told, said = _content(out), _content(log)
+    if not told:
+        raise UserError(said.strip().rpartition("\n")[2] or "ddenv said nothing")
+    with RunFile(path) as file:
+        stopped = fold(file.events()).tally["lost"]
+    data = json.loads(told)
+    made = Counts(data["tests"], data["deflake_runs"], stopped)
+    return Result(made, seconds, tuple(data["kept"]), data["minimal"])
+
+
+def _ended(program: subprocess.Popen) -> bool:
+    with suppress(subprocess.TimeoutExpired):
+        program.wait(LOOK)
+        return True
+    return False
+
+
+def _tests_in(path: Path) -> int:
+    if not path.exists():
+        return 0
+    with suppress(UserError), RunFile(path) as file:
+        return fold(file.events()).tests_done
+    return 0
+
+
+def _content(file: tempfile._TemporaryFileWrapper) -> str:
+    file.seek(0)
+    return file.read().decode()
+
+
+def theirs(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
+    """One reduction by another reducer. Raises UserError."""
+    record = asked.folder / f"{list(REDUCERS).index(reducer)}.tests"
+    context = DrakeContext()
+    here, there = context.Pipe(duplex=False)
+    work = (reducer, asked.scenario, record, asked.jobs, asked.shuffle, there)
+    started = time.perf_counter()
+    process = context.Process(target=reduce_in_process, args=work)
+    process.start()
+    there.close()
+    try:
+        while not here.poll(LOOK):
+            tell(counts(record).tests)
+        told = here.recv()
+        seconds = time.perf_counter() - started
+        if isinstance(told, str):
+            raise UserError(told)
+        kept, made = told
+        return Result(made, seconds, tuple(kept), here.recv())
+    except EOFError:
+        raise UserError("the reducer's process died: see above") from None
+    finally:
+        _kill(process.pid)
+        process.join()
+
+
+def _kill(pid: int) -> None:
+    """Ends a process with all that it has started: picire's tests are process groups of their own."""
+    with suppress(psutil.NoSuchProcess):
+        first = psutil.Process(pid)
+        for process in [*first.children(recursive=True), first]:
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+
+
+if __name__ == "__main__":
+    main()
