@@ -1,5 +1,6 @@
 """What tests of several rooms share."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -18,3 +19,8 @@ def home(tmp_path, monkeypatch) -> Path:
     """A folder of its own for runs."""
     monkeypatch.setenv("DDENV_HOME", str(tmp_path))
     return tmp_path
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Many tests wait for a terminal, a browser or another program: one worker more keeps all cores busy."""
+    return 1 + (os.cpu_count() or 1)

@@ -11,10 +11,17 @@ THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
 
 
 async def settled(pilot):
+    """Waits until nothing changes any more: the map is drawn after the first frame, and looks are made ten times a second."""
     await pilot.pause()
     await pilot.app.workers.wait_for_complete()
-    # The map is drawn after the first frame, and looks are made ten times a second.
-    await pilot.pause(0.25)
+    shown, same = None, 0
+    for _ in range(100):
+        if same == 3:
+            return
+        await pilot.pause(0.1)
+        now = pilot.app.screen._compositor.render_strips()
+        same = same + 1 if now == shown else 0
+        shown = now
 
 
 def shown(theme="ddenv", *keys):
