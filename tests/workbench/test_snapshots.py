@@ -2,6 +2,7 @@
 
 import fake_run
 import pytest
+from textual.widgets import Input
 
 from ddenv.workbench.app import Workbench
 
@@ -13,15 +14,20 @@ THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
 async def settled(pilot):
     """Waits until nothing changes any more: the map is drawn after the first frame, and looks are made ten times a second."""
     await pilot.pause()
-    await pilot.app.workers.wait_for_complete()
     shown, same = None, 0
-    for _ in range(100):
-        if same == 3:
+    for _ in range(300):
+        if same == 5:
             return
+        # Else the picture depends on when it is taken.
+        pilot.app.clear_notifications()
+        for field in pilot.app.screen.query(Input):
+            field.cursor_blink = False
+        await pilot.app.workers.wait_for_complete()
         await pilot.pause(0.1)
         now = pilot.app.screen._compositor.render_strips()
         same = same + 1 if now == shown else 0
         shown = now
+    raise AssertionError("the screen never stands still")
 
 
 def shown(theme="ddenv", *keys):

@@ -49,13 +49,18 @@ class Lines(ScrollView, can_focus=True):
             return
         self.virtual_size = Size(0, len(items))
         if self._tail and at_end and self.is_attached:
-            self.scroll_end(animate=False, immediate=True)
+            # Forced: with the first line too many there is no scroll bar yet.
+            self.scroll_end(animate=False, immediate=True, force=True)
         self.refresh()
 
     def on_resize(self) -> None:
         self.virtual_size = Size(0, len(self._items))
         if self._tail:
-            self.scroll_end(animate=False)
+            self.scroll_end(animate=False, force=True)
+
+    def watch_show_vertical_scrollbar(self) -> None:
+        # It is not told how far the list was scrolled before.
+        self.vertical_scrollbar.position = self.scroll_y
 
     def on_click(self, event: events.Click) -> None:
         place = int(event.y + self.scroll_offset.y)

@@ -86,26 +86,31 @@ class Status(Widget):
         self._left: Remaining | None = None
         self._left_of: tuple = ()
         self._left_at = -math.inf
+        self._left_is_old = False
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
-        if (scene, asked) == self._besides and snapshot is self._snapshot:
+        due = self._left_is_old and time.monotonic() - self._left_at >= LEFT_PERIOD
+        if (scene, asked) == self._besides and snapshot is self._snapshot and not due:
             return
         tests = snapshot.state.tests
         self._cut = cut_tests(tests, self._tests, self._cut)
         self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
+        self._left_is_old = False
         now = facts(snapshot, scene, asked, self._cut, self._remaining)
         if now != self._facts:
             self._facts = now
             self.refresh()
 
     def _remaining(self, snapshot: Snapshot) -> Remaining | None:
-        """What is left takes its time to find: within a round it is told anew now and then, not after each test."""
+        """What is left takes its time to find: within a round it is told anew each `LEFT_PERIOD`, not after each test."""
         state, moment = snapshot.state, time.monotonic()
         number = None if state.round is None else state.round.number
-        of = (snapshot.status, state.paused, state.waiting_candidate, state.budget, state.node, number)
+        of = (snapshot.status, snapshot.behind, state.paused, state.waiting_candidate, state.budget, state.node, number)
         if of != self._left_of or moment - self._left_at >= LEFT_PERIOD:
             self._left, self._left_of, self._left_at = remaining(state, snapshot.engine == "alive"), of, moment
+        else:
+            self._left_is_old = True
         return self._left
 
     def render(self) -> Text:
