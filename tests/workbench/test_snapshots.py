@@ -1,14 +1,23 @@
 """What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
 
+from contextlib import suppress
+
 import fake_run
 import pytest
 from textual.widgets import Input
+from textual.worker import WorkerCancelled
 
 from ddenv.workbench.app import Workbench
 
 SMALL, USUAL, LARGE = (80, 24), (120, 36), (200, 60)
 SIZES = [SMALL, USUAL, LARGE]
 THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
+
+
+@pytest.fixture(autouse=True)
+def no_notifications(monkeypatch):
+    """They go by the clock."""
+    monkeypatch.setattr(Workbench, "notify", lambda *_, **__: None)
 
 
 async def settled(pilot):
@@ -19,10 +28,10 @@ async def settled(pilot):
         if same == 5:
             return
         # Else the picture depends on when it is taken.
-        pilot.app.clear_notifications()
         for field in pilot.app.screen.query(Input):
             field.cursor_blink = False
-        await pilot.app.workers.wait_for_complete()
+        with suppress(WorkerCancelled):
+            await pilot.app.workers.wait_for_complete()
         await pilot.pause(0.1)
         now = pilot.app.screen._compositor.render_strips()
         same = same + 1 if now == shown else 0
