@@ -36,7 +36,7 @@ def _of_running(each: Work) -> float | None:
 def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
     """What one worker would need, s: what other cells of the scenario took, or what such a cell is expected to take."""
     same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
-    over = [spent(each.state) for each in same if each.state.status == "finished"]
+    over = [_spent(each.state) for each in same if each.state.status == "finished"]
     if over:
         return mean(over)
     size = worlds[cell.scenario.name]
@@ -69,9 +69,9 @@ def _expected(cell: Cell, models: int) -> int:
     return asked.baseline_runs + tests.tests
 
 
-def spent(state: RunState) -> float:
-    """What a cell's tests took, s, if they had been made one after another."""
-    return sum(test.wall_seconds for test in state.finished_tests)
+def _spent(state: RunState) -> float:
+    """What a cell's tests took, s, one after another; those taken over from another cell cost nothing."""
+    return sum(test.wall_seconds for test in state.finished_tests if not test.taken)
 
 
 def _of_a_test(state: RunState) -> float | None:

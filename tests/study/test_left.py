@@ -1,0 +1,57 @@
+"""How long a study will take still."""
+
+from dataclasses import replace
+
+import pytest
+
+from ddenv.runfile.fold import fold
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.store import RunFile
+from ddenv.study.folder import RUNS, run_path
+from ddenv.study.left import seconds_left
+from ddenv.study.order import sizes
+from ddenv.study.work import Work
+from tests.study.made import TESTS, crates, plan_of, reduced
+
+
+@pytest.fixture
+def made(tmp_path):
+    """A plan of two cells, and what was made of the first: `TESTS` tests of 2 s."""
+    plan = plan_of(crates(tmp_path))
+    (tmp_path / RUNS).mkdir()
+    reduced(tmp_path, plan.cells[0])
+    path = run_path(tmp_path, plan.cells[0])
+    with RunFile(path) as file:
+        state = fold(file.events())
+        tests = PersistentTuple.of(replace(test, wall_seconds=2.0) for test in state.tests)
+        yield plan, Work(plan.cells[0], path, 2, file, state.changed(tests=tests))
+
+
+def left(plan, ended, jobs=2, running=()):
+    return seconds_left(running, plan.cells[1:], ended, sizes(plan), jobs)
+
+
+def test_another_pair_takes_what_the_first_one_took(made):
+    plan, first = made
+    assert left(plan, [first]) == pytest.approx(TESTS * 2.0 / 2)
+    assert left(plan, [first], jobs=1) == pytest.approx(TESTS * 2.0)
+
+
+def test_tests_that_were_taken_over_took_no_time(made):
+    plan, first = made
+    tests = PersistentTuple.of(replace(test, taken=number < 4) for number, test in enumerate(first.state.tests))
+    assert left(plan, [replace(first, state=first.state.changed(tests=tests))]) == pytest.approx((TESTS - 4) * 2.0 / 2)
+
+
+def test_without_a_test_nothing_tells(made):
+    plan, first = made
+    assert (
+        left(plan, [], running=[replace(first, state=first.state.changed(tests=PersistentTuple(), status="running"))])
+        is None
+    )
+
+
+def test_one_that_failed_tells_only_what_a_test_takes(made):
+    plan, first = made
+    broken = replace(first, state=first.state.changed(status="failed"))
+    assert left(plan, [broken], jobs=1) > TESTS * 2.0
