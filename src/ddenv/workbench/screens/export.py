@@ -16,6 +16,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
+from ddenv.workbench.beside import is_open, tell
 from ddenv.workbench.wording import count, plain
 
 # What can be written: its id, what it is called, and which endings its name may have.
@@ -90,11 +91,10 @@ class ExportScreen(ModalScreen[None]):
     @work(thread=True, group="look")
     def _look(self) -> None:
         words = what_is_left(self._file)
-        self.app.call_from_thread(self._show_left, words)
+        tell(self, self._show_left, words)
 
     def _show_left(self, words: str) -> None:
-        if self.is_attached:
-            self.query_one("#export-left", Static).update(words)
+        self.query_one("#export-left", Static).update(words)
 
     @on(Checkbox.Changed)
     def _chosen(self, event: Checkbox.Changed) -> None:
@@ -163,7 +163,7 @@ class ExportScreen(ModalScreen[None]):
 
         there = [path for path in files_of(wanted) if is_there(path)]
         if there and not agreed.issuperset(there):
-            self.app.call_from_thread(self._ask, there)
+            tell(self, self._ask, there)
             return
         written: list[str] = []
         wrong = ""
@@ -174,8 +174,6 @@ class ExportScreen(ModalScreen[None]):
         self.app.call_from_thread(self._done, written, wrong)
 
     def _ask(self, there: list[Path]) -> None:
-        if not self.is_attached:
-            return
         self._busy, self._agreed = False, frozenset(there)
         names = ", ".join(plain(path.name) for path in there[:MOST_NAMED])
         more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
@@ -184,7 +182,7 @@ class ExportScreen(ModalScreen[None]):
         self.query_one("#export-write", Button).label = "Replace"
 
     def _done(self, written: list[str], wrong: str) -> None:
-        if not self.is_attached:
+        if not is_open(self):
             self.app.notify(wrong or "\n".join(written), severity="error" if wrong else "information", markup=False)
             return
         self._busy = False

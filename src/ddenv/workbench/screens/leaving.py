@@ -9,6 +9,7 @@ from textual import work
 
 from ddenv.runfile.settings import settings
 from ddenv.workbench.attach import attach_name
+from ddenv.workbench.beside import is_open
 from ddenv.workbench.processes import Scene
 from ddenv.workbench.screens.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.screens.steering import Steering
@@ -64,7 +65,7 @@ class Leaving(Steering):
         self.app.call_from_thread(self._scene_answered, dialog)
 
     def _scene_answered(self, dialog: SceneDialog) -> None:
-        if dialog.is_attached:
+        if is_open(dialog):
             dialog.refresh_address()
         elif self.scene.trouble:
             self.notify(self.scene.trouble, severity="error", markup=False)

@@ -16,6 +16,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.state import Candidate, RunState
+from ddenv.workbench.beside import tell
 from ddenv.workbench.place import place_of_run
 from ddenv.workbench.poll import Poll, Snapshot
 from ddenv.workbench.processes import Engine, Scene
@@ -135,12 +136,11 @@ class RunScreen(Leaving):
             place, notice = place_of_run(self.run), ""
         except UserError as error:
             place, notice = Place(), str(error)
-        self.app.call_from_thread(self._placed, place, notice)
+        tell(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
-        if self.is_attached:
-            self.query_one(WorldMap).set_place(place, notice)
-            self._show_models()
+        self.query_one(WorldMap).set_place(place, notice)
+        self._show_models()
 
     def set_focus(self, widget: Widget | None, scroll_visible: bool = True, from_app_focus: bool = False) -> None:
         self.run_worker(self._draw_together(), group="focus")

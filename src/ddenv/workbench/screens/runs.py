@@ -14,6 +14,7 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Footer, Input, Static
 
 from ddenv.errors import UserError
+from ddenv.workbench.beside import is_open, tell
 from ddenv.workbench.recent import Recent, RunsFolder, delete_run, named
 from ddenv.workbench.screens.question import Question
 from ddenv.workbench.widgets.run_table import RunTable
@@ -76,12 +77,10 @@ class RunsScreen(Screen[None]):
 
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(PATIENCE)
-        self.app.call_from_thread(self._show, runs)
+        tell(self, self._show, runs)
 
     def _show(self, runs: list[Recent]) -> None:
         self._reading = False
-        if not self.is_attached:
-            return
         self._runs = runs
         self._list()
         # What is not read yet is read at once, as long as there is something left.
@@ -177,7 +176,7 @@ class RunsScreen(Screen[None]):
     def _deleted(self, path: Path) -> None:
         self.notify(f"{plain(path.stem)} is deleted", timeout=3, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
-        if self.is_attached:
+        if is_open(self):
             self._list()
 
     def _complain(self, why: str) -> None:

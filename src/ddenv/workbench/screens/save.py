@@ -14,6 +14,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
+from ddenv.workbench.beside import tell
 from ddenv.workbench.save_scenario import save_scenario, scenario_path
 from ddenv.workbench.wording import plain
 
@@ -70,9 +71,9 @@ class SaveScenario(ModalScreen[Path | None]):
         try:
             save_scenario(self._scenario, path)
         except UserError as error:
-            self.app.call_from_thread(self._tell, str(error))
+            tell(self, self._tell, str(error))
             return
-        self.app.call_from_thread(self.dismiss, path)
+        tell(self, self.dismiss, path)
 
     def _tell(self, words: str) -> None:
         self.query_one("#wrong", Static).update(Text(plain(words)))

@@ -15,6 +15,7 @@ from textual.widgets import Footer, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench import form
+from ddenv.workbench.beside import tell
 from ddenv.workbench.chosen import Chosen, read_choice, read_run
 from ddenv.workbench.costs import Past, past_of
 from ddenv.workbench.place import place_of
@@ -144,11 +145,9 @@ class SetupScreen(Starting):
         from ddenv.world.bundled import SCENARIOS, bundled_names
 
         bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
-        self.app.call_from_thread(self._offer, bundled, recent_files())
+        tell(self, self._offer, bundled, recent_files())
 
     def _offer(self, bundled: list[Path], recent: list[Path]) -> None:
-        if not self.is_attached:
-            return
         files = self.query_one(FileList)
         files.offer(bundled, recent, self._like)
         if not files.option_count:
@@ -205,18 +204,16 @@ class SetupScreen(Starting):
             answer = None, Place(), "", str(error)
         if worker.is_cancelled:
             return
-        self.app.call_from_thread(self._preview, *answer)
+        tell(self, self._preview, *answer)
         if answer[0] is None:
             return
         if path == self._opened_now:
             self._remember(path)
         past = past_of(answer[0].settings, runs_folder())
         if not worker.is_cancelled:
-            self.app.call_from_thread(self._know, answer[0], past)
+            tell(self, self._know, answer[0], past)
 
     def _preview(self, chosen: Chosen | None, place: Place, name: str, wrong: str) -> None:
-        if not self.is_attached:
-            return
         self.chosen, self._awaited = chosen, False
         # What was asked for too early is not wrong any more.
         self.form.tell("")
@@ -233,7 +230,7 @@ class SetupScreen(Starting):
             self.pick("start")
 
     def _know(self, chosen: Chosen, past: Past) -> None:
-        if self.is_attached and chosen is self.chosen:
+        if chosen is self.chosen:
             self.past, self.form.seconds = past, past.seconds
             self.tell_outcome()
 

@@ -13,6 +13,7 @@ from textual.widgets import Button, Input
 
 from ddenv.errors import UserError
 from ddenv.workbench import form
+from ddenv.workbench.beside import tell
 from ddenv.workbench.chosen import Chosen
 from ddenv.workbench.command_line import command, source_of
 from ddenv.workbench.costs import Past, whole_cost
@@ -79,8 +80,8 @@ class Starting(Picking):
 
         worker = get_current_worker()
         cost = whole_cost(asked, models, jobs, past)
-        if not worker.is_cancelled and self.is_attached:
-            self.app.call_from_thread(self.form.tell_cost, cost)
+        if not worker.is_cancelled:
+            tell(self, self.form.tell_cost, cost)
 
     def _scenario(self) -> Scenario:
         """The scenario that the form describes. Raises UserError."""
@@ -161,9 +162,9 @@ class Starting(Picking):
             if only_baseline:
                 _pause_after_baseline(asked.path)
         except UserError as error:
-            self.app.call_from_thread(self.complain, error)
+            tell(self, self.complain, error)
             return
-        self.app.call_from_thread(self._started, asked.path, engine)
+        tell(self, self._started, asked.path, engine)
 
     def _remember(self, path: Path) -> None:
         """Puts a file on the list of recent ones; bundled scenarios are on the screen anyway."""
@@ -206,9 +207,9 @@ class Starting(Picking):
         try:
             saved = load_scenario(path)
         except UserError as error:
-            self.app.call_from_thread(self.complain, error)
+            tell(self, self.complain, error)
             return
-        self.app.call_from_thread(self._keep_saved, path, saved)
+        tell(self, self._keep_saved, path, saved)
 
     def _keep_saved(self, path: Path, saved: Scenario) -> None:
         self._saved = path, saved

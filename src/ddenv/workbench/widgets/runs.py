@@ -8,6 +8,7 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.map.names import shortened
+from ddenv.workbench.beside import tell
 from ddenv.workbench.recent import SHOWN, Recent, RunsFolder
 from ddenv.workbench.wording import count, plain
 
@@ -34,11 +35,9 @@ class RunList(OptionList):
 
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
-        self.app.call_from_thread(self._show, runs)
+        tell(self, self._show, runs)
 
     def _show(self, runs: list[Recent]) -> None:
-        if not self.is_attached:
-            return
         self._runs = {str(run.path): run for run in runs}
         self.clear_options()
         for run in runs:

@@ -1,0 +1,58 @@
+"""What threads tell the screen."""
+
+import asyncio
+
+import pytest
+from textual.app import App
+from textual.containers import Vertical
+from textual.screen import Screen
+from textual.widgets import Label
+
+from ddenv.workbench.beside import is_open, tell
+
+
+class Panel(Vertical):
+    """Closes slowly: what is in it has gone before."""
+
+    async def on_unmount(self):
+        await asyncio.sleep(0.3)
+
+
+class Page(Screen):
+    def compose(self):
+        with Panel():
+            yield Label("", id="cost")
+
+    def tell_cost(self, words):
+        self.query_one("#cost", Label).update(words)
+
+
+@pytest.fixture
+async def page():
+    async with (app := App()).run_test():
+        await app.push_screen(page := Page())
+        yield page
+
+
+async def test_an_open_screen_is_told(page):
+    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    assert str(page.query_one(Label).content) == "3 tests"
+    await page.app.push_screen(Page())
+    await asyncio.to_thread(tell, page, page.tell_cost, "4 tests")
+    assert str(page.query_one(Label).content) == "4 tests"
+
+
+async def test_a_screen_that_is_being_closed_is_told_nothing_more(page):
+    closing = asyncio.ensure_future(page.app.pop_screen()())
+    while list(page.query(Label)):
+        await asyncio.sleep(0.01)
+    assert not closing.done()
+    assert not is_open(page)
+    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    await closing
+    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+
+
+async def test_an_app_that_ends_is_told_nothing_more(page):
+    page.app.exit()
+    await asyncio.to_thread(tell, page, pytest.fail, "told")
