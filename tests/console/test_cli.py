@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 import yaml
@@ -13,13 +12,14 @@ import yaml
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import SCHEMA_VERSION, RunFile
 from tests.conftest import DATA
+from tests.waiting import PATIENCE, wait_until
 
 WALL = str(DATA / "wall.yaml")
 
 
 def ddenv(*words, **options):
     return subprocess.run(
-        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=120, **options
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE, **options
     )
 
 
@@ -126,9 +126,9 @@ def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
         text=True,
     )
     path = home / "runs" / "wall-1.ddenv"
-    _wait(lambda: path.exists() and engine_is_alive(path))
+    wait_until(lambda: path.exists() and engine_is_alive(path))
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert json.loads(out)["status"] == "stopped"
     assert "ddenv resume" in err
@@ -146,9 +146,11 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
     for engines, moment in enumerate((3, 9, 15), start=1):
         process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         # The one before may have made more tests than this one waits for.
-        _wait(lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least)
+        wait_until(
+            lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least
+        )
         os.kill(_engines(run)[-1], signal.SIGKILL)
-        _, err = process.communicate(timeout=30)
+        _, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 2
         assert err.count("\n") == 1
         assert "ddenv resume" in err
@@ -173,13 +175,6 @@ def _finished(run):
     with RunFile(run) as file:
         journal = Journal(file)
         return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
-
-
-def _wait(condition, seconds=60):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def test_a_second_engine_is_refused(reduced):

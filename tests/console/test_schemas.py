@@ -10,6 +10,7 @@ import pytest
 from ddenv import schemas
 from ddenv.console.schemas import lines, report
 from ddenv.map.names import width
+from tests.waiting import PATIENCE
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +65,7 @@ def test_the_command_prints_them_without_what_is_slow(words):
         f"app(['schemas', *{words}], standalone_mode=False)\n"
         "print([name for name in ('sklearn', 'numpy', 'pydrake', 'scipy') if name in sys.modules], file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
     assert done.stderr.strip() == "[]"
     if words:
         assert json.loads(done.stdout) == report()

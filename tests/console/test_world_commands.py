@@ -10,6 +10,7 @@ from ddenv.console.check import lines, report
 from ddenv.map.names import width
 from ddenv.world.read import parse_world
 from tests.conftest import DATA
+from tests.waiting import PATIENCE
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
 <model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>
@@ -27,7 +28,9 @@ def world(tmp_path):
 
 
 def ddenv(*words):
-    return subprocess.run([sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=60)
+    return subprocess.run(
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE
+    )
 
 
 def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):

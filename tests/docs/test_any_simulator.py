@@ -15,6 +15,7 @@ from ddenv.robot.external.supervise import GRACE
 from ddenv.world.command import PLACEHOLDERS
 from ddenv.world.load import load_scenario
 from tests.conftest import ROOT
+from tests.waiting import PATIENCE
 
 PAGE = (ROOT / "docs/any-simulator.md").read_text()
 SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
@@ -22,7 +23,7 @@ SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
 
 def ddenv(*words, folder):
     return subprocess.run(
-        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=120, cwd=folder
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE, cwd=folder
     )
 
 

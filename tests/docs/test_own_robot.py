@@ -13,6 +13,7 @@ from ddenv.robot.protocol import Reading, Setup
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.readings import Imu, Scan
 from tests.conftest import ROOT
+from tests.waiting import PATIENCE
 
 EXAMPLE = ROOT / "docs" / "examples" / "own_robot"
 GUIDE = (ROOT / "docs" / "own-robot.md").read_text()
@@ -32,7 +33,7 @@ def test_the_example_is_reduced_to_what_the_guide_says(tmp_path):
     """On Drake, by the command that the guide shows."""
     command = [sys.executable, "-m", "ddenv", "run", str(EXAMPLE / "scenario.yaml"), "--jobs", "2", "--json"]
     environment = os.environ | {"DDENV_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout.splitlines()[-1])
     assert "minimal environment: 2 of 12 models (83% smaller): locker_back, locker_left" in GUIDE

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 import uuid
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from tests.waiting import PATIENCE, wait_until
 
 # The program, as a shell takes it.
 DDENV = f"{sys.executable} -m ddenv"
@@ -28,7 +28,7 @@ class Terminal:
     def tmux(self, *words):
         environment = {name: value for name, value in os.environ.items() if name != "TMUX"}
         command = ["tmux", "-L", self.server, *words]
-        return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=30).stdout
+        return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE).stdout
 
     def screen(self):
         return self.tmux("capture-pane", "-p")
@@ -36,13 +36,16 @@ class Terminal:
     def press(self, *keys):
         self.tmux("send-keys", *keys)
 
-    def see(self, words, seconds=60):
+    def see(self, words):
         """The screen as soon as it shows `words`."""
-        deadline = time.monotonic() + seconds
-        while words not in (screen := self.screen()):
-            assert time.monotonic() < deadline, f"'{words}' does not show:\n{screen}"
-            time.sleep(0.1)
-        return screen
+        seen = [""]
+
+        def shows():
+            seen[:] = [self.screen()]
+            return words in seen[0]
+
+        wait_until(shows, lambda: f"'{words}' does not show:\n{seen[0]}")
+        return seen[0]
 
     def kill(self):
         self.tmux("kill-server")
@@ -51,10 +54,3 @@ class Terminal:
 def state_of(run):
     with RunFile(run) as file:
         return fold(file.events())
-
-
-def wait_for(condition, seconds=60):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)

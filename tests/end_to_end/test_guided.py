@@ -5,7 +5,8 @@ import pytest
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from tests.conftest import DATA
-from tests.end_to_end.terminal import DDENV, state_of, wait_for
+from tests.end_to_end.terminal import DDENV, state_of
+from tests.waiting import wait_until
 
 
 @pytest.fixture
@@ -16,7 +17,7 @@ def baseline(terminal, tmp_path):
     run = tmp_path / "runs" / "one.ddenv"
     with RunFile(run) as viewer:
         viewer.send("step", unit="round")
-    wait_for(lambda: state_of(run).status == "paused" and state_of(run).round is not None)
+    wait_until(lambda: state_of(run).status == "paused" and state_of(run).round is not None)
     return run
 
 
@@ -28,7 +29,7 @@ def test_a_reduction_is_guided_by_keys_alone(terminal, baseline, tmp_path):
     _pin(bench, run)
     _try_and_adopt(bench, run)
     bench.press("Space")
-    wait_for(lambda: state_of(run).status == "finished", 90)
+    wait_until(lambda: state_of(run).status == "finished")
     first = state_of(run)
     assert first.minimal
     assert {"deck", "wall", "ball"} == set(first.environment)
@@ -48,33 +49,33 @@ def _veto_and_take_it_back(bench, run):
     bench.press("v")
     bench.see("⊘ vetoed")
     bench.press("v")
-    wait_for(lambda: not state_of(run).round.candidates[0].verdict)
+    wait_until(lambda: not state_of(run).round.candidates[0].verdict)
 
 
 def _pin(bench, run):
     bench.press("p")
     bench.see("part of a name")
     bench.press("b", "a", "l", "l", "Tab", "Enter")
-    wait_for(lambda: state_of(run).pinned == {"ball"})
+    wait_until(lambda: state_of(run).pinned == {"ball"})
 
 
 def _try_and_adopt(bench, run):
     bench.press("w")
     bench.see("part of a name")
     bench.press("f", "a", "r", "Tab", "Enter")
-    wait_for(lambda: state_of(run).trials and state_of(run).trials[0].verdict == "similar")
+    wait_until(lambda: state_of(run).trials and state_of(run).trials[0].verdict == "similar")
     bench.see("● a adopts")
     # The trials are the first rows of the table.
     bench.press("Home", "a")
-    wait_for(lambda: state_of(run).here.how == "adopted")
+    wait_until(lambda: state_of(run).here.how == "adopted")
 
 
 def _undo(bench, run):
     bench.see("finished")
     left = len(state_of(run).nodes)
     bench.press("u")
-    wait_for(lambda: state_of(run).nodes[left - 1].rejected)
-    wait_for(lambda: state_of(run).status == "finished", 90)
+    wait_until(lambda: state_of(run).nodes[left - 1].rejected)
+    wait_until(lambda: state_of(run).status == "finished")
 
 
 def _branch(bench, run):
@@ -87,7 +88,7 @@ def _branch(bench, run):
     bench.press("Enter")
     bench.see("The run pauses there")
     bench.press("y")
-    wait_for(lambda: state_of(run).node == 0 and state_of(run).status == "paused", 90)
+    wait_until(lambda: state_of(run).node == 0 and state_of(run).status == "paused")
     bench.see("A B parts")
 
 
@@ -95,7 +96,7 @@ def _export(bench, folder):
     bench.press("E")
     bench.see("report (HTML)")
     bench.press("C-s")
-    wait_for(lambda: (folder / "one.html").exists() and (folder / "one.minimal.sdf").exists())
+    wait_until(lambda: (folder / "one.html").exists() and (folder / "one.minimal.sdf").exists())
     bench.press("Escape")
     bench.see("A B parts")
 

@@ -7,7 +7,8 @@ import pytest
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from tests.conftest import DATA
-from tests.end_to_end.terminal import state_of, wait_for
+from tests.end_to_end.terminal import state_of
+from tests.waiting import wait_until
 
 
 @pytest.mark.parametrize(("width", "height"), [(120, 36), (80, 24)])
@@ -24,14 +25,14 @@ def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, heig
     assert engine_is_alive(run)
     bench.press("t")
     bench.see("accept: ask")
-    wait_for(lambda: not any(test.outcome == "running" for test in state_of(run).tests))
+    wait_until(lambda: not any(test.outcome == "running" for test in state_of(run).tests))
     before = len(state_of(run).finished_tests)
     bench.press("s")
     bench.see(f"‖ paused   {before + 1} test")
     bench.press("Space")
     bench.see("a accepts it")
     bench.press("a")
-    wait_for(lambda: len(state_of(run).environment) < 6)
+    wait_until(lambda: len(state_of(run).environment) < 6)
 
     bench.kill()
     time.sleep(0.5)

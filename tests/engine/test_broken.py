@@ -19,7 +19,8 @@ from ddenv.launch.scenarios import load_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.test_pool import EVERYTHING, result, workers
-from tests.robot.external.own import FAMILY, SLEEP, TOKEN, own_scenario, processes_with, wait_until
+from tests.robot.external.own import FAMILY, SLEEP, TOKEN, own_scenario, processes_with
+from tests.waiting import PATIENCE, wait_until
 
 COMMAND = "DDENV_WORLD="
 
@@ -34,7 +35,7 @@ def token(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setenv("TMPDIR", str(temporary))
     yield token
-    wait_until(lambda: not processes_with(token, COMMAND) and not list(temporary.glob("ddenv-*")), 20)
+    wait_until(lambda: not processes_with(token, COMMAND) and not list(temporary.glob("ddenv-*")))
 
 
 def own_pool(folder: Path, code: str, **options) -> Pool:
@@ -102,7 +103,7 @@ def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
     else:
         engine.send_signal(signal.SIGKILL if way == "killed" else signal.SIGTERM)
     engine.wait(30)
-    wait_until(lambda: not processes_with(token), 20)
+    wait_until(lambda: not processes_with(token))
 
 
 # Fails where the deck and the wall are; from the fourth run on it breaks until it is mended.
@@ -149,7 +150,7 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
 
 def _resume(run: Path) -> subprocess.CompletedProcess:
     words = [sys.executable, "-m", "ddenv", "resume", str(run), "--jobs", "2"]
-    return subprocess.run(words, capture_output=True, text=True, timeout=120)
+    return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
 
 
 def test_where_all_of_the_baseline_breaks_there_is_nothing_to_reduce(tmp_path):

@@ -13,6 +13,7 @@ from ddenv.errors import UserError
 from ddenv.launch.scenarios import load_parts
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
+from tests.waiting import wait_until
 
 EVERYTHING = frozenset({"deck", "wall"})
 
@@ -32,11 +33,9 @@ def pool():
 
 
 def result(pool):
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        for one in pool.finished(0.2):
-            return one
-    raise AssertionError("no test ended")
+    ended = []
+    wait_until(lambda: ended.extend(pool.finished(0.2)) or ended, lambda: "no test ended")
+    return ended[0]
 
 
 def workers(pool):
@@ -73,9 +72,7 @@ def _test_a_dying_worker(pool):
 
 def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(pool):
     pool.submit(1, EVERYTHING, 0)
-    deadline = time.monotonic() + 60
-    while not pool.live():
-        assert time.monotonic() < deadline
+    wait_until(pool.live)
     for pid in workers(pool):
         os.kill(pid, signal.SIGKILL)
     test, broken = result(pool)

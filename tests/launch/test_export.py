@@ -14,6 +14,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
 from tests.conftest import ROOT
+from tests.waiting import PATIENCE
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
@@ -197,7 +198,7 @@ def test_the_command_line_says_what_is_still_needed(tmp_path, folder):
         (tmp_path / f"{name}.obj").write_text(TETRAHEDRON)
     models = [mesh(name, tmp_path / f"{name}.obj", 5 + 3 * number) for number, name in enumerate("abcde")]
     words = [sys.executable, "-m", "ddenv", "export", run_of(tmp_path, models), "--sdf", folder / "m.sdf"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
     assert done.stdout == f"wrote {folder / 'm.sdf'}\n"
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith(f"{folder / 'm.sdf'} still needs ")

@@ -19,6 +19,8 @@ import pytest
 from PIL import Image
 from tornado.websocket import websocket_connect
 
+from tests.waiting import PATIENCE, wait_until
+
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
 
@@ -60,12 +62,8 @@ def chromium(size: tuple[int, int]):
 
 
 def _protocol_port(file: Path) -> int:
-    deadline = time.monotonic() + 15
-    while time.monotonic() < deadline:
-        if file.exists() and (lines := file.read_text().splitlines()):
-            return int(lines[0])
-        time.sleep(0.05)
-    raise TimeoutError("chromium did not start")
+    wait_until(lambda: file.exists() and file.read_text().splitlines(), lambda: "chromium did not start")
+    return int(file.read_text().splitlines()[0])
 
 
 class Page:
@@ -77,7 +75,7 @@ class Page:
 
     @classmethod
     async def open(cls, port: int) -> Page:
-        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=5) as answer:
+        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=PATIENCE) as answer:
             tabs = json.load(answer)
         address = next(tab["webSocketDebuggerUrl"] for tab in tabs if tab["type"] == "page")
         return cls(await websocket_connect(address, max_message_size=100_000_000))
@@ -105,6 +103,14 @@ class Page:
         return base64.b64decode((await self.do("Page.captureScreenshot", format="png"))["data"])
 
 
+async def shows(page: Page, expression: str) -> None:
+    """Returns when a JavaScript expression is true."""
+    deadline = time.monotonic() + PATIENCE
+    while not await page.value(expression):
+        assert time.monotonic() < deadline, expression
+        await asyncio.sleep(0.1)
+
+
 def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> int:
     """How many pixels are of about this colour."""
     return int((np.abs(picture.astype(int) - color).max(axis=2) <= reach).sum())
@@ -119,11 +125,8 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
     with chromium((900, 600)) as port:
         page = await Page.open(port)
         await page.do("Page.navigate", url=url)
-        deadline = time.monotonic() + 20
         ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
-        while not await page.value(ready):
-            assert time.monotonic() < deadline, "the page does not draw"
-            await asyncio.sleep(0.1)
+        await shows(page, ready)
         assert await page.value("document.title") == "small · ddenv"
         assert await page.value("document.querySelector('#caption .models').textContent") == "2 of 4 models"
         assert await page.value("viewer.scene_tree.find(['world', 'models', '003 board']).object.visible") is False
@@ -131,9 +134,8 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
         picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))
         process.terminate()
-        process.wait(5)
-        await asyncio.sleep(0.3)
-        assert await page.value("document.getElementById('lost').style.display") == "block"
+        process.wait(PATIENCE)
+        await shows(page, "document.getElementById('lost').style.display === 'block'")
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 200
     assert near(picture, (240, 190, 20)) > 100, "the robot's yellow"
     assert near(picture, (20, 180, 75)) > 100, "the goal's green"

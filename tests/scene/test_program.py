@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import re
@@ -10,7 +11,7 @@ import signal
 import socket
 import subprocess
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -21,6 +22,7 @@ from tornado.websocket import websocket_connect
 
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import Live
+from tests.waiting import PATIENCE, wait_until
 
 
 def url_of(process: subprocess.Popen) -> str:
@@ -48,21 +50,27 @@ def listening(pid: int) -> list[str]:
     return addresses
 
 
-async def messages(url: str, seconds: float, headers: dict[str, str] | None = None) -> list[bytes | str]:
-    """What a browser is told in its first `seconds`."""
+Told = list[bytes | str]
+
+
+async def messages(url: str, enough: Callable[[Told], bool] = bool, headers: dict[str, str] | None = None) -> Told:
+    """What a browser is told from its first moment until that is `enough`."""
     connection = await websocket_connect(HTTPRequest(feed_of(url), headers=headers or {}), max_message_size=10_000_000)
-    found, end = [], time.monotonic() + seconds
-    while (left := end - time.monotonic()) > 0:
-        try:
-            found.append(await asyncio.wait_for(connection.read_message(), left))
-        except TimeoutError:
-            break
+    found: Told = []
+    while not enough(found):
+        found.append(await asyncio.wait_for(connection.read_message(), PATIENCE))
+        assert found[-1] is not None, "the scene has hung up"
     connection.close()
     return found
 
 
-def caption(found: list[bytes | str]) -> dict[str, str]:
-    return json.loads([message for message in found if isinstance(message, str)][-1])
+def captions(found: Told) -> list[dict[str, str]]:
+    return [json.loads(message) for message in found if isinstance(message, str)]
+
+
+def titled(title: str) -> Callable[[Told], bool]:
+    """Whether the last caption has a title that begins so."""
+    return lambda found: any(words["title"].startswith(title) for words in captions(found)[-1:])
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's /proc/net/tcp")
@@ -87,14 +95,16 @@ def test_page_and_viewer_are_served_and_nothing_else(writer, start_scene):
 
 async def test_a_browser_gets_the_scene_and_its_words(writer, start_scene):
     writer.baseline()
-    found = await messages(url_of(start_scene(writer.path)), 1.0)
-    drawn = [message for message in found if isinstance(message, bytes) and b"set_object" in message]
-    assert len(drawn) > 10
-    words = caption(found)
+
+    def mention(found, words):
+        return sum(isinstance(message, bytes) and words in message for message in found)
+
+    def drawn_and_moving(found):
+        return captions(found) and mention(found, b"set_object") > 10 and mention(found, b"/world/robot") > 5
+
+    words = captions(await messages(url_of(start_scene(writer.path)), drawn_and_moving))[-1]
     assert (words["name"], words["models"]) == ("small", "4 of 4 models")
     assert words["title"] == "the failure f · test 1 · similar · replay at 4×"
-    moves = [message for message in found if isinstance(message, bytes) and b"/world/robot" in message]
-    assert len(moves) > 5
 
 
 async def test_a_running_test_is_followed(writer, start_scene):
@@ -104,13 +114,12 @@ async def test_a_running_test_is_followed(writer, start_scene):
     with engine_lock(writer.path):
         writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
         url = url_of(start_scene(writer.path))
-        words = caption(await messages(url, 0.7))
-        assert words["title"] == "round 1 · part B · test 2 · runs now"
+        words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
         writer.run.set_live([])
         writer.finish_test(2, "similar")
     # The engine is gone without an event: the scene goes back to the failure.
-    assert caption(await messages(url, 3.6))["title"].startswith("the failure f")
+    await messages(url, titled("the failure f"))
 
 
 async def test_rows_of_a_killed_engine_are_not_live(writer, start_scene):
@@ -119,28 +128,29 @@ async def test_rows_of_a_killed_engine_are_not_live(writer, start_scene):
     writer.start_test(2, candidate=1)
     writer.run.set_live([Live(0, 2, 1.5, (1.0, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0))])
     url = url_of(start_scene(writer.path))
-    assert caption(await messages(url, 0.5))["title"].startswith("the failure f")
+    found = await messages(url, titled("the failure f"))
+    assert not any("runs now" in words["title"] for words in captions(found))
 
 
 async def test_pages_from_elsewhere_are_refused(writer, start_scene):
     url = url_of(start_scene(writer.path))
     for origin in ("http://evil.example", "http://127.0.0.1.evil.example", "null", "http://[", "file://", ""):
         with pytest.raises(HTTPClientError) as error:
-            await messages(url, 0.3, {"Origin": origin})
+            await messages(url, headers={"Origin": origin})
         assert error.value.code == 403, origin
 
 
 async def test_a_name_made_to_lead_here_is_refused(writer, start_scene):
     url = url_of(start_scene(writer.path))
     with pytest.raises(HTTPClientError) as error:
-        await messages(url, 0.3, {"Origin": "http://evil.example:7000", "Host": "evil.example:7000"})
+        await messages(url, headers={"Origin": "http://evil.example:7000", "Host": "evil.example:7000"})
     assert error.value.code == 403
 
 
 async def test_own_pages_are_welcome_also_through_a_tunnel(writer, start_scene):
     url = url_of(start_scene(writer.path))
     for origin in ("http://localhost:8123", "http://127.0.0.1:7000", "http://[::1]:7000"):
-        assert await messages(url, 0.1, {"Origin": origin})
+        assert await messages(url, headers={"Origin": origin})
 
 
 async def test_browsers_come_and_go(writer, start_scene):
@@ -148,12 +158,12 @@ async def test_browsers_come_and_go(writer, start_scene):
     process = start_scene(writer.path)
     url = url_of(process)
     for _ in range(3):
-        assert await messages(url, 0.2)
+        assert await messages(url)
     connection = await websocket_connect(feed_of(url))
     connection.protocol.stream.close()
     await asyncio.sleep(0.3)
     assert process.poll() is None
-    assert await messages(url, 0.2)
+    assert await messages(url)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
@@ -162,7 +172,7 @@ async def test_ends_cleanly(writer, start_scene, number):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))
     process.send_signal(number)
-    assert await asyncio.to_thread(process.wait, 5) == 0
+    assert await asyncio.to_thread(process.wait, PATIENCE) == 0
     assert process.stderr.read() == ""
     connection.close()
 
@@ -173,16 +183,18 @@ def test_ends_with_its_parent(writer):
         f"child = subprocess.Popen([sys.executable, '-m', 'ddenv.scene', {str(writer.path)!r}], stdout=subprocess.PIPE)\n"
         "print(child.pid, child.stdout.readline().decode(), flush=True)"
     )
-    parent = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=True)
+    parent = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, check=True)
     port = int(parent.stdout.split(":")[2].split("/")[0])
-    deadline = time.monotonic() + 5
-    while time.monotonic() < deadline:
+
+    def gone():
         with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) != 0:
-                return
-        time.sleep(0.05)
-    os.kill(int(parent.stdout.split()[0]), signal.SIGKILL)
-    pytest.fail("the scene outlives its parent")
+            return probe.connect_ex(("127.0.0.1", port)) != 0
+
+    try:
+        wait_until(gone, lambda: "the scene outlives its parent")
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(int(parent.stdout.split()[0]), signal.SIGKILL)
 
 
 def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
@@ -191,7 +203,7 @@ def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
     assert first != second
     taken = first.split(":")[2].split("/")[0]
     process = start_scene(writer.path, "--port", taken)
-    assert process.wait(10) == 2
+    assert process.wait(PATIENCE) == 2
     assert process.stderr.read().count("\n") == 1
 
 
@@ -200,7 +212,7 @@ def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
 )
 def test_user_errors_are_one_line(start_scene, words):
     process = start_scene(*words)
-    assert process.wait(10) == 2
+    assert process.wait(PATIENCE) == 2
     error = process.stderr.read()
     assert error.startswith("ddenv.scene: ")
     assert error.count("\n") == 1
@@ -210,14 +222,14 @@ def test_user_errors_are_one_line(start_scene, words):
 @pytest.mark.parametrize("port", ["-1", "70000", "99999999999"])
 def test_ports_that_do_not_exist(writer, start_scene, port):
     process = start_scene(writer.path, "--port", port)
-    assert process.wait(10) == 2
+    assert process.wait(PATIENCE) == 2
     assert process.stderr.read().count("\n") == 1
 
 
 def test_a_damaged_run_file_is_one_line(writer, start_scene):
     writer.run.append("nonsense", {})
     process = start_scene(writer.path)
-    assert process.wait(10) == 2
+    assert process.wait(PATIENCE) == 2
     error = process.stderr.read()
     assert "unknown kind" in error
     assert error.count("\n") == 1
@@ -227,6 +239,6 @@ async def test_a_run_file_that_is_damaged_while_shown(writer, start_scene):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))
     writer.run.append("nonsense", {})
-    assert await asyncio.to_thread(process.wait, 5) == 2
+    assert await asyncio.to_thread(process.wait, PATIENCE) == 2
     assert process.stderr.read().count("\n") == 1
     connection.close()

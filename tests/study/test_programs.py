@@ -11,10 +11,10 @@ import pytest
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.study.folder import run_path, sittings
-from tests.robot.external.own import wait_until
 from tests.study.made import plan_of, wall
 from tests.study.quick import Lab
 from tests.study.test_work import fails, study, told
+from tests.waiting import PATIENCE, wait_until
 
 # Counts its runs, and waits before each unless it may go on: so many at a time.
 ROBOT = """
@@ -60,7 +60,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
 
     def stands_at(number):
         """The next test waits."""
-        wait_until(lambda: made.exists() and len(made.read_text()) > number, 300)
+        wait_until(lambda: made.exists() and len(made.read_text()) > number)
 
     # Killed, its engine lives on, until it is killed as well.
     most.write_text("2")
@@ -77,7 +77,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     second = start()
     stands_at(6)
     second.send_signal(signal.SIGINT)
-    said, complained = second.communicate(timeout=300)
+    said, complained = second.communicate(timeout=PATIENCE)
     assert (second.returncode, complained) == (130, "interrupted; the same command goes on where it was\n")
     assert "0 of 1 cell minimal; wrote study/study.html" in said
     assert (folder / "study.html").exists() and not engine_is_alive(run)
@@ -85,7 +85,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     # Nothing in its way any more.
     most.write_text("1000")
     third = start()
-    said, complained = third.communicate(timeout=300)
+    said, complained = third.communicate(timeout=PATIENCE)
     assert (third.returncode, complained) == (0, "")
     assert "1 of 1 cell minimal; wrote study/study.html" in said
     assert len(sittings(folder)) == 3

@@ -20,9 +20,9 @@ from ddenv.study.conduct import conduct
 from ddenv.study.folder import run_path, sittings
 from ddenv.study.found import read_cell
 from ddenv.study.progress import Progress
-from tests.robot.external.own import wait_until
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
+from tests.waiting import wait_until
 
 NEEDED = {"deck", "wall"}
 METHODS = {"pairs": "model2model/failure-proximal,model2model/sequential", "algorithms": "splitting"}

@@ -10,8 +10,15 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import fake_run
 
+from ddenv.workbench.app import Workbench
+
 # Every event of a test happens now, Unix time s; the screen looks 83 s later.
 MOMENT = 1_700_000_000.0
+
+
+def lasting(notify):
+    """As `notify`, but what is said stays for the whole test."""
+    return lambda app, message, **options: notify(app, message, **options | {"timeout": 3600.0})
 
 
 @pytest.fixture(autouse=True)
@@ -19,6 +26,7 @@ def still_time(monkeypatch):
     """Neither events nor screens depend on the clock."""
     monkeypatch.setattr("ddenv.runfile.store.time", SimpleNamespace(time=lambda: MOMENT))
     monkeypatch.setattr("ddenv.workbench.poll.now", lambda: MOMENT + 83.0)
+    monkeypatch.setattr("ddenv.workbench.app.Workbench.notify", lasting(Workbench.notify))
     monkeypatch.setenv("TZ", "UTC")
     monkeypatch.delenv("NO_COLOR", raising=False)
 

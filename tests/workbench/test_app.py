@@ -1,7 +1,6 @@
 """What holds on every screen: help, the list of commands, keys of the user's own, and the program in a browser."""
 
 import asyncio
-import contextlib
 import os
 import re
 import socket
@@ -18,6 +17,7 @@ from ddenv.workbench.config import Config
 from ddenv.workbench.screens.dialogs import Help
 from ddenv.workbench.screens.runs import RunsScreen
 from ddenv.workbench.shortcuts import commands, groups
+from tests.waiting import PATIENCE, settled
 
 
 def told(screen):
@@ -53,23 +53,23 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
         shortcuts = commands(pilot.app.screen)
         assert all(shortcut.words for shortcut in shortcuts)
         assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.veto", "app.leave"}
-        assert any("choose the colours" in words for words in await searched(pilot, "choose the colours"))
-        assert "go to [bold]box_1[/] on the map" in await searched(pilot, "box_1")
+        await offers(pilot, "choose the colours", "choose the colours")
+        await offers(pilot, "box_1", "go to [bold]box_1[/] on the map\n")
 
 
-async def searched(pilot, query):
-    """What the list of commands offers for a query."""
+async def offers(pilot, query, words):
+    """The list of commands offers what has these words, for a query."""
     await pilot.press("ctrl+p")
     assert isinstance(pilot.app.screen, CommandPalette)
     await pilot.press(*query)
     listed = pilot.app.screen.query_one(OptionList)
-    for _ in range(200):
-        await pilot.pause(0.02)
-        if listed.option_count:
-            break
-    words = [str(listed.get_option_at_index(index).prompt).split("\n")[0] for index in range(listed.option_count)]
+
+    def offered():
+        return [f"{listed.get_option_at_index(index).prompt}\n" for index in range(listed.option_count)]
+
+    # What matches is found by and by.
+    await settled(lambda: any(words in prompt for prompt in offered()), lambda: str(offered()))
     await pilot.press("escape")
-    return words
 
 
 @pytest.mark.parametrize("theme", ["ddenv-light", "ansi-dark"])
@@ -88,7 +88,7 @@ async def test_every_theme_can_be_worn(run, theme):
 
 def test_serving_is_for_this_machine_alone(runs):
     refused = subprocess.run(
-        [sys.executable, "-m", "ddenv", "serve", "--host", "0.0.0.0"], capture_output=True, text=True, timeout=60
+        [sys.executable, "-m", "ddenv", "serve", "--host", "0.0.0.0"], capture_output=True, text=True, timeout=PATIENCE
     )
     assert refused.returncode == 2 and "127.0.0.1 alone" in refused.stderr
 
@@ -101,6 +101,11 @@ def test_without_the_package_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "textual_serve.server", None)
     with pytest.raises(UserError, match=r"pip install 'ddenv\[serve\]'"):
         serve(8000)
+
+
+def listens(port):
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
@@ -117,11 +122,7 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
         said = [(await server.stdout.readline()).decode() for _ in range(4)]
         assert own in said[0] and "acts as" in said[1] and f"ssh -L {port}:127.0.0.1:{port}" in said[3]
         async with aiohttp.ClientSession() as session:
-            for _ in range(100):
-                with contextlib.suppress(aiohttp.ClientConnectorError):
-                    (await session.get(own)).close()
-                    break
-                await asyncio.sleep(0.1)
+            await settled(lambda: listens(port))
             async with session.get(own) as page:
                 assert page.status == 200 and "textual.js" in await page.text()
             async with session.get(own, headers={"Host": "elsewhere.example"}) as page:
@@ -131,7 +132,7 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
             async with session.ws_connect(f"{own}/ws?width=120&height=36", headers={"Origin": own}) as socketed:
                 seen = b""
                 while b"crates" not in seen:
-                    message = await socketed.receive(timeout=60)
+                    message = await socketed.receive(timeout=PATIENCE)
                     assert message.type is aiohttp.WSMsgType.BINARY, message
                     seen += message.data
                 await socketed.send_json(["stdin", "\x11"])

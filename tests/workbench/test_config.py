@@ -15,6 +15,7 @@ from ddenv.errors import UserError
 from ddenv.workbench.config import Config, config_path, read_config
 from ddenv.workbench.keys import actions, checked, shown_key, written
 from ddenv.workbench.themes import ANSI, DARK, LIGHT, OURS, fitting, for_rich
+from tests.waiting import PATIENCE
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_what_is_wrong_is_told_with_its_place(config, text, told):
 
 def test_a_wrong_file_ends_the_program_before_the_screen(config, runs):
     path = config("keys: {run.puse: p}")
-    done = subprocess.run([sys.executable, "-m", "ddenv"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-m", "ddenv"], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.startswith(f"ddenv: {path}: keys: ") and done.stderr.count("\n") == 1
 

@@ -7,7 +7,8 @@ import pytest
 
 from ddenv.launch.scenarios import load_parts
 from ddenv.robot.external.simulator import ExternalSimulator
-from tests.robot.external.own import TOKEN, own_scenario, processes_with, wait_until
+from tests.robot.external.own import TOKEN, own_scenario, processes_with
+from tests.waiting import wait_until
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +20,7 @@ def tidy(tmp_path, monkeypatch):
     temporary.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     yield
-    wait_until(lambda: not processes_with(token) and not list(temporary.iterdir()), 20)
+    wait_until(lambda: not processes_with(token) and not list(temporary.iterdir()))
 
 
 @pytest.fixture

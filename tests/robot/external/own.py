@@ -2,13 +2,12 @@
 
 import sys
 import textwrap
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle, Scenario
 from tests.conftest import DATA
+from tests.waiting import PATIENCE
 
 TOKEN = "DDENV_TEST_TOKEN"
 
@@ -27,7 +26,7 @@ subprocess.Popen([sys.executable, "-c", {STUBBORN!r}])
 """
 
 
-def own_scenario(folder: Path, code: str, words: str = "", wall_timeout: float = 20.0, **reduction) -> Scenario:
+def own_scenario(folder: Path, code: str, words: str = "", wall_timeout: float = PATIENCE, **reduction) -> Scenario:
     """The scenario of the small world with the Python program `code`, kept in `folder`."""
     (folder / "robot.py").write_text(textwrap.dedent(code))
     scenario = load_scenario(DATA / "wall.yaml")
@@ -52,10 +51,3 @@ def processes_with(*marks: str) -> list[tuple[str, bytes]]:
         except OSError:
             continue
     return found
-
-
-def wait_until(true: Callable[[], object], seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)

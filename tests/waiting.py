@@ -1,0 +1,28 @@
+"""How tests wait for what other programs, threads and screens do."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+# Only what hangs takes so long (s): a slow machine is no bug.
+PATIENCE = 300.0
+# Between two looks (s).
+PERIOD = 0.02
+
+
+def wait_until(true: Callable[[], object], what: Callable[[], object] = str) -> None:
+    """Returns when `true()` holds. Raises AssertionError with `what()` when it never does."""
+    deadline = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < deadline, what()
+        time.sleep(PERIOD)
+
+
+async def settled(true: Callable[[], object], what: Callable[[], object] = str) -> None:
+    """As `wait_until`, while the event loop goes on."""
+    deadline = time.monotonic() + PATIENCE
+    while not true():
+        assert time.monotonic() < deadline, what()
+        await asyncio.sleep(PERIOD)
