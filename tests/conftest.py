@@ -1,6 +1,7 @@
 """What tests of several rooms share."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,10 @@ from hypothesis import HealthCheck, settings
 # A slow machine is no bug.
 settings.register_profile("ddenv", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("ddenv")
+
+# Programs that tests start can be interrupted, also where the tests run in the background.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 DATA = Path(__file__).parent / "data"
 ROOT = Path(__file__).parents[1]
