@@ -127,10 +127,10 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
         await page.do("Page.navigate", url=url)
         ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
         await shows(page, ready)
-        assert await page.value("document.title") == "small · ddenv"
-        assert await page.value("document.querySelector('#caption .models').textContent") == "2 of 4 models"
-        assert await page.value("viewer.scene_tree.find(['world', 'models', '003 board']).object.visible") is False
-        assert await page.value("viewer.scene_tree.find(['world', 'removed', '003 board']).object.visible") is True
+        await shows(page, "document.title === 'small · ddenv'")
+        await shows(page, "document.querySelector('#caption .models').textContent === '2 of 4 models'")
+        await shows(page, "viewer.scene_tree.find(['world', 'models', '003 board']).object.visible === false")
+        await shows(page, "viewer.scene_tree.find(['world', 'removed', '003 board']).object.visible === true")
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
         picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))
         process.terminate()
