@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 # Only what hangs takes so long (s): a slow machine is no bug.
 PATIENCE = 300.0
@@ -20,9 +20,9 @@ def wait_until(true: Callable[[], object], what: Callable[[], object] = str) -> 
         time.sleep(PERIOD)
 
 
-async def settled(true: Callable[[], object], what: Callable[[], object] = str) -> None:
+async def eventually(true: Callable[[], Awaitable[object]], what: Callable[[], object] = str) -> None:
     """As `wait_until`, while the event loop goes on."""
     deadline = time.monotonic() + PATIENCE
-    while not true():
+    while not await true():
         assert time.monotonic() < deadline, what()
         await asyncio.sleep(PERIOD)

@@ -102,7 +102,7 @@ def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
             file.send("stop")
     else:
         engine.send_signal(signal.SIGKILL if way == "killed" else signal.SIGTERM)
-    engine.wait(30)
+    engine.wait(PATIENCE)
     wait_until(lambda: not processes_with(token))
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
 import io
 import json
 import shutil
 import subprocess
 import tempfile
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.request import urlopen
@@ -19,7 +17,7 @@ import pytest
 from PIL import Image
 from tornado.websocket import websocket_connect
 
-from tests.waiting import PATIENCE, wait_until
+from tests.waiting import PATIENCE, eventually, wait_until
 
 CHROMIUM = shutil.which("chromium")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine: the picture cannot be looked at")
@@ -105,10 +103,7 @@ class Page:
 
 async def shows(page: Page, expression: str) -> None:
     """Returns when a JavaScript expression is true."""
-    deadline = time.monotonic() + PATIENCE
-    while not await page.value(expression):
-        assert time.monotonic() < deadline, expression
-        await asyncio.sleep(0.1)
+    await eventually(lambda: page.value(expression), lambda: expression)
 
 
 def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> int:

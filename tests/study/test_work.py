@@ -22,7 +22,7 @@ from ddenv.study.found import read_cell
 from ddenv.study.progress import Progress
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE, wait_until
 
 NEEDED = {"deck", "wall"}
 METHODS = {"pairs": "model2model/failure-proximal,model2model/sequential", "algorithms": "splitting"}
@@ -187,7 +187,7 @@ def test_cells_that_come_to_no_end_are_told_and_the_others_are_made(tmp_path, la
 def orphan(lab, folder, plan, gate):
     """An engine that an earlier study left; it goes on to its end once `gate` is set."""
     (cell,) = plan.cells
-    lab.before = lambda run, made: gate.wait(30)
+    lab.before = lambda run, made: gate.wait(PATIENCE)
     engine = lab.start_engine(run_path(folder, cell), 1)
     wait_until(lambda: engine_is_alive(run_path(folder, cell)))
     return engine

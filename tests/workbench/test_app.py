@@ -17,7 +17,7 @@ from ddenv.workbench.config import Config
 from ddenv.workbench.screens.dialogs import Help
 from ddenv.workbench.screens.runs import RunsScreen
 from ddenv.workbench.shortcuts import commands, groups
-from tests.waiting import PATIENCE, settled
+from tests.waiting import PATIENCE, eventually
 
 
 def told(screen):
@@ -64,11 +64,12 @@ async def offers(pilot, query, words):
     await pilot.press(*query)
     listed = pilot.app.screen.query_one(OptionList)
 
-    def offered():
-        return [f"{listed.get_option_at_index(index).prompt}\n" for index in range(listed.option_count)]
+    async def offered():
+        prompts = [listed.get_option_at_index(index).prompt for index in range(listed.option_count)]
+        return any(words in f"{prompt}\n" for prompt in prompts)
 
     # What matches is found by and by.
-    await settled(lambda: any(words in prompt for prompt in offered()), lambda: str(offered()))
+    await eventually(offered, lambda: f"'{words}' is not offered")
     await pilot.press("escape")
 
 
@@ -103,7 +104,7 @@ def test_without_the_package_it_says_what_to_install(monkeypatch):
         serve(8000)
 
 
-def listens(port):
+async def listens(port):
     with socket.socket() as probe:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
@@ -122,7 +123,7 @@ async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
         said = [(await server.stdout.readline()).decode() for _ in range(4)]
         assert own in said[0] and "acts as" in said[1] and f"ssh -L {port}:127.0.0.1:{port}" in said[3]
         async with aiohttp.ClientSession() as session:
-            await settled(lambda: listens(port))
+            await eventually(lambda: listens(port))
             async with session.get(own) as page:
                 assert page.status == 200 and "textual.js" in await page.text()
             async with session.get(own, headers={"Host": "elsewhere.example"}) as page:

@@ -14,8 +14,10 @@ import pytest
 from ddenv.cli import main
 from tests.waiting import PATIENCE
 
-# Generous for a busy machine; what hangs takes for ever.
+# Bytes, and seconds of CPU: generous for a slow machine, and other work on it does not count.
 MEMORY = 3 << 30
+SECONDS = 30
+AT_ONCE = 10
 BOX = "<geometry><box><size>1 2 3</size></box></geometry>"
 LINK = f"<link name='l'><collision name='c'>{BOX}</collision></link>"
 MODEL = f"<model name='m'>{LINK}</model>"
@@ -69,11 +71,12 @@ def in_process(monkeypatch, capsys, *arguments: object) -> Said:
     return Said(code, printed.out, printed.err + "".join(f"{each.message}\n" for each in told))
 
 
-def in_own_process(*arguments: object, **environment: str) -> Said:
+def in_own_process(*arguments: object, seconds: int = SECONDS, **environment: str) -> Said:
     """`ddenv world check` as a user starts it, with an end to its time and its memory."""
 
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
 
     done = subprocess.run(
         [sys.executable, "-m", "ddenv", "world", "check", *map(str, arguments)],
@@ -529,7 +532,7 @@ def test_a_gigabyte_is_refused_at_once(tmp_path):
     path = tmp_path / "large.world"
     with path.open("wb") as file:
         file.truncate(1 << 30)
-    assert "too large" in refusal(in_own_process(path), path)
+    assert "too large" in refusal(in_own_process(path, seconds=AT_ONCE), path)
 
 
 @pytest.mark.parametrize(
@@ -540,7 +543,7 @@ def test_a_gigabyte_that_is_named_is_refused_at_once(tmp_path, text):
         file.truncate(1 << 30)
     path = tmp_path / "hostile.world"
     path.write_bytes(text)
-    assert "MB" in refusal(in_own_process(path), path)
+    assert "MB" in refusal(in_own_process(path, seconds=AT_ONCE), path)
 
 
 def test_a_folder_is_refused(tmp_path):
@@ -555,19 +558,19 @@ def test_a_file_that_is_missing_is_refused(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("name", ["/dev/zero", "/dev/null", "/dev/tty"])
 def test_a_device_is_refused(name):
-    refusal(in_own_process(name), name)
+    refusal(in_own_process(name, seconds=AT_ONCE), name)
 
 
 def test_a_pipe_is_refused_and_not_waited_on(tmp_path):
     path = tmp_path / "pipe.world"
     os.mkfifo(path)
-    refusal(in_own_process(path), path)
+    refusal(in_own_process(path, seconds=AT_ONCE), path)
     other = tmp_path / "hostile.world"
     for text in (world(include("pipe.world")), shape("<mesh><uri>pipe.obj</uri></mesh>")):
         (tmp_path / "pipe.obj").unlink(missing_ok=True)
         os.mkfifo(tmp_path / "pipe.obj")
         other.write_bytes(text)
-        refusal(in_own_process(other), other)
+        refusal(in_own_process(other, seconds=AT_ONCE), other)
 
 
 def test_a_link_that_leads_to_itself_is_refused(tmp_path, monkeypatch, capsys):
