@@ -65,6 +65,8 @@ def in_process(monkeypatch, capsys, *arguments: object) -> Said:
     monkeypatch.setattr(sys, "argv", ["ddenv", "world", "check", *map(str, arguments)])
     with warnings.catch_warnings(record=True) as told, pytest.raises(SystemExit) as left:
         warnings.simplefilter("always")
+        # It would not be printed, and is of whatever garbage is collected just now.
+        warnings.simplefilter("ignore", ResourceWarning)
         main()
     printed = capsys.readouterr()
     code = left.value.code or 0
