@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ddenv.engine.baseline import fix_failure
-from ddenv.launch.scenarios import load_parts
-from ddenv.reduction.statistics import wilson_interval
+from ddenv.reduction.rates import wilson_interval
+from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
-from ddenv.robot.variants import Variants
 from ddenv.runfile.state import Test
+from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 

@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ddenv.launch.scenarios import load_parts
-from ddenv.reduction.statistics import wilson_interval
+from ddenv.reduction.rates import wilson_interval
+from ddenv.robot.drake.template import Template
 from ddenv.robot.oracle import medoid
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
-from ddenv.world.bundled import SCENARIOS, SDF
-from ddenv.world.load import load_scenario
+from ddenv.runs.scenarios import load_parts
+from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
 from ddenv.world.read import parse_world
 

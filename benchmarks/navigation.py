@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.robot.navigation.toy import PERIOD, Ground, drive, setup
 
 from ddenv.robot.navigation.navigate import Navigator
-from ddenv.robot.navigation.path import Path as Way
-from ddenv.robot.navigation.plan import Planner
+from ddenv.robot.navigation.route import Path as Way
+from ddenv.robot.navigation.route import Planner
 from ddenv.robot.protocol import Reading, Setup, Twist
 
 REPEATS = 3

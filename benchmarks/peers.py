@@ -34,11 +34,11 @@ import psutil
 from peers_reducers import REDUCERS, reduce_in_process
 from peers_tests import Counts, counts
 
-from ddenv.engine.spawn import DrakeContext
+from ddenv.engine.pool import DrakeContext
 from ddenv.errors import UserError
-from ddenv.launch.scenarios import with_options
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.runs.scenarios import with_options
 from ddenv.study.plan import FEWER_TESTS, PAIRS
 from ddenv.words import first_of
 from ddenv.world.load import find_scenario, load_scenario

@@ -14,11 +14,11 @@ from pathlib import Path
 
 from early_stop import fixed
 
-from ddenv.launch.scenarios import load_parts
 from ddenv.reduction.verdict import standing
+from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
-from ddenv.robot.variants import Variants
+from ddenv.runs.scenarios import load_parts
 from ddenv.world.scenario import Scenario
 
 Keep = frozenset[str]

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from xml.etree import ElementTree
 
-from ddenv.world.bundled import SDF
+from ddenv.world.load import SDF
 
 MODELS = 5000
 REPEATS = 5

@@ -18,11 +18,9 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from ddenv.launch.scenarios import load_parts
-from ddenv.robot.template import Template
-from ddenv.robot.variants import Variants
-from ddenv.world.bundled import SCENARIOS
-from ddenv.world.load import load_scenario
+from ddenv.robot.drake.template import Template, Variants
+from ddenv.runs.scenarios import load_parts
+from ddenv.world.load import SCENARIOS, load_scenario
 
 TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}
 

@@ -11,9 +11,8 @@ import math
 import time
 from pathlib import Path
 
-from ddenv.robot.template import Template
-from ddenv.world.bundled import SDF
-from ddenv.world.load import validate
+from ddenv.robot.drake.template import Template
+from ddenv.world.load import SDF, validate
 from ddenv.world.model import World
 from ddenv.world.read import parse_world, read_model
 

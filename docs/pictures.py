@@ -19,11 +19,11 @@ from tests.scene.test_browser import Page, chromium
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.scene.follow import PAUSE, SPEED
+from ddenv.scene.camera import View, set_up
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server
+from ddenv.scene.shot import PAUSE, SPEED
 from ddenv.scene.stage import Stage
-from ddenv.scene.view import View, set_up
 
 DOCS = Path(__file__).resolve().parent
 SIZE = (1200, 700)

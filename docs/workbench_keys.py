@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ddenv.workbench.keys import Action, actions, shown_key
+from ddenv.workbench.help.keys import Action, actions, shown_key
 
 PAGE = Path(__file__).resolve().with_name("workbench.md")
 # A table is between these; the sections are the first parts of the actions' names.

@@ -22,19 +22,18 @@ from unittest.mock import patch
 
 from textual.pilot import Pilot
 
-from ddenv.launch.programs import start_engine
-from ddenv.launch.runs import create_run
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.config import Config
-from ddenv.workbench.guiding import nearest_other
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.widgets.map import WorldMap
-from ddenv.world.bundled import SDF
-from ddenv.world.load import find_scenario, load_scenario
+from ddenv.workbench.help.config import Config
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.guiding import nearest_other
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"
 MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)

@@ -36,7 +36,7 @@ def test_drake_is_never_imported_with_a_star():
 
 def test_views_start_without_drake_and_scikit_learn():
     code = (
-        "import sys, ddenv.cli, ddenv.workbench.app, ddenv.scene.__main__, ddenv.console.follow;"
+        "import sys, ddenv.cli, ddenv.workbench.app, ddenv.scene.__main__, ddenv.cli.follow;"
         "print([name for name in ('pydrake', 'sklearn') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -22,24 +22,24 @@ Kind = Literal["partitioning", "prioritization", "algorithm"]
 
 _OURS: dict[str, dict[str, str]] = {
     "partitioning": {
-        "model2model": "ddenv.reduction.partitionings.model2model:model2model",
-        "timeseg": "ddenv.reduction.partitionings.timeseg:timeseg",
-        "trajectoryseg": "ddenv.reduction.partitionings.trajectoryseg:trajectoryseg",
-        "learner": "ddenv.reduction.partitionings.learner:Learner",
+        "model2model": "ddenv.reduction.partitionings:model2model",
+        "timeseg": "ddenv.reduction.partitionings:timeseg",
+        "trajectoryseg": "ddenv.reduction.partitionings:trajectoryseg",
+        "learner": "ddenv.reduction.learner:Learner",
     },
     "prioritization": {
-        "failure-proximal": "ddenv.reduction.prioritizations.failure_proximal:failure_proximal",
-        "avg-trajectory-proximal": "ddenv.reduction.prioritizations.avg_trajectory_proximal:avg_trajectory_proximal",
-        "min-trajectory-proximal": "ddenv.reduction.prioritizations.min_trajectory_proximal:min_trajectory_proximal",
-        "timestep": "ddenv.reduction.prioritizations.timestep:timestep",
-        "sequential": "ddenv.reduction.prioritizations.sequential:sequential",
-        "random": "ddenv.reduction.prioritizations.random:random",
+        "failure-proximal": "ddenv.reduction.prioritizations:failure_proximal",
+        "avg-trajectory-proximal": "ddenv.reduction.prioritizations:avg_trajectory_proximal",
+        "min-trajectory-proximal": "ddenv.reduction.prioritizations:min_trajectory_proximal",
+        "timestep": "ddenv.reduction.prioritizations:timestep",
+        "sequential": "ddenv.reduction.prioritizations:sequential",
+        "random": "ddenv.reduction.prioritizations:random",
     },
     "algorithm": {
-        "ddenv": "ddenv.reduction.algorithms.ddenv:ddenv",
-        "ddmin": "ddenv.reduction.algorithms.ddmin:ddmin",
-        "probdd": "ddenv.reduction.algorithms.probdd:probdd",
-        "splitting": "ddenv.reduction.algorithms.splitting:splitting",
+        "ddenv": "ddenv.reduction.algorithms:ddenv",
+        "ddmin": "ddenv.reduction.algorithms:ddmin",
+        "probdd": "ddenv.reduction.algorithms:probdd",
+        "splitting": "ddenv.reduction.algorithms:splitting",
     },
 }
 

@@ -7,9 +7,8 @@ import shutil
 from collections import Counter
 from collections.abc import Sequence
 
-from ddenv.runfile.failures import DEEDS
-from ddenv.runfile.guiding import Trial
-from ddenv.runfile.state import Candidate, RunState
+from ddenv.runfile.events import DEEDS
+from ddenv.runfile.state import Candidate, RunState, Trial
 
 CONFIRMING = "confirming what is left with full runs"
 # Of what is always the same.

@@ -11,7 +11,7 @@ import pytest
 
 from ddenv.robot.protocol import Reading, Setup
 from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.readings import Imu, Scan
+from ddenv.robot.sensing.sensors import Imu, Scan
 from tests.conftest import ROOT
 from tests.waiting import PATIENCE
 

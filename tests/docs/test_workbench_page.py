@@ -2,15 +2,15 @@
 
 import re
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
 import pytest
 from docs import workbench_keys
 from docs.workbench_pictures import PICTURES
 from textual.screen import Screen
 
-import ddenv.workbench.screens
-from ddenv.workbench.keys import actions
+import ddenv.workbench
+from ddenv.workbench.help.keys import actions
 from tests.conftest import ROOT
 
 DOCS = ROOT / "docs"
@@ -20,8 +20,8 @@ SHOWN = {name: words for words, name in re.findall(r"!\[([^]]*)\]\(screens/([\w-
 
 def screens():
     """All that a user can come to: what other screens are made of is none."""
-    home = ddenv.workbench.screens
-    names = [f"{home.__name__}.{module.name}" for module in iter_modules(home.__path__)]
+    home = ddenv.workbench
+    names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.")]
     found = [value for name in names for value in vars(import_module(name)).values()]
     ours = {each for each in found if isinstance(each, type) and issubclass(each, Screen) and each.__module__ in names}
     return {each.__name__ for each in ours if not any(other is not each and issubclass(other, each) for other in ours)}

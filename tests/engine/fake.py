@@ -15,10 +15,10 @@ from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
-from ddenv.launch.runs import create_run
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
+from ddenv.runs.creation import create_run
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
 from tests.conftest import DATA
@@ -99,7 +99,7 @@ def drive(
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
-    from ddenv.launch.runs import read_parts
+    from ddenv.runs.creation import read_parts
 
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)

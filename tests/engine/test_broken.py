@@ -13,11 +13,11 @@ import pytest
 from ddenv.engine.bench import MOST_BROKEN
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
-from ddenv.launch.programs import start_engine
-from ddenv.launch.runs import create_run
-from ddenv.launch.scenarios import load_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.programs import start_engine
+from ddenv.runs.scenarios import load_parts
 from tests.engine.test_pool import EVERYTHING, result, workers
 from tests.robot.external.own import FAMILY, SLEEP, TOKEN, own_scenario, processes_with
 from tests.waiting import PATIENCE, wait_until

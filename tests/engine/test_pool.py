@@ -10,7 +10,7 @@ import pytest
 
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
-from ddenv.launch.scenarios import load_parts
+from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.waiting import wait_until

@@ -9,8 +9,8 @@ import pytest
 
 from ddenv.engine import shared
 from ddenv.engine.shared import SharingPool
-from ddenv.launch.runs import create_run, read_parts
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run, read_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA

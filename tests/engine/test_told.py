@@ -2,8 +2,8 @@
 
 import json
 
+from ddenv.engine.judging import told
 from ddenv.engine.pool import Broken
-from ddenv.engine.told import told
 from tests.engine.fake import result
 
 

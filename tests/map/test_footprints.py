@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ddenv.map.footprints import ROUND, footprint
-from ddenv.world.extent import shape_bounds
+from ddenv.world.extent import polygon_area, shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Shape, Sphere
-from ddenv.world.outline import polygon_area
 from ddenv.world.pose import Pose
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

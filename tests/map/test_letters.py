@@ -1,6 +1,6 @@
 import numpy as np
 
-from ddenv.map.letters import ROOM, Signs, place_signs
+from ddenv.map.cells import ROOM, Signs, place_signs
 
 
 def signs_of(texts, sure=()):

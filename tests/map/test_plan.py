@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.map.plan import DYNAMIC, STATIC, plan
+from ddenv.map.footprints import DYNAMIC, STATIC, plan
 from tests.map.worlds import GROUND, box, world_of
 
 

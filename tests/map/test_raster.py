@@ -5,7 +5,7 @@ import pytest
 
 from ddenv.map.footprints import footprints
 from ddenv.map.raster import EMPTY, View, arrow, braille, fit, heading, masks, owners
-from ddenv.world.outline import convex_hull
+from ddenv.world.extent import convex_hull
 from tests.map.worlds import GROUND, box, world_of
 
 VIEW = View(0.0, 0.0, 0.5, 20, 8)

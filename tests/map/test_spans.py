@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from ddenv.map.footprints import Footprint
 from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners
-from ddenv.world.outline import convex_hull
+from ddenv.world.extent import convex_hull
 
 VIEW = View(0.3, -0.2, 0.5, 12, 6)
 coordinates = st.floats(-6, 6).map(lambda value: round(value, 3))

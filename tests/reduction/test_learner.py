@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ddenv.reduction.chance import beliefs, spatial_prior, undominated
 from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.partitionings.learner import Learner
+from ddenv.reduction.learner import Learner
 from tests.reduction.worlds import evidence, tried
 
 

@@ -5,12 +5,9 @@ import time
 import numpy as np
 import pytest
 
-from ddenv.reduction.evidence import Evidence
-from ddenv.reduction.geometry import nearest_on_path, to_segments
+from ddenv.reduction.evidence import Evidence, nearest_on_path, to_segments
 from ddenv.reduction.guide import make_guide
-from ddenv.reduction.partitionings.model2model import model2model
-from ddenv.reduction.partitionings.timeseg import timeseg
-from ddenv.reduction.partitionings.trajectoryseg import cuts, trajectoryseg
+from ddenv.reduction.partitionings import cuts, model2model, timeseg, trajectoryseg
 from ddenv.reduction.round import make_round, one_model_partitions
 from ddenv.schemas import names
 from tests.reduction.worlds import evidence

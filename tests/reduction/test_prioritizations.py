@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from ddenv.reduction.evidence import Evidence
-from ddenv.reduction.prioritizations.avg_trajectory_proximal import avg_trajectory_proximal
-from ddenv.reduction.prioritizations.failure_proximal import failure_proximal
-from ddenv.reduction.prioritizations.min_trajectory_proximal import min_trajectory_proximal
-from ddenv.reduction.prioritizations.random import random
-from ddenv.reduction.prioritizations.sequential import sequential
-from ddenv.reduction.prioritizations.timestep import timestep
+from ddenv.reduction.prioritizations import (
+    avg_trajectory_proximal,
+    failure_proximal,
+    min_trajectory_proximal,
+    random,
+    sequential,
+    timestep,
+)
 from ddenv.reduction.round import one_model_partitions
 from tests.reduction.worlds import evidence
 

@@ -9,11 +9,10 @@ from xml.sax.saxutils import escape
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.report.blocks import Picture, Table
-from ddenv.report.content import content
-from ddenv.report.read import read_run
+from ddenv.page.blocks import Picture, Table
+from ddenv.report.report import content, files_of, write_report
 from ddenv.report.rounds import MOST_ROUNDS
-from ddenv.report.write import files_of, write_report
+from ddenv.report.run_data import read_run
 from tests.workbench import fake_run
 
 VOID = {"meta"}

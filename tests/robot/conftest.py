@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.robot.template import Template
-from ddenv.world.bundled import SCENARIOS, SDF
-from ddenv.world.load import load_scenario, validate
+from ddenv.robot.drake.template import Template
+from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.read import parse_world, read_model, read_world

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.drive import find_drive, footprint
-from ddenv.robot.navigation.straight import Straight
+from ddenv.robot.drake.drive import find_drive, footprint
+from ddenv.robot.drake.template import Template
+from ddenv.robot.navigation.navigate import Straight
 from ddenv.robot.protocol import STOP, Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.template import Template
 from ddenv.world.model import Box, Capsule, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Controller, Wheels

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot.kinds import kind_of
-from ddenv.robot.stuck import ANGLE, RADIUS, SECONDS, Stuck
+from ddenv.robot.oracle import kind_of
+from ddenv.robot.run import ANGLE, RADIUS, SECONDS, Stuck
 
 
 def way(seconds: float, place, turn=lambda t: (1.0, 0.0, 0.0, 0.0)) -> np.ndarray:

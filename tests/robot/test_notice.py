@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from ddenv.robot import notice
-from ddenv.robot.notice import Notice
-from ddenv.robot.reach import reach
+from ddenv.robot.drake.template import Template
+from ddenv.robot.notice import Notice, first_in_view, in_view
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
-from ddenv.robot.view import first_in_view, in_view
+from ddenv.robot.surroundings import reach
 from ddenv.world.model import Box, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import box_model, joint_of, link_of, model_of

@@ -13,8 +13,7 @@ import pytest
 
 import ddenv
 from ddenv.errors import UserError
-from ddenv.robot.guard import ControllerFailed, Guarded
-from ddenv.robot.own import controllers, load
+from ddenv.robot.controllers import ControllerFailed, Guarded, controllers, load
 from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.world.scenario import Controller
@@ -193,7 +192,7 @@ def test_modules_that_it_imports_later(tmp_path):
 
 
 def test_a_module_that_is_installed(tmp_path):
-    assert load("ddenv.robot.navigation.straight:Straight", tmp_path) is load("straight", tmp_path)
+    assert load("ddenv.robot.navigation.navigate:Straight", tmp_path) is load("straight", tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.launch.scenarios import load_parts
+from ddenv.robot.drake.template import Template
 from ddenv.robot.oracle import Failure, judge, medoid
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
-from ddenv.world.bundled import SCENARIOS, SDF
-from ddenv.world.load import load_scenario
+from ddenv.runs.scenarios import load_parts
+from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.shapes import CORNER_RADIUS, corners_of
-from ddenv.robot.template import Template, lowest
+from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of
+from ddenv.robot.drake.template import Template, lowest
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from ddenv.launch.scenarios import load_parts
-from ddenv.robot import variants
-from ddenv.robot.rehearsal import Rehearsals
+from ddenv.robot.drake import template as variants
+from ddenv.robot.drake.template import Template, Variants
+from ddenv.robot.piles.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
-from ddenv.robot.template import Template
-from ddenv.robot.variants import Variants
-from ddenv.world.bundled import SCENARIOS
-from ddenv.world.load import load_scenario
+from ddenv.runs.scenarios import load_parts
+from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario

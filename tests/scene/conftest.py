@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.launch.runs import create_run
-from ddenv.launch.scenarios import scenario_for_world
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.scenarios import scenario_for_world
 from ddenv.world.read import parse_world
 
 NAMES = ("left wall", "tile/é <b>1</b>", "board", "asphalt")

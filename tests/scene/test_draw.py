@@ -7,13 +7,13 @@ import pytest
 import umsgpack
 
 from ddenv.runfile.fold import fold
+from ddenv.scene.camera import view
 from ddenv.scene.draw import Scenery, outline, paint, path_on_ground, safe_name
-from ddenv.scene.follow import shot
 from ddenv.scene.mesh import box, merge, sphere
 from ddenv.scene.player import Player
+from ddenv.scene.shot import shot
 from ddenv.scene.stage import Stage
-from ddenv.scene.view import view
-from ddenv.world.bundled import SDF
+from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual
 from ddenv.world.pose import Pose
 from ddenv.world.read import read_model, read_world

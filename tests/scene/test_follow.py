@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
-from ddenv.scene.follow import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot
+from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot
 
 
 def live(test: int, slot: int = 0) -> Live:

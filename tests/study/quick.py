@@ -13,10 +13,10 @@ from pathlib import Path
 
 from ddenv.engine import __main__ as program
 from ddenv.errors import UserError
-from ddenv.launch.programs import ENGINE_SAYS
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs.programs import ENGINE_SAYS
 from ddenv.study import work
 from tests.engine.fake import FakePool
 

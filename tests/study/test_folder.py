@@ -5,7 +5,7 @@ import json
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.study.folder import ABOUT, RUNS, Sitting, machine, opened, sittings, versions, write_sittings
+from ddenv.study.study_folder import ABOUT, RUNS, Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.version import __version__
 
 TIMES = (

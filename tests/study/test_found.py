@@ -7,8 +7,8 @@ import sqlite3
 
 import pytest
 
-from ddenv.study.folder import RUNS, check_path, run_path
-from ddenv.study.found import read_cell
+from ddenv.study.results import read_cell
+from ddenv.study.study_folder import RUNS, check_path, run_path
 from ddenv.version import __version__
 from tests.study.made import LEFT, TESTS, begun, checked, crates, never_failed, plan_of, reduced
 from tests.workbench import fake_run

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from ddenv.study.folder import Sitting, run_path
-from ddenv.study.write import write_study
+from ddenv.study.study_folder import Sitting, run_path
+from ddenv.study.study_page import write_study
 from tests.report.test_report import EVIL, Page
 from tests.study.made import LONGEST, checked, crates, never_failed, plan_of, reduced
 from tests.workbench import fake_run

@@ -4,9 +4,9 @@ import pytest
 
 from ddenv import schemas
 from ddenv.errors import UserError
-from ddenv.study.folder import check_path, run_path
-from ddenv.study.paper import theirs
 from ddenv.study.plan import PAIRS, make_plan
+from ddenv.study.rows import theirs
+from ddenv.study.study_folder import check_path, run_path
 from tests.study.made import LONGEST, crates, plan_of
 
 LONGEST_FILE_NAME = 255

@@ -6,15 +6,15 @@ from xml.etree import ElementTree
 
 import pytest
 
-from ddenv.report.blocks import Strong, Table
+from ddenv.page.blocks import Strong, Table
 from ddenv.runfile.state import Baseline
 from ddenv.study.best import best
 from ddenv.study.check import APART, Check
-from ddenv.study.content import content
-from ddenv.study.figure import chart
-from ddenv.study.found import Found
+from ddenv.study.figures import chart
 from ddenv.study.plan import PAIRS, make_plan
+from ddenv.study.results import Found
 from ddenv.study.rows import groups, spread
+from ddenv.study.study_page import content
 from ddenv.study.tables import behind, numbers
 from tests.study.made import crates, plan_of
 

@@ -13,13 +13,13 @@ import time
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.launch.runs import create_run
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
 from ddenv.study.conduct import conduct
-from ddenv.study.folder import run_path, sittings
-from ddenv.study.found import read_cell
 from ddenv.study.progress import Progress
+from ddenv.study.results import read_cell
+from ddenv.study.study_folder import run_path, sittings
 from tests.study.made import plan_of, wall
 from tests.study.quick import Killed, Lab
 from tests.waiting import PATIENCE, wait_until

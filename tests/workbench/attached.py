@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.screens.run import RunScreen
+from ddenv.workbench.run.run_screen import RunScreen
 
 
 class Session:
@@ -88,5 +88,5 @@ def starts(monkeypatch) -> list:
         started.append((path, jobs, options))
         return SimpleNamespace(poll=lambda: None)
 
-    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", start_engine)
     return started

@@ -25,7 +25,7 @@ def lasting(notify):
 def still_time(monkeypatch):
     """Neither events nor screens depend on the clock."""
     monkeypatch.setattr("ddenv.runfile.store.time", SimpleNamespace(time=lambda: MOMENT))
-    monkeypatch.setattr("ddenv.workbench.poll.now", lambda: MOMENT + 83.0)
+    monkeypatch.setattr("ddenv.workbench.run.poll.now", lambda: MOMENT + 83.0)
     monkeypatch.setattr("ddenv.workbench.app.Workbench.notify", lasting(Workbench.notify))
     monkeypatch.setenv("TZ", "UTC")
     monkeypatch.delenv("NO_COLOR", raising=False)
@@ -58,7 +58,7 @@ def scenarios(tmp_path, monkeypatch) -> Path:
     (folder / "crates.sdf").write_bytes(fake_run.world_text())
     (folder / "robot.sdf").write_bytes(fake_run.ROBOT_SDF)
     (folder / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario()))
-    monkeypatch.setattr("ddenv.world.bundled.SCENARIOS", folder)
+    monkeypatch.setattr("ddenv.world.load.SCENARIOS", folder)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     return folder
 
@@ -72,5 +72,5 @@ def started(monkeypatch) -> list[tuple]:
         calls.append((path.name, jobs, options))
         return SimpleNamespace(poll=lambda: None)
 
-    monkeypatch.setattr("ddenv.launch.programs.start_engine", start_engine)
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", start_engine)
     return calls

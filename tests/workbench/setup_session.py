@@ -5,14 +5,14 @@ from contextlib import suppress
 from textual.widgets import Select, Static
 from textual.worker import WorkerCancelled
 
-from ddenv.launch.runs import read_parts
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import read_parts
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.methods import KINDS
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.screens.setup import SetupScreen
-from ddenv.workbench.widgets.map import WorldMap
-from ddenv.workbench.widgets.schema import Explained
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.methods import KINDS
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.setup.fields import Explained
+from ddenv.workbench.setup.setup_screen import SetupScreen
 
 
 class Session:

@@ -13,10 +13,10 @@ from textual.command import CommandPalette
 from textual.widgets import OptionList, Static
 
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.config import Config
-from ddenv.workbench.screens.dialogs import Help
-from ddenv.workbench.screens.runs import RunsScreen
-from ddenv.workbench.shortcuts import commands, groups
+from ddenv.workbench.help.config import Config
+from ddenv.workbench.help.dialogs import Help
+from ddenv.workbench.help.shortcuts import commands, groups
+from ddenv.workbench.runs.runs_screen import RunsScreen
 from tests.waiting import PATIENCE, eventually
 
 
@@ -96,7 +96,7 @@ def test_serving_is_for_this_machine_alone(runs):
 
 def test_without_the_package_it_says_what_to_install(monkeypatch):
     from ddenv.errors import UserError
-    from ddenv.workbench.served import serve
+    from ddenv.workbench.terminal.served import serve
 
     monkeypatch.setitem(sys.modules, "textual_serve", None)
     monkeypatch.setitem(sys.modules, "textual_serve.server", None)

@@ -8,7 +8,7 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Label
 
-from ddenv.workbench.beside import is_open, tell
+from ddenv.workbench.background import is_open, tell
 
 
 class Panel(Vertical):

@@ -8,13 +8,12 @@ from textual.app import App
 
 from ddenv.runfile import state as runs_state
 from ddenv.runfile.fold import fold
-from ddenv.runfile.guiding import Trial
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.state import Candidate, Round, RunState, Split
-from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.widgets import candidates as module
-from ddenv.workbench.widgets.candidates import Candidates
-from ddenv.workbench.widgets.rows import COLUMNS, fitting, listed, words
+from ddenv.runfile.state import Candidate, Round, RunState, Split, Trial
+from ddenv.workbench.run import candidates as module
+from ddenv.workbench.run.candidate_rows import COLUMNS, fitting, listed, words
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.poll import Snapshot
 
 
 def snapshot(run, engine="alive") -> Snapshot:

@@ -12,9 +12,9 @@ from textual.color import Color
 
 from ddenv.cli.app import app as command_line
 from ddenv.errors import UserError
-from ddenv.workbench.config import Config, config_path, read_config
-from ddenv.workbench.keys import actions, checked, shown_key, written
-from ddenv.workbench.themes import ANSI, DARK, LIGHT, OURS, fitting, for_rich
+from ddenv.workbench.help.config import Config, config_path, read_config
+from ddenv.workbench.help.keys import actions, checked, shown_key, written
+from ddenv.workbench.terminal.themes import ANSI, DARK, LIGHT, OURS, fitting, for_rich
 from tests.waiting import PATIENCE
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.schemas import names
-from ddenv.workbench.explain import baseline_sentence, explain
-from ddenv.workbench.listings import ANY, LISTINGS, listing
-from ddenv.workbench.poll import Poll, Snapshot
+from ddenv.workbench.run.explain import baseline_sentence, explain
+from ddenv.workbench.run.methods import ANY, LISTINGS, listing
+from ddenv.workbench.run.poll import Poll, Snapshot
 
 
 def snapshot(run, engine="alive") -> Snapshot:

@@ -10,14 +10,14 @@ from textual.widgets import Input, Select
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.workbench import guiding
-from ddenv.workbench.poll import Poll, Snapshot
-from ddenv.workbench.screens.change import Change
-from ddenv.workbench.screens.choose import ChooseModels
-from ddenv.workbench.screens.question import Question
-from ddenv.workbench.screens.run_footer import footer_words
-from ddenv.workbench.widgets.candidates import Candidates
-from ddenv.workbench.widgets.map import WorldMap
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run import guiding
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.change import Change
+from ddenv.workbench.run.choose import ChooseModels
+from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.run.run_keys import footer_words
 
 
 def state_of(run):

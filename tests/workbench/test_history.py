@@ -5,12 +5,11 @@ from attached import Attached, starts
 from textual.widgets import DataTable
 
 from ddenv.runfile.fold import fold
-from ddenv.runfile.guiding import Node
-from ddenv.workbench import branches
-from ddenv.workbench.comparing import compare
-from ddenv.workbench.screens.compare import Compare
-from ddenv.workbench.screens.history import History
-from ddenv.workbench.screens.question import Question
+from ddenv.runfile.state import Node
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.history import branches
+from ddenv.workbench.history.compare import Compare, compare
+from ddenv.workbench.history.history_screen import History
 from ddenv.workbench.widgets.lines import Lines
 
 

@@ -20,17 +20,17 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.config import read_config
-from ddenv.workbench.explain import explain
-from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.recent import RunsFolder
-from ddenv.workbench.save_scenario import scenario_path
-from ddenv.workbench.screens.dialogs import WorldTree, complain_about
-from ddenv.workbench.screens.export import Wanted, suggested, write
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.terminal import check_terminal
-from ddenv.workbench.widgets.rows import listed
-from ddenv.workbench.widgets.run_table import moment
+from ddenv.workbench.export.export_dialog import Wanted, suggested, write
+from ddenv.workbench.help.config import read_config
+from ddenv.workbench.help.dialogs import WorldTree, complain_about
+from ddenv.workbench.run.candidate_rows import listed
+from ddenv.workbench.run.explain import explain
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.runs.recent_runs import RunsFolder
+from ddenv.workbench.runs.runs_table import moment
+from ddenv.workbench.setup.save_scenario import scenario_path
+from ddenv.workbench.terminal.terminal_check import check_terminal
 
 NAMES = [
     "[bold]loud[/bold]",
@@ -247,7 +247,7 @@ SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 @pytest.mark.parametrize("watch", [True, False], ids=["watch", "guide"])
 async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
     started = starts(monkeypatch)
-    monkeypatch.setattr("ddenv.workbench.processes.Scene.start", lambda self: None)
+    monkeypatch.setattr("ddenv.workbench.run.processes.Scene.start", lambda self: None)
     fake_run.guided(run)
     run.hold()
     chance = random.Random(20 + watch)
@@ -276,7 +276,7 @@ async def test_an_engine_that_hangs_is_told(run, monkeypatch):
     async with Attached(run) as session:
         await session.press("space")
         assert "no answer" not in session.screen.waiting_for()
-        monkeypatch.setattr("ddenv.workbench.screens.controls.PATIENCE", 0)
+        monkeypatch.setattr("ddenv.workbench.run.controls.PATIENCE", 0)
         assert session.screen.waiting_for().startswith("pause: no answer for")
 
 

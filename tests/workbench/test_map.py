@@ -12,12 +12,12 @@ from textual.events import MouseScrollUp
 
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
-from ddenv.runfile.guiding import Trial
+from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live
-from ddenv.workbench.place import place_of_run
-from ddenv.workbench.poll import Poll, Snapshot
-from ddenv.workbench.widgets import overview
-from ddenv.workbench.widgets.map import LAYERS, Place, WorldMap
+from ddenv.workbench.map import overview
+from ddenv.workbench.map.place import place_of_run
+from ddenv.workbench.map.world_map import LAYERS, Place, WorldMap
+from ddenv.workbench.run.poll import Poll, Snapshot
 
 
 class Screen(App):

@@ -11,8 +11,8 @@ from textual.color import Color
 from ddenv.map.footprints import Footprint
 from ddenv.map.paint import HUES, NUMBERED, Canvas, luminance, packed
 from ddenv.map.raster import View, masks, owners
-from ddenv.workbench.widgets.looks import Kept, fill, looks
-from ddenv.workbench.widgets.palette import (
+from ddenv.workbench.map.looks import Kept, fill, looks
+from ddenv.workbench.map.map_colors import (
     KEPT,
     LEFT_OUT,
     MANY,
@@ -26,7 +26,7 @@ from ddenv.workbench.widgets.palette import (
     plain,
     sixteen,
 )
-from ddenv.workbench.widgets.strips import strip
+from ddenv.workbench.map.moving import strip
 
 DARK, LIGHT = ((15, 20, 27), (213, 219, 229)), ((250, 250, 250), (30, 30, 30))
 PALETTES = {

@@ -9,10 +9,10 @@ import pytest
 
 from ddenv import __version__
 from ddenv.errors import UserError
-from ddenv.workbench import poll as polling
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.observed import Busy, Observed
-from ddenv.workbench.poll import Poll
+from ddenv.workbench.run import poll as polling
+from ddenv.workbench.run.observed import Busy, Observed
+from ddenv.workbench.run.poll import Poll
 
 
 def look(poll):

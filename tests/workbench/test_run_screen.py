@@ -12,22 +12,22 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.poll import Poll
-from ddenv.workbench.screens.change import Change
-from ddenv.workbench.screens.choose import ChooseModels
-from ddenv.workbench.screens.compare import Compare
-from ddenv.workbench.screens.copy import Copy
-from ddenv.workbench.screens.dialogs import Help, Method, Quit, SceneDialog, ssh_line
-from ddenv.workbench.screens.history import History
-from ddenv.workbench.screens.layers import Layers
-from ddenv.workbench.screens.question import Question
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.screens.setup import SetupScreen
-from ddenv.workbench.widgets.candidates import Candidates
+from ddenv.workbench.help.dialogs import Help, Method, Quit, SceneDialog, ssh_line
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.history.compare import Compare
+from ddenv.workbench.history.history_screen import History
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.change import Change
+from ddenv.workbench.run.choose import ChooseModels
+from ddenv.workbench.run.copying import Copy
+from ddenv.workbench.run.layers import Layers
+from ddenv.workbench.run.poll import Poll
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.setup.fields import SchemaSelect
+from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.workbench.widgets.footer import KeyFooter
 from ddenv.workbench.widgets.lines import Lines
-from ddenv.workbench.widgets.map import WorldMap
-from ddenv.workbench.widgets.schema import SchemaSelect
 
 URL = "http://127.0.0.1:7012/static/"
 
@@ -253,7 +253,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypa
 
 
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
-    monkeypatch.setattr("ddenv.launch.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
     fake_run.mid_round(run)
     run.path.with_name("crates-1.ddenv.log").write_text(
         "ddenv engine: started\nModuleNotFoundError: No module named 'x'\n"
@@ -271,7 +271,7 @@ def scene_program(code):
 
 async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(run, monkeypatch):
     program = f"import time; print({URL!r}, flush=True); time.sleep(60)"
-    monkeypatch.setattr("ddenv.launch.programs.start_scene", scene_program(program))
+    monkeypatch.setattr("ddenv.runs.programs.start_scene", scene_program(program))
     monkeypatch.setattr("getpass.getuser", lambda: "ada")
     monkeypatch.setattr("socket.gethostname", lambda: "lab")
     fake_run.finished(run)
@@ -303,7 +303,7 @@ async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(
 
 
 async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
-    monkeypatch.setattr("ddenv.launch.programs.start_scene", scene_program("pass"))
+    monkeypatch.setattr("ddenv.runs.programs.start_scene", scene_program("pass"))
     run.path.with_name("crates-1.ddenv.scene.log").write_text("no port is free\n")
     fake_run.finished(run)
     async with Attached(run) as session:

@@ -6,12 +6,12 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.recent import RunsFolder, delete_run
-from ddenv.workbench.screens.question import Question
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.screens.runs import RunsScreen
-from ddenv.workbench.screens.setup import SetupScreen
-from ddenv.workbench.widgets.run_table import RunTable
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.runs.recent_runs import RunsFolder, delete_run
+from ddenv.workbench.runs.runs_screen import RunsScreen
+from ddenv.workbench.runs.runs_table import RunTable
+from ddenv.workbench.setup.setup_screen import SetupScreen
 
 
 @pytest.fixture
@@ -190,7 +190,7 @@ def test_only_files_that_changed_are_read_again(several, runs, monkeypatch):
     folder = RunsFolder(runs)
     first = folder.look()
     opened = []
-    monkeypatch.setattr("ddenv.workbench.recent.Observed", lambda path: opened.append(path))
+    monkeypatch.setattr("ddenv.workbench.runs.recent_runs.Observed", lambda path: opened.append(path))
     assert folder.look() == first and opened == []
 
 

@@ -8,8 +8,8 @@ import yaml
 from setup_session import Opened
 
 from ddenv.cli.app import app as command_line
-from ddenv.workbench import form
-from ddenv.workbench.command_line import command, source_of
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.command_line import command, source_of
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def asked_by(scenarios, monkeypatch):
                 caught.extend((scenario, path))
                 raise Caught
 
-            patch.setattr("ddenv.launch.runs.create_run", create_run)
+            patch.setattr("ddenv.runs.creation.create_run", create_run)
             patch.setattr("ddenv.world.load.SCENARIOS", scenarios)
             with pytest.raises(Caught):
                 command_line(words[1:], standalone_mode=False)

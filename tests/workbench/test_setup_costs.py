@@ -3,9 +3,9 @@
 import fake_run
 import pytest
 
-from ddenv.workbench import form
-from ddenv.workbench.costs import Past, past_of, whole_cost
-from ddenv.workbench.meanings import Circumstances, cost, meaning, not_used
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.costs import Past, past_of, whole_cost
+from ddenv.workbench.setup.meanings import Circumstances, cost, meaning, not_used
 from ddenv.world.scenario import Scenario
 
 FIELDS = {field.id: field for field in form.ALL}

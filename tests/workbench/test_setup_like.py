@@ -7,9 +7,9 @@ import pytest
 from setup_session import Opened
 
 from ddenv.errors import UserError
-from ddenv.launch.runs import create_like, create_run, read_parts
 from ddenv.runfile.store import RunFile
-from ddenv.workbench.screens.setup import SetupScreen
+from ddenv.runs.creation import create_like, create_run, read_parts
+from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.world.load import load_scenario
 
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from setup_session import Opened
 
-from ddenv.workbench.widgets.map import WorldMap
+from ddenv.workbench.map.world_map import WorldMap
 
 
 class Places:

@@ -3,8 +3,7 @@
 import pytest
 from setup_session import Opened
 
-from ddenv.workbench.recent_files import KEPT, recent_file, recent_files, remember
-from ddenv.workbench.widgets.files import FileList
+from ddenv.workbench.setup.beginnings import KEPT, FileList, recent_file, recent_files, remember
 
 
 @pytest.fixture

@@ -7,9 +7,8 @@ from setup_session import Opened
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.recent_files import recent_files
-from ddenv.workbench.save_scenario import save_scenario, scenario_path
-from ddenv.workbench.screens.save import SaveScenario
+from ddenv.workbench.setup.beginnings import recent_files
+from ddenv.workbench.setup.save_scenario import SaveScenario, save_scenario, scenario_path
 from ddenv.world.load import load_scenario
 
 

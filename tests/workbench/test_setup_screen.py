@@ -7,11 +7,11 @@ from setup_session import Opened
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import explanation
-from ddenv.workbench.methods import KINDS
-from ddenv.workbench.screens.dialogs import Help, OpenFile
-from ddenv.workbench.screens.run import RunScreen
-from ddenv.workbench.widgets.map import WorldMap
-from ddenv.workbench.widgets.schema import Explained
+from ddenv.workbench.help.dialogs import Help, OpenFile
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.methods import KINDS
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.setup.fields import Explained
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
@@ -385,7 +385,7 @@ async def test_letters_can_be_typed_into_fields(scenarios):
 
 
 async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr("ddenv.world.bundled.SCENARIOS", tmp_path / "none")
+    monkeypatch.setattr("ddenv.world.load.SCENARIOS", tmp_path / "none")
     async with Opened() as session:
         assert "ctrl+o" in session.screen.query_one(WorldMap).notice
 

@@ -8,10 +8,10 @@ from textual.app import App
 
 from ddenv import __version__
 from ddenv.runfile.fold import fold
-from ddenv.runfile.guiding import Node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.widgets.status import Header, Status, branch_of, cut_tests, facts, fitted, heading
+from ddenv.runfile.state import Node
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.run.status import Header, Status, branch_of, cut_tests, facts, fitted, heading
 
 
 def snapshot(run, engine="alive", **changes) -> Snapshot:
@@ -114,8 +114,8 @@ async def test_lines_fit_and_are_drawn_only_when_they_changed(run, width, monkey
 
 async def test_what_is_left_is_told_of_all_that_was_read_and_never_stays_old(run, monkeypatch):
     fake_run.mid_round(run)
-    monkeypatch.setattr("ddenv.workbench.widgets.status.remaining", lambda state, at_work: state.revision)
-    monkeypatch.setattr("ddenv.workbench.widgets.status.facts", lambda now, *_: told.append(_[-1](now)) or ())
+    monkeypatch.setattr("ddenv.workbench.run.status.remaining", lambda state, at_work: state.revision)
+    monkeypatch.setattr("ddenv.workbench.run.status.facts", lambda now, *_: told.append(_[-1](now)) or ())
     told, shown, later = [], snapshot(run), snapshot(run, revision=1_000)
     async with Lines().run_test() as pilot:
         status = pilot.app.query_one(Status)
@@ -124,7 +124,7 @@ async def test_what_is_left_is_told_of_all_that_was_read_and_never_stays_old(run
         status.show(later)
         status.show(later)
         assert told == [shown.state.revision] * 3
-        monkeypatch.setattr("ddenv.workbench.widgets.status.LEFT_PERIOD", 0.0)
+        monkeypatch.setattr("ddenv.workbench.run.status.LEFT_PERIOD", 0.0)
         status.show(later)
         status.show(later)
         assert told[3:] == [1_000]

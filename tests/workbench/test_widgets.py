@@ -10,11 +10,11 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
-from ddenv.workbench.poll import Snapshot
-from ddenv.workbench.processes import last_line
-from ddenv.workbench.recent import recent_runs
-from ddenv.workbench.widgets.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
-from ddenv.workbench.widgets.strips import strip
+from ddenv.workbench.map.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
+from ddenv.workbench.map.moving import strip
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.run.processes import last_line
+from ddenv.workbench.runs.recent_runs import recent_runs
 from ddenv.workbench.wording import about, brief, duration, metres, percent, plain, shorten
 from ddenv.world.read import parse_world
 

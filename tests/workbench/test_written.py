@@ -10,7 +10,7 @@ from textual.geometry import Region
 from textual.strip import Strip
 
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.written import Written
+from ddenv.workbench.terminal.written import Written
 
 RED, PLAIN = Style.parse("red on black"), Style.parse("white on black")
 CONSOLE = Console(color_system="truecolor", force_terminal=True)

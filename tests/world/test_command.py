@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.launch.runs import create_run
+from ddenv.runs.creation import create_run
 from ddenv.world.command import command_words, filled, has_placeholder
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle

@@ -4,8 +4,7 @@ import pytest
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.world.bundled import bundled_names
-from ddenv.world.load import find_scenario, load_scenario
+from ddenv.world.load import bundled_names, find_scenario, load_scenario
 from tests.conftest import DATA
 
 GOOD = yaml.safe_load((DATA / "wall.yaml").read_text())

@@ -17,11 +17,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ddenv.errors import UserError
-from ddenv.robot.place import spatial_inertia
+from ddenv.robot.drake.articulation import spatial_inertia
 from ddenv.world.model import Joint, Link, Mesh, Model, Plane, Shape, World
 from ddenv.world.read import parse_world
 from ddenv.world.scenario import Reading
-from ddenv.world.write import without
+from ddenv.world.subworld import without
 from tests.conftest import DATA, ROOT
 
 READING = Reading(model_path=(DATA / "models",))

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from ddenv.world.bundled import SDF
+from ddenv.world.load import SDF
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
-from ddenv.world.overlap import Hull, distance, hull, overlap
+from ddenv.world.placement import Hull, distance, hull, overlap
 from ddenv.world.pose import Pose
 from ddenv.world.read import read_model
 

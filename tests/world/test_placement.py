@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.bundled import SDF
+from ddenv.world.load import SDF
 from ddenv.world.model import Capsule, Collision, Ellipsoid, Link, Model, Plane, Shape, World
 from ddenv.world.placement import check_spawn
 from ddenv.world.pose import Pose

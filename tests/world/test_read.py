@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.bundled import SDF
+from ddenv.world.load import SDF
 from ddenv.world.model import Box, Cylinder, Plane, Sphere
 from ddenv.world.pose import Pose
 from ddenv.world.read import parse_model, parse_world, read_model, read_world

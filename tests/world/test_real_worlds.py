@@ -10,7 +10,7 @@ from ddenv.world.convert import write_converted
 from ddenv.world.model import Box
 from ddenv.world.read import parse_world, read_world
 from ddenv.world.scenario import Reading
-from ddenv.world.write import without
+from ddenv.world.subworld import without
 from tests.conftest import ROOT
 from tests.world.test_convert import assert_same_in_drake
 

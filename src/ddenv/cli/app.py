@@ -13,12 +13,12 @@ from typing import Any
 
 import click
 
-from ddenv.cli.config import config_command
+from ddenv.cli.config_command import config_command
 from ddenv.cli.options import JOBS, method_options, reading_options, scenario_options, search_options
-from ddenv.cli.schemas import schemas_command
-from ddenv.cli.serve import serve_command
-from ddenv.cli.study import study_command
-from ddenv.cli.world import world_group
+from ddenv.cli.schemas_command import schemas_command
+from ddenv.cli.serve_command import serve_command
+from ddenv.cli.study_command import study_command
+from ddenv.cli.world_command import world_group
 from ddenv.errors import UserError, printable
 from ddenv.version import __version__
 
@@ -39,7 +39,7 @@ def app(context: click.Context, **reading) -> None:
         from ddenv.workbench.app import run_workbench
 
         if any(reading.values()):
-            from ddenv.launch.scenarios import reading_of
+            from ddenv.runs.scenarios import reading_of
 
             # What is wrong with them is told before the screen is taken.
             reading_of(**reading)
@@ -64,10 +64,10 @@ def run(
     scenario, spawn, goal, world, timeout, model_path, stand_in, ignore, name, output, jobs, as_json, **options
 ) -> int:
     """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
-    from ddenv.launch.folder import run_path
-    from ddenv.launch.programs import start_engine
-    from ddenv.launch.runs import create_run
-    from ddenv.launch.scenarios import with_options
+    from ddenv.runs.creation import create_run
+    from ddenv.runs.folder import run_path
+    from ddenv.runs.programs import start_engine
+    from ddenv.runs.scenarios import with_options
 
     reading = {"model_path": model_path, "stand_in": stand_in, "ignore": ignore}
     chosen = with_options(_scenario(scenario, spawn, goal, world, timeout, reading), **options)
@@ -84,11 +84,11 @@ def run(
 @click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 def resume(run: str, jobs: int, as_json: bool) -> int:
     """Goes on with RUN (a name or a file) without a screen; no finished test is made again."""
-    from ddenv.launch.folder import find_run
-    from ddenv.launch.programs import start_engine
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.programs import start_engine
 
     path = find_run(run)
     with RunFile(path) as file, engine_lock(path):
@@ -107,7 +107,7 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
 )
 def open_run(run: str, watch: bool) -> int:
     """Attaches the workbench to RUN (a name or a file)."""
-    from ddenv.launch.folder import find_run
+    from ddenv.runs.folder import find_run
     from ddenv.workbench.app import run_workbench
 
     return run_workbench(find_run(run), watch=watch)
@@ -116,8 +116,8 @@ def open_run(run: str, watch: bool) -> int:
 @app.command()
 def runs() -> int:
     """Lists the runs."""
-    from ddenv.console.runs import run_lines
-    from ddenv.launch.folder import runs_folder
+    from ddenv.cli.runs_list import run_lines
+    from ddenv.runs.folder import runs_folder
 
     lines = run_lines(runs_folder())
     print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
@@ -140,7 +140,7 @@ def test(
     subject, spawn, goal, world, timeout, model_path, stand_in, ignore, keep, jobs, as_json, leave_out, **options
 ) -> int:
     """Runs the robot in a scenario, or in a run's world, and prints each run's outcome."""
-    from ddenv.engine.trial import plan, run_trials
+    from ddenv.engine.single_test import plan, run_trials
 
     reading = {"model_path": model_path, "stand_in": stand_in, "ignore": ignore}
     what = _subject(subject, spawn, goal, world, timeout, reading)
@@ -162,8 +162,8 @@ def test(
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
     """Writes the world that RUN has left."""
-    from ddenv.launch.export import export_world
-    from ddenv.launch.folder import find_run
+    from ddenv.runs.export import export_world
+    from ddenv.runs.folder import find_run
 
     if sdf is None:
         raise UserError("nothing to export: give --sdf FILE")
@@ -188,8 +188,8 @@ def export(run: str, sdf: Path | None, scenario: Path | None) -> int:
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def report(run: str, file: Path, force: bool) -> int:
     """Writes what RUN came to as one page: to read, to print, to mail."""
-    from ddenv.launch.folder import find_run
-    from ddenv.report.write import write_report
+    from ddenv.report.report import write_report
+    from ddenv.runs.folder import find_run
 
     for path in write_report(find_run(run), file, force):
         print(f"wrote {path}")
@@ -198,7 +198,7 @@ def report(run: str, file: Path, force: bool) -> int:
 
 def _scenario(name, spawn, goal, world, timeout, reading):
     """The scenario that a command line asks for."""
-    from ddenv.launch.scenarios import reading_of, scenario_for_world, with_options
+    from ddenv.runs.scenarios import reading_of, scenario_for_world, with_options
     from ddenv.world.load import find_scenario, load_scenario
 
     if Path(name).suffix.lower() in (".sdf", ".world"):
@@ -215,10 +215,10 @@ def _scenario(name, spawn, goal, world, timeout, reading):
 
 def _subject(name, spawn, goal, world, timeout, reading):
     """What `ddenv test` tries: a run where there is one of that name, else a scenario."""
-    from ddenv.engine.trial import Subject, subject_of_run
-    from ddenv.launch.folder import find_run
-    from ddenv.launch.scenarios import load_parts
+    from ddenv.engine.single_test import Subject, subject_of_run
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.scenarios import load_parts
 
     path = find_run(name)
     if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
@@ -257,9 +257,9 @@ def _tell_needs(sdf: Path, uris: list[str]) -> None:
 
 
 def _follow(path: Path, engine: Any, as_json: bool, sdf: Path | None) -> int:
-    from ddenv.console.follow import Interrupted, follow
-    from ddenv.console.summary import lines, summary
-    from ddenv.launch.export import export_world
+    from ddenv.cli.follow import Interrupted, follow
+    from ddenv.cli.summary import lines, summary
+    from ddenv.runs.export import export_world
 
     code = 0
     try:

@@ -20,10 +20,10 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.engine.shared import SharingPool, simulator, tests_of_others
 from ddenv.errors import UserError
-from ddenv.launch.programs import ENGINE_SAYS, ENGINE_STARTED
-from ddenv.launch.runs import read_parts
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import read_parts
+from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.version import __version__
 
 

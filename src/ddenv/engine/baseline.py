@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.reduction.statistics import iterations_needed, miss_chance, wilson_interval
+from ddenv.reduction.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, judge_trajectory, medoid
 from ddenv.runfile.state import Test
 from ddenv.world.scenario import FailureSpec

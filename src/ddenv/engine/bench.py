@@ -11,16 +11,44 @@ from collections.abc import Callable
 import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.failures import failures_of
 from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.judging import failures_of, told
 from ddenv.engine.pool import Broken, Pool
-from ddenv.engine.told import told
-from ddenv.engine.trials import judge_trials, open_trials
 from ddenv.errors import UserError
+from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
+from ddenv.runfile.state import Trial
 from ddenv.runfile.store import ROBOT
 from ddenv.world.scenario import FailureSpec
+
+Hand = tuple[Keep, int, int]
+
+
+def open_trials(journal: Journal) -> list[Trial]:
+    """Those without a verdict, in the order in which they were asked for."""
+    return [trial for trial in journal.state.trials if not trial.verdict]
+
+
+def judge_trials(journal: Journal) -> list[Hand]:
+    """Writes the verdicts that are due; returns the tests still needed as (models, run, trial), the first asked for first."""
+    wanted: list[Hand] = []
+    iterations = journal.state.scenario["reduction"]["iterations"]
+    for trial in open_trials(journal):
+        keep = frozenset(trial.models)
+        now = standing([keep], journal.is_similar, iterations)
+        if now.verdicts[0]:
+            _judge(journal, trial, keep, now.verdicts[0], iterations)
+        else:
+            wanted += [(keep, run, trial.number) for _, run in now.wanted]
+    return wanted
+
+
+def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str, iterations: int) -> None:
+    tests = journal.tests_of(keep, iterations)
+    known = sum(journal.state.tests[test - 1].trial != trial.number for test in tests)
+    journal.record("trial_judged", trial=trial.number, verdict=verdict, tests=tests, known=known)
+
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05

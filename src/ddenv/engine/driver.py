@@ -11,9 +11,9 @@ from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.confirm import Confirmation
 from ddenv.engine.control import Control, Steered
-from ddenv.engine.evidence import Sight
-from ddenv.engine.failures import rows_of
 from ddenv.engine.journal import Journal, Keep, other_way
+from ddenv.engine.judging import rows_of
+from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.guide import Search, make_guide, search

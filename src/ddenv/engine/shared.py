@@ -17,10 +17,10 @@ import numpy as np
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
-from ddenv.launch.folder import SUFFIX
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runs.folder import SUFFIX
 from ddenv.version import __version__
 from ddenv.world.scenario import Scenario
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ddenv.engine.failures import failure_of, rejudged
 from ddenv.engine.journal import Journal
+from ddenv.engine.judging import failure_of, rejudged
 from ddenv.errors import UserError
-from ddenv.runfile.fold_nodes import failures_at
+from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.state import Candidate, Test
 from ddenv.schemas import check, split_pair
 from ddenv.world.scenario import FailureSpec, Reduction

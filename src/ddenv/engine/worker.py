@@ -58,7 +58,7 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and is not there for those who have no use for it.
-    from ddenv.robot.variants import Variants
+    from ddenv.robot.drake.template import Variants
 
     return Variants(world, robot, scenario)
 

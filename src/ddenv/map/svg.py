@@ -9,15 +9,14 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from ddenv.errors import printable
-from ddenv.map.frame import Frame
+from ddenv.map.footprints import Drawn, plan
+from ddenv.map.frame import Frame, tick_step, tick_text, ticks
 from ddenv.map.labels import HEIGHT, Label, Spot, place_labels, spot
 from ddenv.map.names import shortened
 from ddenv.map.paint import RGB, blend, packed, readable
-from ddenv.map.plan import Drawn, plan
 from ddenv.map.raster import extent
-from ddenv.map.ticks import tick_step, tick_text, ticks
+from ddenv.world.extent import convex_hull
 from ddenv.world.model import World, is_ground
-from ddenv.world.outline import convex_hull
 
 # Pixels: the most that the map itself takes, and what stands around it.
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ddenv.report.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, plain, say
-from ddenv.report.drawing import CORNERS, close_up, picture
-from ddenv.report.numbers import place
-from ddenv.report.read import Record
+from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, place, plain, say
+from ddenv.report.report_map import CORNERS, close_up, picture
+from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.words import count
 from ddenv.world.model import is_ground
 
 if TYPE_CHECKING:
-    from ddenv.map.plan import Drawn
+    from ddenv.map.footprints import Drawn
 
 # A table of more models is not read by anyone; so many names of others are told.
 MOST_MODELS, MOST_NAMES = 200, 12
@@ -27,7 +26,7 @@ def result(record: Record) -> Section:
         title = "The world"
     if record.world is None:
         return Section(title, _names_alone(state))
-    from ddenv.map.plan import plan
+    from ddenv.map.footprints import plan
 
     drawn = plan(record.world, CORNERS)
     blocks: list[Block] = [Picture("map", picture(record, drawn), _told(state))]

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ddenv.report.blocks import Block, Cell, Picture, Section, Strong, Table, say
-from ddenv.report.chart import chart
-from ddenv.report.read import Record
+from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, say
+from ddenv.page.step_chart import chart
+from ddenv.report.run_data import Record
 from ddenv.runfile.state import Candidate, Round, RunState
 from ddenv.words import count
 

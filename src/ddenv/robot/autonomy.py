@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.drive import Drive
+from ddenv.robot.drake.drive import Drive
 from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
-from ddenv.robot.sensing.readings import Imu, Scan
-from ddenv.robot.sensing.suite import SensorSuite, Truth
+from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
 from ddenv.world.scenario import Sensors
 
 

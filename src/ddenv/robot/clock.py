@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from ddenv.robot.recording import RECORD_PERIOD
+from ddenv.robot.result import RECORD_PERIOD
 from ddenv.world.scenario import Scenario
 
 

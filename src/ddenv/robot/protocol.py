@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.readings import Imu, Scan
+from ddenv.robot.sensing.sensors import Imu, Scan
 
 
 class Twist(NamedTuple):

@@ -12,18 +12,115 @@ from pydrake.systems.framework import Context
 
 from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.drive import Drive
-from ddenv.robot.kinds import kind_of
+from ddenv.robot.controllers import ControllerFailed
+from ddenv.robot.drake.drive import Drive
+from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.notice import Notice
-from ddenv.robot.observe import Observer, PoseRow
-from ddenv.robot.own import ControllerFailed
-from ddenv.robot.plant import Body, Built
-from ddenv.robot.recording import Recording
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.oracle import kind_of
+from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.result import Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.sleep import Sleep
-from ddenv.robot.stuck import Stuck
-from ddenv.world.scenario import Scenario
+from ddenv.robot.sensing.sensors import Truth
+from ddenv.world.scenario import Controller, Scenario
+
+PoseRow = tuple[float, ...]
+
+
+class Observer:
+    """Reads one context of the plant."""
+
+    def __init__(self, built: Built, drive: Drive, plant_context: Context) -> None:
+        plant, base = built.plant, built.robot.base
+        self._plant = plant
+        self._context = plant_context
+        self._place = base.floating_positions_start()
+        self._spin = plant.num_positions() + base.floating_velocities_start_in_v()
+        joints = [plant.GetJointByName(name, built.robot.instance) for name in drive.joints]
+        starts = [plant.num_positions() + joint.velocity_start() for joint in joints]
+        self._wheels = list(zip(starts, drive.signs, strict=True))
+        self._state: list[float] = []
+        self.look()
+
+    def look(self) -> bool:
+        """Reads the state as it is now; returns whether all of it still consists of numbers."""
+        self._state = self._plant.GetPositionsAndVelocities(self._context).tolist()
+        # No sum of numbers comes near the largest one.
+        return math.isfinite(sum(self._state))
+
+    def pose(self, body: Body) -> PoseRow:
+        """x, y, z (m), qw, qx, qy, qz of the first link of a model in the world frame, as of the last look."""
+        if not body.base.is_floating_base_body():
+            place = self._plant.EvalBodyPoseInWorld(self._context, body.base)
+            return (*place.translation().tolist(), *place.rotation().ToQuaternion().wxyz().tolist())
+        return self._floating(body.base.floating_positions_start())
+
+    def robot(self) -> PoseRow:
+        """The pose of the robot."""
+        return self._floating(self._place)
+
+    def truth(self, pose: PoseRow) -> Truth:
+        """What the robot's sensors would measure without noise at its `pose`."""
+        _, _, _, qw, qx, qy, qz = pose
+        state, spin = self._state, self._spin
+        # The gyro is fixed to the body: it measures the turning about the body's own z axis, given here in the world frame.
+        up_x, up_y, up_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
+        return Truth(
+            heading=math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)),
+            roll=math.atan2(2 * (qy * qz + qw * qx), up_z),
+            pitch=math.asin(min(1.0, max(-1.0, 2 * (qw * qy - qx * qz)))),
+            yaw_rate=up_x * state[spin] + up_y * state[spin + 1] + up_z * state[spin + 2],
+            wheels=tuple([sign * state[start] for start, sign in self._wheels]),
+        )
+
+    def _floating(self, start: int) -> PoseRow:
+        # As the plant holds it: continuous, never jumping to the opposite quaternion, but not quite of unit length.
+        qw, qx, qy, qz, x, y, z = self._state[start : start + 7]
+        length = math.hypot(qw, qx, qy, qz)
+        return x, y, z, qw / length, qx / length, qy / length, qz / length
+
+
+# Who stays within so many m and rad for so long (s) is stuck. Wheels that slip in a rut rock a robot by less; one that turns on the
+# spot, or backs up, leaves these limits in a fraction of a second.
+RADIUS = 0.05
+ANGLE = math.radians(5)
+SECONDS = 8.0
+
+# The controller `costmap` first stands still for its patience, clears its map and waits as long again before it backs up and
+# turns: whoever watches must be more patient than that.
+PATIENCES = 3.0
+
+
+def seconds_for(controller: Controller) -> float:
+    """How long a robot with this controller must not move to be stuck for good, s."""
+    return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS
+
+
+class Stuck:
+    """Is told each recorded pose of one run, in order of time.
+
+    It is a guess: a robot may still come free later. That is why full runs confirm what is left after runs that were cut.
+    """
+
+    def __init__(self, seconds: float = SECONDS) -> None:
+        self._seconds = seconds
+        self._since = 0.0
+        self._place: PoseRow | None = None
+
+    def update(self, now: float, pose: PoseRow) -> bool:
+        """Whether the robot is stuck at `now` (s); `pose` is x, y, z (m), qw, qx, qy, qz."""
+        if self._place is None or _has_left(self._place, pose):
+            self._since, self._place = now, pose
+        # Times are sums of steps: what is due in 8 s may come 1e-15 s early.
+        return now - self._since >= self._seconds - 1e-6
+
+
+def _has_left(place: PoseRow, pose: PoseRow) -> bool:
+    if math.dist(place[:3], pose[:3]) > RADIUS:
+        return True
+    # A rotation has two quaternions.
+    likeness = abs(sum(a * b for a, b in zip(place[3:], pose[3:], strict=True)))
+    return 2 * math.acos(min(1.0, likeness)) > ANGLE
+
 
 # Outcome, failure, and whether the run was cut short.
 End = tuple[str, str, bool]

@@ -1,59 +1,18 @@
-"""Events to state: `apply(state, event)` gives the next state and touches nothing else.
-
-The kinds of events, with their data (models are numbers into the run's `elements`):
-
-    created              scenario {...}, elements [names]
-    engine_started       pid, jobs, version (of ddenv), simulator (what computes); both absent in older files
-    test_started         test, phase, round, candidate, run, seed; where phase is "confirm" also without: model or null,
-                         where it is "hand" trial
-    test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
-                         first_sensed [[model, s]], first_touched [[model, s]] (both absent in files of version 1),
-                         cut (absent before version 3), taken: the run that it was taken over from (absent where it was
-                         made); trajectories beside it
-    test_lost            test: it was running when the engine died
-    baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
-    leg_started          round: the number of the next one, n_partitions: a new search begins after the user changed something
-    round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
-                         pinned [..] (absent where there are none)
-    candidate_judged     candidate, verdict, tests [ids], known
-    waiting              candidate
-    decided              candidate, decision: accept or reject
-    reduced              candidate, environment [..], evidence_test
-    round_finished
-    confirm_started      the rounds are over, and what is left is run in full
-    paused / resumed
-    accept_mode          mode
-    vetoed               candidate, verdict: vetoed, or rejected if the same models were rejected in an earlier round, which
-                         `again` says
-    unvetoed             round, candidate
-    pinned / unpinned    models [..]
-    trial_started        trial, models [..]: the user's own selection is tried
-    trial_judged         trial, verdict, tests [ids], known
-    adopted              trial, environment [..], evidence_test
-    accepted_other       test, what, trial or null, environment [..], outcomes {test: outcome}, distances {test: m}
-    went_back            node, rejected: the node that is undone, or null; outcomes and distances of tests where other failures
-                         count there
-    changed              settings {...}: keys of the scenario's section `reduction`
-    command_refused      why
-    command_handled      command: no other event came of it
-    finished             minimal, reason
-    engine_stopped       reason
-    engine_failed        reason
-
-An event that a viewer's command became also holds `command`, its number.
-"""
+"""Events to state: `apply(state, event)` gives the next state and touches nothing else."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_guiding, fold_nodes, fold_rounds, fold_tests
-from ddenv.runfile.guiding import Node
-from ddenv.runfile.state import Point, RunState
+from ddenv.runfile import fold_decisions
+from ddenv.runfile.events import Changes, Data, as_now, chance, moments, names, number, one_of, vector
+from ddenv.runfile.fold_decisions import arrived, counts, decision, waits_no_more, with_outcomes, with_test
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import Baseline, Candidate, Node, Point, Round, RunState, Split, Test, Trial, many
 from ddenv.runfile.store import Event
-from ddenv.runfile.values import Changes, Data, one_of
 
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
@@ -126,7 +85,7 @@ def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
     if mode == state.accept_mode:
         return {}
     words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"
-    return {"accept_mode": mode, **fold_nodes.decision(state, at, "accept_mode", words)}
+    return {"accept_mode": mode, **fold_decisions.decision(state, at, "accept_mode", words)}
 
 
 def _command_handled(state: RunState, data: Data, _: float) -> Changes:
@@ -166,36 +125,237 @@ def _ended(state: RunState, status: str, data: Data, at: float) -> Changes:
     }
 
 
+def test_started(state: RunState, data: Data, _: float) -> Changes:
+    round, candidate = data["round"], data["candidate"]
+    without = data.get("without")
+    test = Test(
+        id=int(data["test"]),
+        phase=str(data["phase"]),
+        round=round,
+        candidate=candidate,
+        run=int(data["run"]),
+        seed=int(data["seed"]),
+        without=None if without is None else names(state.elements, [without])[0],
+        trial=data.get("trial"),
+    )
+    if test.id != len(state.tests) + 1:
+        raise ValueError(test.id)
+    changes = {"tests": state.tests.added(test), **counts(state, None, test)}
+    if test.trial is not None:
+        return changes | {"trials": _with_test_of_trial(state, test)}
+    if round is None:
+        return changes
+    if round != state.round.number:
+        raise ValueError(round)
+    one = tried(state, candidate)
+    return changes | with_candidate(state, replace(one, tests=(*one.tests, test.id)))
+
+
+def test_finished(state: RunState, data: Data, _: float) -> Changes:
+    distance, pose = data["distance"], data["end_pose"]
+    values = {
+        "outcome": str(data["outcome"]),
+        "failure": as_now(str(data["failure"])),
+        "distance": None if distance is None else number(distance),
+        "end_pose": None if pose is None else vector(pose, 7),
+        "simulated_seconds": number(data["simulated_seconds"]),
+        "wall_seconds": number(data["wall_seconds"]),
+        "first_sensed": moments(state.elements, data.get("first_sensed", ())),
+        "first_touched": moments(state.elements, data.get("first_touched", ())),
+        "cut": bool(data.get("cut", False)),
+        "taken": bool(data.get("taken", "")),
+    }
+    return with_test(state, int(data["test"]), values)
+
+
+def test_lost(state: RunState, data: Data, _: float) -> Changes:
+    return with_test(state, int(data["test"]), {"outcome": "lost"})
+
+
+def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
+    baseline = Baseline(
+        runs=int(data["runs"]),
+        failures=int(data["failures"]),
+        rate=chance(data["rate"]),
+        low=chance(data["low"]),
+        high=chance(data["high"]),
+        failure_test=int(data["failure_test"]),
+        position=vector(data["position"], 3),
+        miss_chance=chance(data["miss_chance"]),
+        iterations_95=int(data["iterations_95"]),
+    )
+    compared = with_outcomes(state, data)
+    point = Point(compared.tests_done, len(state.environment))
+    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=baseline.failure_test),)
+    return {
+        "tests": compared.tests,
+        "tally": compared.tally,
+        "deflake_runs": compared.deflake_runs,
+        "baseline": baseline,
+        "evidence_test": baseline.failure_test,
+        "failures": (baseline.failure_test,),
+        "nodes": (*root, *state.nodes[1:]),
+        "history": (*state.history, point),
+        "status": state.status if state.paused else "running",
+    }
+
+
+def _with_test_of_trial(state: RunState, test: Test) -> tuple[Trial, ...]:
+    if type(test.trial) is not int or not 0 < test.trial <= len(state.trials):
+        raise IndexError(test.trial)
+    trials = list(state.trials)
+    trial = trials[test.trial - 1]
+    trials[test.trial - 1] = replace(trial, tests=(*trial.tests, test.id))
+    return tuple(trials)
+
+
+def round_started(state: RunState, data: Data, _: float) -> Changes:
+    environment = names(state.elements, data["environment"])
+    partitions = tuple(names(state.elements, part) for part in data["partitions"])
+    split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
+    _check(split, data["candidates"])
+    if state.round is not None and int(data["round"]) <= state.round.number:
+        raise ValueError(data["round"])
+    candidates = PersistentTuple.of(
+        Candidate(index, kind, partition, split, None if distance is None else number(distance))
+        for index, (kind, partition, distance) in enumerate(data["candidates"])
+    )
+    round = Round(int(data["round"]), int(data["n_partitions"]), split, candidates)
+    return {**waits_no_more(state), "round": round}
+
+
+def _check(split: Split, candidates: list[Any]) -> None:
+    """Partitions are disjoint and within the environment, and each makes at most two candidates: there are not many."""
+    models = [*(name for partition in split.partitions for name in partition), *split.pinned]
+    environment = set(split.environment)
+    if len(set(models)) != len(models) or not environment.issuperset(models) or not all(split.partitions):
+        raise ValueError("partitions")
+    if len(environment) != len(split.environment):
+        raise ValueError("environment")
+    if len({(kind, partition) for kind, partition, _ in candidates}) != len(candidates):
+        raise ValueError("candidates")
+    numbers = range(len(split.partitions))
+    if not all(
+        kind in ("partition", "complement") and type(part) is int and part in numbers for kind, part, _ in candidates
+    ):
+        raise ValueError("candidates")
+
+
+def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
+    candidate = replace(
+        tried(state, data["candidate"]),
+        verdict=one_of(data["verdict"], "similar", "dissimilar"),
+        tests=tuple(map(int, data["tests"])),
+        known=int(data["known"]),
+    )
+    round = with_candidate(state, candidate)["round"]
+    if candidate.verdict != "dissimilar":
+        return {"round": round}
+    # What it leaves out is needed in part; what different complements leave out has nothing in common.
+    apart = candidate.kind == "complement" or len(round.partitions) == 2
+    round = replace(round, missed=round.missed + apart)
+    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    if needed == state.lower_bound:
+        return {"round": round}
+    point = Point(state.tests_done, len(state.environment), needed)
+    return {"round": round, "lower_bound": needed, "history": (*state.history, point)}
+
+
+def vetoed(state: RunState, data: Data, at: float) -> Changes:
+    verdict = one_of(data["verdict"], "vetoed", "rejected")
+    candidate = replace(tried(state, data["candidate"]), verdict=verdict)
+    changes = with_candidate(state, candidate)
+    if data.get("again"):
+        return changes
+    return changes | decision(state, at, "veto", f"vetoed {_told(state, candidate)}")
+
+
+def unvetoed(state: RunState, data: Data, at: float) -> Changes:
+    candidate = tried(state, data["candidate"])
+    words = f"took back the veto of {_told(state, candidate)}"
+    if candidate.verdict == "rejected":
+        words = f"took back the rejection of {_told(state, candidate)}"
+    changes = with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
+    # The first similar one wins: what waits behind this one has to wait for its verdict.
+    if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
+        changes |= waits_no_more(state)
+    return changes
+
+
+def waiting(state: RunState, data: Data, _: float) -> Changes:
+    return {"status": "waiting", "waiting_candidate": tried(state, data["candidate"]).index}
+
+
+def decided(state: RunState, data: Data, at: float) -> Changes:
+    changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
+    candidate = tried(state, data["candidate"])
+    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_told(state, candidate)}"
+    changes |= decision(state, at, str(data["decision"]), said)
+    if data["decision"] == "accept":
+        return changes
+    return changes | with_candidate(state, replace(candidate, verdict="rejected"))
+
+
+def reduced(state: RunState, data: Data, at: float) -> Changes:
+    winner = tried(state, data["candidate"])
+    # One part alone shows f, and yet others seemed to be needed: what was known is not so.
+    if winner.kind == "partition" and state.round.missed > 1:
+        state = state.changed(lower_bound=0)
+    changes = arrived(state, data, at, "reduced", winner.label)
+    return changes | {"round": replace(state.round, winner=winner.index)}
+
+
+def _told(state: RunState, candidate: Candidate) -> str:
+    return f"{candidate.label} of round {state.round.number} ({many(candidate.size)})"
+
+
+def round_finished(state: RunState, _: Data, __: float) -> Changes:
+    return {"round": replace(state.round, done=True), "rounds_done": state.round.number}
+
+
+def tried(state: RunState, index: int) -> Candidate:
+    """A candidate of the current round. Raises IndexError if there is none with this index."""
+    if index < 0:
+        raise IndexError(index)
+    return state.round.candidates[index]
+
+
+def with_candidate(state: RunState, candidate: Candidate) -> Changes:
+    """The round with another candidate in the place of the one with the same index."""
+    candidates = state.round.candidates.changed(candidate.index, candidate)
+    return {"round": replace(state.round, candidates=candidates)}
+
+
 # Each tells the fields that get other values, so that the state is copied once an event.
 _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "created": _created,
     "engine_started": _engine_started,
-    "test_started": fold_tests.test_started,
-    "test_finished": fold_tests.test_finished,
-    "test_lost": fold_tests.test_lost,
-    "baseline_finished": fold_tests.baseline_finished,
-    "round_started": fold_rounds.round_started,
-    "candidate_judged": fold_rounds.candidate_judged,
-    "waiting": fold_rounds.waiting,
-    "decided": fold_rounds.decided,
-    "reduced": fold_rounds.reduced,
-    "round_finished": fold_rounds.round_finished,
+    "test_started": test_started,
+    "test_finished": test_finished,
+    "test_lost": test_lost,
+    "baseline_finished": baseline_finished,
+    "round_started": round_started,
+    "candidate_judged": candidate_judged,
+    "waiting": waiting,
+    "decided": decided,
+    "reduced": reduced,
+    "round_finished": round_finished,
     "confirm_started": _confirm_started,
     "paused": _paused,
     "resumed": _resumed,
     "accept_mode": _accept_mode,
-    "vetoed": fold_rounds.vetoed,
-    "unvetoed": fold_rounds.unvetoed,
-    "pinned": fold_guiding.pinned,
-    "unpinned": fold_guiding.unpinned,
-    "trial_started": fold_guiding.trial_started,
-    "trial_judged": fold_guiding.trial_judged,
-    "adopted": fold_guiding.adopted,
-    "accepted_other": fold_guiding.accepted_other,
-    "went_back": fold_guiding.went_back,
-    "changed": fold_guiding.changed,
-    "leg_started": fold_guiding.leg_started,
-    "command_refused": fold_guiding.command_refused,
+    "vetoed": vetoed,
+    "unvetoed": unvetoed,
+    "pinned": fold_decisions.pinned,
+    "unpinned": fold_decisions.unpinned,
+    "trial_started": fold_decisions.trial_started,
+    "trial_judged": fold_decisions.trial_judged,
+    "adopted": fold_decisions.adopted,
+    "accepted_other": fold_decisions.accepted_other,
+    "went_back": fold_decisions.went_back,
+    "changed": fold_decisions.changed,
+    "leg_started": fold_decisions.leg_started,
+    "command_refused": fold_decisions.command_refused,
     "command_handled": _command_handled,
     "finished": _finished,
     "engine_stopped": _engine_stopped,

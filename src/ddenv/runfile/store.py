@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.values import moment
+from ddenv.runfile.events import moment
 
 APPLICATION_ID = 0x64644531
 # The tables are those of version 1; documents and events may hold what a reader of an earlier version does not know.

@@ -17,8 +17,8 @@ from meshcat.geometry import (
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
-from ddenv.scene.follow import Shot
 from ddenv.scene.mesh import Surface
+from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.world.model import Collision, Link, Model, Plane, Visual, World, is_ground
 from ddenv.world.pose import Pose, Vector

@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ddenv.launch.runs import read_parts
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runs.creation import read_parts
 from ddenv.scene import colors
+from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import Scenery, circle, flag, mark
-from ddenv.scene.follow import Shot, live_pose, pose_at, replay_time, shot
+from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot
 from ddenv.scene.stage import Stage
-from ddenv.scene.view import set_up, view
 from ddenv.world.placement import spawn_pose
 
 READ_EVERY = 0.1  # s between looks into the run file

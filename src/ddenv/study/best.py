@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from ddenv.report.blocks import Block, Cell, Section, Strong, Table, plain, say
-from ddenv.study.bound import least_to_find, least_to_show
+from ddenv.page.blocks import Block, Cell, Section, Strong, Table, plain, say
 from ddenv.study.plan import Method
-from ddenv.study.rows import Group, Row, least_of
+from ddenv.study.rows import Group, Row, least_of, least_to_find, least_to_show
 from ddenv.words import count
 
 # A comparison needs some methods; without it, the tables tell all.

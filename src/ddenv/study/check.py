@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import IO
 
 from ddenv.errors import UserError
-from ddenv.study.folder import check_path
 from ddenv.study.plan import Cell
-from ddenv.world.files.whole import read_bytes, write_file
+from ddenv.study.study_folder import check_path
+from ddenv.world.files.access import read_bytes, write_file
 
 # Between the seeds of a reduction and those of its check.
 APART = 100_000

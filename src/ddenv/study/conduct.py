@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv.errors import printable
-from ddenv.study.folder import Sitting, machine, opened, sittings, versions, write_sittings
-from ddenv.study.order import Size, longest_first, sizes
-from ddenv.study.plan import Cell, Plan
+from ddenv.study.plan import Cell, Plan, Size, longest_first, sizes
 from ddenv.study.progress import Progress
+from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
+from ddenv.study.study_page import write_study
 from ddenv.study.work import PER_CELL, Work, is_done, made, work
-from ddenv.study.write import write_study
 from ddenv.words import count
 
 # How often it is written how long the study took so far, s.

@@ -10,7 +10,7 @@ from typing import Any
 
 from ddenv import schemas
 from ddenv.errors import UserError
-from ddenv.launch.scenarios import with_options
+from ddenv.runs.scenarios import load_parts, with_options
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -105,7 +105,7 @@ def make_plan(
 ) -> Plan:
     """The study that these words ask for; each may hold several names separated by commas. Raises UserError.
 
-    `options` are those of `ddenv.launch.scenarios.with_options` for all of it.
+    `options` are those of `ddenv.runs.scenarios.with_options` for all of it.
     """
     names = _names("--scenarios", ",".join(scenarios)) if scenarios else SCENARIOS
     chosen_pairs, chosen_algorithms = _pairs(pairs), _algorithms(algorithms)
@@ -182,3 +182,34 @@ def _cell(scenario: Scenario, method: Method, number: int) -> Cell:
         )
     asked = reduction.model_copy(update={"algorithm": method.algorithm, "pair": method.pair, "seed": seed})
     return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)
+
+
+# What a model that can move costs in a test, beside one that cannot: about as much as was measured of piles of boards.
+MOVES = 4
+# Equal spans of time put most of a world into one part, which takes many rounds to come apart.
+SLOW = ("timeseg/", "trajectoryseg/")
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A scenario's world: how many models can be removed, and what a test of it costs, in models that do not move."""
+
+    models: int
+    cost: int
+
+
+def sizes(plan: Plan) -> dict[str, Size]:
+    """The sizes of the scenarios' worlds by the scenarios' names. Raises UserError for a world or a robot that cannot be read."""
+    return {scenario.name: _size(scenario) for scenario in plan.scenarios}
+
+
+def _size(scenario: Scenario) -> Size:
+    world, _ = load_parts(scenario)
+    elements = set(world.elements(frozenset(scenario.protected)))
+    moving = sum(not model.static for model in world.models if model.name in elements)
+    return Size(len(elements), len(elements) + MOVES * moving)
+
+
+def longest_first(cells: Sequence[Cell], worlds: dict[str, Size]) -> list[Cell]:
+    """The cells as they are to be made."""
+    return sorted(cells, key=lambda cell: (-worlds[cell.scenario.name].cost, not cell.method.pair.startswith(SLOW)))

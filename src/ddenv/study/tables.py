@@ -6,14 +6,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from ddenv.report.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Table, plain, say
-from ddenv.report.numbers import percent
-from ddenv.study.figure import chart
-from ddenv.study.found import Found
-from ddenv.study.paper import TABLES, theirs
+from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Table, percent, plain, say
+from ddenv.study.figures import chart, worlds
 from ddenv.study.plan import file_name
-from ddenv.study.rows import Group, Row, spread
-from ddenv.study.worlds import worlds
+from ddenv.study.results import Found
+from ddenv.study.rows import TABLES, Group, Row, spread, theirs
 from ddenv.words import count
 
 # So many models that are left are named.

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import IO
 
 from ddenv.errors import UserError
-from ddenv.launch.programs import STOP_WAIT, last_words, start_engine, stop_engines
-from ddenv.launch.runs import create_run
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
 from ddenv.study.check import read_check, start_check, write_check
-from ddenv.study.folder import check_path, run_path
 from ddenv.study.plan import Cell
-from ddenv.study.same import difference
+from ddenv.study.results import difference
+from ddenv.study.study_folder import check_path, run_path
 
 POLL = 0.2
 # More workers than this mostly run ahead of one reduction in vain.

@@ -15,14 +15,14 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.config import Config
-from ddenv.workbench.themes import DARK, OURS, fitting, for_rich
+from ddenv.workbench.help.config import Config
+from ddenv.workbench.terminal.themes import DARK, OURS, fitting, for_rich
+from ddenv.workbench.terminal.written import Written
 from ddenv.workbench.wording import plain
-from ddenv.workbench.written import Written
 
 
 def _commands() -> type[Provider]:
-    from ddenv.workbench.palette import Commands
+    from ddenv.workbench.help.command_palette import Commands
 
     return Commands
 
@@ -83,19 +83,19 @@ class Workbench(App[int]):
         self._own_keys = config.keys
         self._run, self._watch = run, watch
         if run is not None:
-            from ddenv.workbench.observed import Observed
+            from ddenv.workbench.run.observed import Observed
 
             # Opened before the screen is taken, so that a wrong file is told in the terminal as one line.
             Observed(run, strictly=watch).close()
 
     @staticmethod
     def _attached(run: Path, watch: bool) -> Screen:
-        from ddenv.workbench.screens.run import RunScreen
+        from ddenv.workbench.run.run_screen import RunScreen
 
         return RunScreen(run, watch=True) if watch else RunScreen(run)
 
     def _setup(self) -> Screen:
-        from ddenv.workbench.screens.setup import SetupScreen
+        from ddenv.workbench.setup.setup_screen import SetupScreen
 
         return SetupScreen(self._reading)
 
@@ -150,13 +150,13 @@ class Workbench(App[int]):
 
     def action_help(self) -> None:
         """The keys of the focused pane, of the screen, and of the app."""
-        from ddenv.workbench.screens.dialogs import Help
+        from ddenv.workbench.help.dialogs import Help
 
         self.push_screen(Help.of(self.screen))
 
     def action_runs(self) -> None:
         """The list of all runs, above the screen that asks for it."""
-        from ddenv.workbench.screens.runs import RunsScreen
+        from ddenv.workbench.runs.runs_screen import RunsScreen
 
         if not any(isinstance(screen, RunsScreen) for screen in self.screen_stack):
             self.push_screen(RunsScreen())
@@ -167,7 +167,7 @@ class Workbench(App[int]):
 
     def show_setup(self, like: Path | None = None) -> None:
         """The setup screen, in place of all screens; with the settings of the run `like` filled in."""
-        from ddenv.workbench.screens.setup import SetupScreen
+        from ddenv.workbench.setup.setup_screen import SetupScreen
 
         self._only(SetupScreen(self._reading) if like is None else SetupScreen(self._reading, like=like))
 
@@ -190,8 +190,8 @@ class Workbench(App[int]):
 
 def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None, *, watch: bool = False) -> int:
     """Runs the workbench until it is left; returns the exit code. Raises UserError for what is no run file, or no terminal."""
-    from ddenv.workbench.config import read_config
-    from ddenv.workbench.terminal import check_terminal
+    from ddenv.workbench.help.config import read_config
+    from ddenv.workbench.terminal.terminal_check import check_terminal
 
     config = read_config()
     app = Workbench(run, reading, watch=watch, config=config)

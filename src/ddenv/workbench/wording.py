@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import shlex
+from pathlib import Path
 from typing import Any
 
-from ddenv.runfile.failures import DEEDS
+from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
 from ddenv.words import count as count
 from ddenv.words import duration as duration
@@ -86,3 +88,11 @@ def metres(value: Any, digits: int = 1) -> str:
     if not isinstance(value, (int, float)) or not math.isfinite(value):
         return ""
     return f"{value:.{digits}f} m"
+
+
+def attach_name(run: Path) -> str:
+    """A run's name if it lies in the runs folder, else its path, quoted for a shell."""
+    from ddenv.runs.folder import find_run
+
+    name = run.stem if find_run(run.stem) == run else str(run)
+    return shlex.quote(plain(name))

@@ -15,9 +15,19 @@ from pydantic import BaseModel, ValidationError
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
-from ddenv.world.bundled import SCENARIOS, bundled_names
-from ddenv.world.files.whole import read_bytes
+from ddenv.world.files.access import read_bytes
 from ddenv.world.scenario import Scenario
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_ROOT = _PACKAGE / "data" if (_PACKAGE / "data").is_dir() else _PACKAGE.parents[1]
+SCENARIOS = _ROOT / "scenarios"
+SDF = _ROOT / "sdf"
+
+
+def bundled_names() -> list[str]:
+    """Names of the bundled scenarios, sorted."""
+    return sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
+
 
 # What pydantic's words for its errors would not tell a user.
 PLAINLY = {

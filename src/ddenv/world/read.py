@@ -12,18 +12,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.world.files.access import read_bytes
 from ddenv.world.files.resources import Disk, Resources
-from ddenv.world.files.whole import read_bytes
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import PLAIN, Reading
-from ddenv.world.sdf.assemble import assemble
-from ddenv.world.sdf.context import Context, sdf_root
+from ddenv.world.sdf.assemble import Saved, assemble, read_state
+from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.state import Saved, read_state
-from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
-from ddenv.world.urdf.robot import ROOT, massless, to_sdf, without_mass
+from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # What would put models into the world that this reader does not see.

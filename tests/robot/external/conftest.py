@@ -5,8 +5,8 @@ import uuid
 
 import pytest
 
-from ddenv.launch.scenarios import load_parts
 from ddenv.robot.external.simulator import ExternalSimulator
+from ddenv.runs.scenarios import load_parts
 from tests.robot.external.own import TOKEN, own_scenario, processes_with
 from tests.waiting import wait_until
 

@@ -9,7 +9,7 @@ import pytest
 
 from ddenv.robot.navigation.costmap import Costmap
 from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.readings import Imu, Scan
+from ddenv.robot.sensing.sensors import Imu, Scan
 from tests.robot.navigation.toy import ANGLES, LIDAR, Ground, setup
 
 BARREL = Ground(circles=((3.0, 1.0, 0.3),))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ddenv.robot.navigation.grid import STEPS, Grid, way_to
+from ddenv.robot.navigation.route import STEPS, Grid, way_to
 
 COUNT = 4
 GRID = Grid(COUNT)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ddenv.robot.navigation.plan import Planner
+from ddenv.robot.navigation.route import Planner
 from tests.robot.navigation.toy import HUSKY, setup
 
 

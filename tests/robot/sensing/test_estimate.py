@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ddenv.robot.sensing import estimate as filter_module
 from ddenv.robot.sensing.estimate import Filter, wrap
-from ddenv.robot.sensing.suite import SensorSuite, Truth
+from ddenv.robot.sensing.sensors import SensorSuite, Truth
 from ddenv.world.scenario import Sensors
 
 NOISELESS = Sensors(compass=0, gyro=0, odometry=0, tilt=0)

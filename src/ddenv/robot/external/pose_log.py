@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ddenv.errors import printable
-from ddenv.robot.recording import RECORD_PERIOD
+from ddenv.robot.result import RECORD_PERIOD
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 EXPECTED = f"expected {','.join(COLUMNS)} (s, m, a quaternion)"

@@ -15,21 +15,21 @@ import numpy as np
 from ddenv.errors import UserError
 from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
 from ddenv.robot.external.process import Ended, running, watch
-from ddenv.robot.kinds import kind_of
+from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import Progress, RunResult
 from ddenv.world.command import command_words, filled, has_placeholder
 from ddenv.world.files.resolve import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
-from ddenv.world.write import without
+from ddenv.world.subworld import without
 
 # What the command's exit codes mean; all others are errors.
 OUTCOMES = {0: "pass", 1: "failed"}
 
 
 class ExternalSimulator:
-    """Runs as `ddenv.robot.template.Template` has them, by a command. What it should do is told in docs/any-simulator.md."""
+    """Runs as `ddenv.robot.drake.template.Template` has them, by a command. What it should do is told in docs/any-simulator.md."""
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Raises UserError for a command that cannot be started."""

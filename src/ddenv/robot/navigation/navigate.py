@@ -7,15 +7,70 @@ import math
 import numpy as np
 
 from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.navigation.follow import Follower
-from ddenv.robot.navigation.path import Path
-from ddenv.robot.navigation.plan import Planner
-from ddenv.robot.navigation.progress import Progress
+from ddenv.robot.navigation.pursuit import Follower
 from ddenv.robot.navigation.recover import Attempt, Recovery
-from ddenv.robot.navigation.straight import ARRIVED
+from ddenv.robot.navigation.route import Path, Planner
 from ddenv.robot.protocol import STOP, Reading, Setup, Twist
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.readings import Imu
+from ddenv.robot.sensing.estimate import Estimate, wrap
+from ddenv.robot.sensing.sensors import Imu
+
+# The robot stops when it believes to be this far inside the goal's tolerance (a fraction of it).
+ARRIVED = 0.2
+
+
+class Straight:
+    """Drives to the goal in a straight line, turning on the spot when it lies behind. Once it believes to be there it stays."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._gain = setup.settings.heading_gain
+        self._speed = 0.0
+        self.arrived = False
+
+    def step(self, reading: Reading) -> Twist:
+        """The command for the next period."""
+        setup, estimate = self._setup, reading.estimate
+        dx, dy = setup.goal[0] - estimate.x, setup.goal[1] - estimate.y
+        self.arrived = self.arrived or math.hypot(dx, dy) <= ARRIVED * setup.tolerance
+        if self.arrived:
+            return STOP
+        error = wrap(math.atan2(dy, dx) - estimate.heading)
+        wanted = setup.speed * max(0.0, math.cos(error))
+        # Faster starts lift the front wheels; slowing down is left to the goal's tolerance.
+        self._speed = min(wanted, self._speed + setup.acceleration * setup.period)
+        turn = min(max(self._gain * error, -setup.turn_rate), setup.turn_rate)
+        return Twist(self._speed, turn)
+
+
+# It moved if it is this far (m) from where it was, or turned by this (rad).
+MOVED = 0.1
+TURNED = 0.3
+# Turning alone counts for no longer than this many times the patience.
+ON_THE_SPOT = 4
+
+
+class Progress:
+    """Remembers where the robot last got further, and since when it does not."""
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
+        self._from: Estimate | None = None
+        self._heading = 0.0
+        self._moved = self._turned = 0.0
+
+    def begin(self) -> None:
+        """From now on it has to get further again."""
+        self._from = None
+
+    def is_stalled(self, time: float, estimate: Estimate) -> bool:
+        """Whether the robot at `estimate` has not moved for too long."""
+        if self._from is None or math.hypot(estimate.x - self._from.x, estimate.y - self._from.y) >= MOVED:
+            self._from, self._moved = estimate, time
+            self._heading, self._turned = estimate.heading, time
+        elif abs(wrap(estimate.heading - self._heading)) >= TURNED:
+            self._heading, self._turned = estimate.heading, time
+        return time - self._turned >= self._patience or time - self._moved >= ON_THE_SPOT * self._patience
+
 
 # Scans that come faster than this (s) are left out, and of a robot that waits where it is, these.
 LOOK_EVERY = 0.2

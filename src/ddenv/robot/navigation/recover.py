@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.navigation.follow import BACK_SPEED, may_back_up, may_turn
-from ddenv.robot.navigation.footprint import Footprint
+from ddenv.robot.navigation.costmap import Costmap, Footprint
+from ddenv.robot.navigation.pursuit import BACK_SPEED, may_back_up, may_turn
 from ddenv.robot.protocol import STOP, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
 

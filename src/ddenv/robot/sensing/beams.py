@@ -13,9 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ddenv.robot.sensing.crossing import Interval, ball, cube, pill, tube
+from ddenv.robot.sensing.crossing import Facets, Interval, ball, cube, pill, tube
 from ddenv.robot.sensing.obstacles import HULL, KINDS, PILL, Obstacles
-from ddenv.robot.sensing.section import Facets
 from ddenv.world.scenario import Lidar
 
 # What is left out is at least this much out of the way (m, rad, and as a part of the range): far more than rounding does.

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.robot.joints import anchored
-from ddenv.robot.sensing.section import Facets
+from ddenv.robot.drake.articulation import anchored
+from ddenv.robot.sensing.crossing import Facets
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World
 from ddenv.world.pose import Pose, Vector
 

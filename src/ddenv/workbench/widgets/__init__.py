@@ -1,1 +1,1 @@
-"""The panels of the run screen, one a file."""
+"""Widgets that several screens share."""

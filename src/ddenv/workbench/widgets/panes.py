@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from rich.text import Text
 from textual import events
 from textual.app import ComposeResult
 from textual.containers import HorizontalGroup
@@ -41,3 +44,37 @@ class Panes(HorizontalGroup):
         id = getattr(event.widget, "id", None) or ""
         if id.startswith("pane-"):
             self.post_message(self.Chosen(id.removeprefix("pane-")))
+
+
+class SetupPanes(HorizontalGroup):
+    """The titles in a row, each with its key; the one that is shown is marked by its brackets."""
+
+    class Asked(Message):
+        """The user wants to see this pane."""
+
+        def __init__(self, pane: str) -> None:
+            super().__init__()
+            self.pane = pane
+
+    def __init__(self, panes: Mapping[str, str], *, id: str) -> None:
+        """`panes` has the panes by the keys that show them."""
+        super().__init__(id=id)
+        self._panes = dict(panes)
+
+    def compose(self) -> ComposeResult:
+        for pane in self._panes.values():
+            yield Static("", id=f"to-{pane}", classes="pane-title", markup=False)
+
+    def mark(self, pane: str) -> None:
+        """`pane` is shown from now on."""
+        for key, name in self._panes.items():
+            shown = name == pane
+            words = Text(f"[{key} {name}]", "bold") if shown else Text(f" {key} {name} ", "not bold")
+            title = self.query_one(f"#to-{name}", Static)
+            title.update(words)
+            title.set_class(shown, "-shown")
+
+    def on_click(self, event: events.Click) -> None:
+        id = getattr(event.widget, "id", None) or ""
+        if id.startswith("to-"):
+            self.post_message(self.Asked(id.removeprefix("to-")))

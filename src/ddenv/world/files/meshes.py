@@ -25,8 +25,7 @@ from ddenv.world.files.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.hull import convex_hull
-from ddenv.world.files.obj_stl import read_obj, read_stl
-from ddenv.world.files.triangles import MOST_FACES, Part, chosen, joined
+from ddenv.world.files.triangles import MOST_FACES, Part, chosen, joined, read_obj, read_stl
 from ddenv.world.model import Mesh
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")

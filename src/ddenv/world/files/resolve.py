@@ -10,8 +10,47 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ddenv.world.files import fuel
 from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason, without_tilde
+
+HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
+CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
+
+
+def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
+    """Folders where the Fuel cache may have the model; of `version`, or the newest if that is empty or "tip".
+
+    The cache is $GZ_FUEL_CACHE_PATH, or else `CACHES`; both hosts are looked at, since Fuel moved from one to the other.
+    """
+    chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
+    for cache in (chosen,) if chosen else CACHES:
+        for host in HOSTS:
+            folder = without_tilde(cache) / host / owner.lower() / "models" / name.lower()
+            if version.isdecimal():
+                yield folder / version
+            elif versions := [entry for entry in folders_of(folder) if entry.isdecimal()]:
+                yield folder / max(versions, key=int)
+
+
+def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
+    """Folders called `name` in any of `folders`; then those that differ by case only, or by `_` for a space."""
+    for folder in folders:
+        yield folder / name
+    for folder in folders:
+        yield from (folder / entry for entry in folders_of(folder) if _plain(entry) == _plain(name))
+
+
+def folders_of(folder: Path) -> list[str]:
+    """Names of the folders in `folder`, sorted; none if it cannot be looked at."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if entry.is_dir())
+    except (OSError, ValueError):
+        return []
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("_", " ")
+
 
 ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 # The newest SDF that is understood: a model's folder may hold one file for each version.
@@ -101,14 +140,14 @@ def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
 def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     """`rest` is HOST/1.0/OWNER/models/NAME[/VERSION][/files/FILE]: a model that was downloaded from Fuel before."""
     words = rest.split("/")
-    if words[0].lower() not in fuel.HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
+    if words[0].lower() not in HOSTS or len(words) < 5 or words[3] != "models" or not (words[2] and words[4]):
         raise Missing("is not downloaded; name a file or folder of this machine instead")
     if any(word in (".", "..") for word in words):
         raise Unusable(CLIMBS if ".." in words else "names no file")
     owner, name, tail = words[2], words[4], words[5:]
     version = tail.pop(0) if tail and tail[0] != "files" else ""
     path = _inside("/".join(tail[1:] if tail[:1] == ["files"] else tail))
-    models = (*fuel.in_cache(owner, name, version), *fuel.of_name(name, tuple(folders)))
+    models = (*in_cache(owner, name, version), *of_name(name, tuple(folders)))
     where = f"looked in the Fuel cache and in {_listed(folders)}; nothing is downloaded"
     return _first((model / path for model in models), where)
 

@@ -8,9 +8,8 @@ from urllib.parse import unquote
 
 from ddenv.world.files.resources import Missing
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from ddenv.world.sdf.context import Context, refuse, sdf_root
+from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import SIZES, StandIn
-from ddenv.world.sdf.unread import note_unread
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
 # What an included file may hold in place of a model, which nothing can touch.

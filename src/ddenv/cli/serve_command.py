@@ -1,0 +1,29 @@
+"""`ddenv serve`: the workbench in a browser of this machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from ddenv.errors import UserError
+
+
+def _refuse_host(_: Any, __: Any, value: str | None) -> None:
+    if value is not None:
+        raise UserError(
+            "--host: the workbench is served on 127.0.0.1 alone, since whoever reaches it acts as you; "
+            "from another machine use ssh -L"
+        )
+
+
+@click.command("serve")
+@click.argument("run", required=False)
+@click.option("--port", type=click.IntRange(1, 65535), default=8000, show_default=True, help="Port on 127.0.0.1.")
+@click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
+def serve_command(run: str | None, port: int) -> int:
+    """Serves the workbench to browsers on this machine; with RUN (a name or a file) attached to it."""
+    from ddenv.workbench.terminal.served import serve
+
+    serve(port, run)
+    return 0

@@ -1,0 +1,175 @@
+"""What was understood of a world: a table for people, plain data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from ddenv.cli.schemas_command import cut, wrapped
+from ddenv.errors import printable
+from ddenv.map.names import padded, shortened, width
+from ddenv.words import count, first_of
+from ddenv.world.extent import center, model_bounds
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Model,
+    Note,
+    Plane,
+    Shape,
+    Sphere,
+    World,
+    is_ground,
+)
+
+NAMES: dict[type, str] = {
+    Box: "box",
+    Capsule: "capsule",
+    Cylinder: "cylinder",
+    Ellipsoid: "ellipsoid",
+    Mesh: "hull",
+    Plane: "plane",
+    Sphere: "sphere",
+}
+LONGEST_NAME, SHORTEST_NAME = 34, 10
+GAP = "  "
+# The notes of a model stand in a row twice: with what differs between models, and as mere numbers.
+HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes", "notes")
+TO_THE_RIGHT = (2, 6)
+# Which columns are shown, from wide terminals to narrow ones.
+CHOICES = (
+    (0, 1, 2, 3, 4, 5, 6, 7),
+    (0, 1, 2, 3, 4, 5, 6, 8),
+    (0, 1, 3, 4, 5, 6, 8),
+    (0, 1, 4, 5, 6, 8),
+    (0, 1, 4, 5, 8),
+)
+# So many of the models that must stay are named.
+MOST_ANCHORS = 5
+
+
+def report(world: World) -> dict[str, Any]:
+    """Everything of the table and more; lengths in m, angles in rad."""
+    elements = set(world.elements())
+    return {
+        "file": str(world.path),
+        "version": world.version,
+        "world": world.name,
+        "gravity": list(world.gravity),
+        "models": [_described(model, model.name in elements, world.notes) for model in world.models],
+        "notes": [_note(note) for note in world.notes if not note.model],
+    }
+
+
+def _described(model: Model, removable: bool, notes: Iterable[Note]) -> dict[str, Any]:
+    box = model_bounds(model)
+    return {
+        "name": model.name,
+        "kind": kind(model),
+        "removable": removable,
+        "line": model.line,
+        "pose": [*model.pose.position, *model.pose.quaternion],
+        "links": [{"name": link.name, "pose": [*link.pose.position, *link.pose.quaternion]} for link in model.links],
+        "joints": [{"name": joint.name, "kind": joint.kind} for joint in model.joints],
+        "shapes": dict(_shapes(model)),
+        "low": None if box is None else box[0].tolist(),
+        "high": None if box is None else box[1].tolist(),
+        "friction": sorted({collision.mu for collision in model.collisions}),
+        "mass": sum(link.inertia.mass for link in model.links if link.inertia is not None) or None,
+        "notes": [_note(note) for note in notes if note.model == model.name],
+    }
+
+
+def _note(note: Note) -> dict[str, str]:
+    return {"kind": note.kind, "what": note.what, "why": note.why, "detail": note.detail, "place": note.place}
+
+
+def kind(model: Model) -> str:
+    """ground, static or dynamic."""
+    if is_ground(model):
+        return "ground"
+    return "static" if model.static else "dynamic"
+
+
+def lines(world: World, columns: int | None = None) -> list[str]:
+    """The table: a line for each model, then the notes by number, then the totals.
+
+    No line is wider than `columns`, for which the table leaves out what matters least; with None nothing is left out.
+    """
+    numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
+    by_model: dict[str, dict[str, str]] = {}
+    for note in sorted(world.notes, key=lambda note: numbers[_text(note)]):
+        number = str(numbers[_text(note)])
+        detail = printable(note.detail.removesuffix(" away"))
+        by_model.setdefault(note.model, {})[f"{number} ({detail})" if detail else number] = number
+    table = _table([HEADER, *(_row(model, by_model.get(model.name, {})) for model in world.models)], columns)
+    notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
+    below = ["", "notes", *notes] if notes else []
+    return [*wrapped(_title(world), columns), "", *table, *below, "", *wrapped(_totals(world), columns)]
+
+
+def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
+    """The rows, with as many of their columns as there is room for, and names that are shortened for the last bit."""
+    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
+    wide = [sum(widths[i] for i in choice) + len(GAP) * (len(choice) - 1) for choice in CHOICES]
+    fitting = (choice for choice, each in zip(CHOICES, wide, strict=True) if columns is None or each <= columns)
+    shown = next(fitting, None)
+    if shown is None:
+        shown = CHOICES[-1]
+        widths[0] = max(SHORTEST_NAME, widths[0] - (wide[-1] - columns))
+    return [cut(GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip(), columns) for row in rows]
+
+
+def _title(world: World) -> str:
+    gravity = " ".join(f"{part:g}" for part in world.gravity)
+    return printable(f"{world.path}: SDF {world.version}, world '{world.name}', gravity {gravity} m/s^2")
+
+
+def _totals(world: World) -> str:
+    counts = {which: sum(note.kind == which for note in world.notes) for which in ("replaced", "ignored")}
+    said = ", ".join(f"{number} {which}" for which, number in counts.items() if number)
+    models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed"
+    return f"{models}{_staying(world)}; {said or 'everything was taken as it is written'}"
+
+
+def _staying(world: World) -> str:
+    names = [shortened(model.name, LONGEST_NAME) for model in world.models if model.name in world.anchors]
+    if not names:
+        return ""
+    they, them = ("1 stays", "it") if len(names) == 1 else (f"{len(names)} stay", "them")
+    return f"; {they} since others are placed relative to {them}: {first_of(names, MOST_ANCHORS)}"
+
+
+def _text(note: Note) -> str:
+    return printable(f"{note.kind}: {note.what} {note.why}")
+
+
+def _row(model: Model, notes: Mapping[str, str]) -> tuple[str, ...]:
+    """A cell for each of HEADER; `notes` are those with details, and the number of each."""
+    box = model_bounds(model)
+    size = "" if box is None else " x ".join(f"{part:.2f}" for part in box[1] - box[0])
+    return (
+        shortened(model.name, LONGEST_NAME),
+        kind(model),
+        str(len(model.links)),
+        ", ".join(f"{number} {shape}" for shape, number in _shapes(model)) or "none",
+        size,
+        ", ".join(f"{part:.2f}" for part in center(model)),
+        f"{model.links[0].pose.yaw():.2f}",
+        ", ".join(notes),
+        ", ".join(dict.fromkeys(notes.values())),
+    )
+
+
+def _shapes(model: Model) -> list[tuple[str, int]]:
+    shapes: list[Shape] = [collision.shape for collision in model.collisions]
+    found = [NAMES[type(shape)] for shape in shapes]
+    return [(name, found.count(name)) for name in dict.fromkeys(found)]
+
+
+def _cell(text: str, columns: int, which: int) -> str:
+    text = shortened(text, columns)
+    return f"{' ' * (columns - width(text))}{text}" if which in TO_THE_RIGHT else padded(text, columns)

@@ -1,0 +1,81 @@
+"""`ddenv world ...`: looks at SDF worlds, and writes clean ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import click
+
+from ddenv.cli.options import Numbers, reading_options
+from ddenv.errors import UserError, printable
+
+
+@click.group("world")
+def world_group() -> None:
+    """Looks at SDF worlds: what was understood of them, and from above."""
+
+
+@world_group.command()
+@click.argument("file", type=Path)
+@reading_options
+@click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
+def check(file: Path, as_json: bool, **reading) -> int:
+    """Tells what is read of FILE: each model, what was replaced or ignored, and why."""
+    from ddenv.cli.world_check import lines, report
+
+    world = _read(file, reading)
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    print(json.dumps(report(world)) if as_json else "\n".join(lines(world, columns)))
+    return 0
+
+
+@world_group.command()
+@click.argument("file", type=Path)
+@reading_options
+@click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark where a robot starts, m and rad.")
+@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark where it shall go, m.")
+@click.option("--svg", type=Path, help="Write the map to this file instead.")
+def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
+    """Draws the map of FILE, from above."""
+    from ddenv.cli.world_show import terminal_map
+    from ddenv.map.svg import svg_map
+    from ddenv.world.files.access import write_file
+
+    world = _read(file, reading)
+    marks = {"spawn": spawn and (*spawn, 0.0)[:3], "goal": goal}
+    if svg is not None:
+        write_file(svg, svg_map(world, **marks).encode())
+        print(f"wrote {svg}")
+        return 0
+    columns, rows = shutil.get_terminal_size((100, 36))
+    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    print(terminal_map(world, columns, rows - 1, color=color, **marks))
+    return 0
+
+
+@world_group.command()
+@click.argument("file", type=Path)
+@reading_options
+@click.option(
+    "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
+)
+def convert(file: Path, output: Path, **reading) -> int:
+    """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
+    from ddenv.world.convert import write_converted
+
+    for path in write_converted(_read(file, reading), output):
+        print(f"wrote {path}")
+    return 0
+
+
+def _read(file: Path, reading: dict):
+    from ddenv.runs.scenarios import reading_of
+    from ddenv.world.read import read_world
+
+    if file.suffix.lower() in (".yaml", ".yml"):
+        raise UserError(f"{file}: is a scenario; give the SDF file of its world")
+    return read_world(file, reading_of(**reading), lambda line: print(printable(line), file=sys.stderr, flush=True))

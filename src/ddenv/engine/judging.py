@@ -1,0 +1,85 @@
+"""What came out of a test as plain data, for the run file and for `--json`: every number in it is finite."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ddenv.engine.pool import Broken
+from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
+from ddenv.robot.result import RunResult
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.world.scenario import FailureSpec
+
+
+def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
+    """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
+
+    `failures` are f, and what the user took for as good; the nearest one counts.
+    `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None. `cut` says that it
+    was ended before its time because the robot was stuck for good, `taken` from which other run it was taken over.
+    """
+    if isinstance(result, Broken):
+        nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
+        unnoticed = {"first_sensed": {}, "first_touched": {}}
+        return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed, "cut": False}
+    outcome, distance = result.outcome, None
+    if failures:
+        judgement = nearest([judge(result, failure) for failure in failures])
+        outcome, distance = judgement.outcome, judgement.distance
+    pose = [float(value) for value in result.end_pose]
+    taken = {"taken": result.taken} if result.taken else {}
+    return {
+        "outcome": outcome,
+        "failure": result.failure,
+        "distance": None if distance is None or not math.isfinite(distance) else distance,
+        "end_pose": pose if all(map(math.isfinite, pose)) else None,
+        "simulated_seconds": result.simulated_seconds,
+        "wall_seconds": result.wall_seconds,
+        "first_sensed": _to_ms(result.first_sensed),
+        "first_touched": _to_ms(result.first_touched),
+        "cut": result.cut,
+        **taken,
+    }
+
+
+def nearest(judgements: Sequence[Judgement]) -> Judgement:
+    """The one that counts: a similar one, or else the one that is nearest."""
+    return min(judgements, key=lambda each: (each.outcome != "similar", each.distance))
+
+
+def _to_ms(times: dict[str, float]) -> dict[str, float]:
+    return {name: round(seconds, 3) for name, seconds in times.items()}
+
+
+def failures_of(file: RunFile, state: RunState, spec: FailureSpec) -> tuple[Failure, ...]:
+    """f first; none before it is fixed. Raises UserError for a damaged run file."""
+    return tuple(failure_of(file, state, test, spec) for test in state.failures)
+
+
+def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> Failure:
+    """The failure that a test showed. Raises UserError for a damaged run file."""
+    f = state.baseline
+    end = f.position if test == f.failure_test else state.tests[test - 1].end_pose[:3]
+    return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
+
+
+def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> dict[str, dict[str, Any]]:
+    """What all failed tests so far are, seen from `failures`: their outcomes, and distances in m, by the test's id."""
+    outcomes, distances = {}, {}
+    for test in state.tests:
+        if test.outcome not in ("similar", "other"):
+            continue
+        judged = nearest([judge_trajectory(rows_of(file, test.id), failure) for failure in failures])
+        outcomes[str(test.id)], distances[str(test.id)] = judged.outcome, judged.distance
+    return {"outcomes": outcomes, "distances": distances}
+
+
+def rows_of(file: RunFile, test: int) -> np.ndarray:
+    """The robot's trajectory in a test, shape (N, COLUMNS). Raises UserError where there is none."""
+    return np.array(file.trajectory(test)).reshape(-1, COLUMNS)

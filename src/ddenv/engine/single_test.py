@@ -1,0 +1,107 @@
+"""Runs the robot outside of a reduction: in a whole scenario, or in any part of a run's world, judged against the run's f."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ddenv.engine.judging import failures_of, told
+from ddenv.engine.pool import Pool
+from ddenv.errors import UserError
+from ddenv.robot.oracle import Failure
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import read_parts
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is tried. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
+
+    scenario: Scenario
+    world: World
+    robot: Model
+    state: RunState | None = None
+    failures: tuple[Failure, ...] = ()
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        return self.world.elements(frozenset(self.scenario.protected))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run to make: the models that are there, the seed, and the model that was left out on purpose, if any."""
+
+    keep: frozenset[str]
+    seed: int
+    without: str | None = None
+
+
+def subject_of_run(file: RunFile) -> Subject:
+    """The world of a run, with its f if the baseline is done."""
+    scenario, world, robot = read_parts(file)
+    state = fold(file.events())
+    failures = failures_of(file, state, scenario.failure)
+    return Subject(scenario, world, robot, state, failures)
+
+
+def plan(
+    subject: Subject,
+    *,
+    keep: list[str] | None = None,
+    minimal: bool = False,
+    leave_out: list[str] | None = None,
+    leave_each_out: bool = False,
+    seed: int | None = None,
+    repeat: int = 1,
+) -> list[Trial]:
+    """The runs asked for. Seeds are `seed`, `seed + 1`, ... (the scenario's own by default). Raises UserError."""
+    models = _models(subject, keep, minimal)
+    for name in leave_out or []:
+        if name not in models:
+            raise UserError(f"--leave-out: '{name}' is not among the {len(models)} models that are there")
+    models = tuple(name for name in models if name not in (leave_out or []))
+    base = subject.scenario.reduction.seed if seed is None else seed
+    keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
+    if leave_each_out:
+        keeps += [(frozenset(models) - {name}, name) for name in models]
+    return [Trial(there, base + run, without) for there, without in keeps for run in range(repeat)]
+
+
+def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[str, ...]:
+    if minimal and subject.state is None:
+        raise UserError("--minimal: needs a run; a scenario has no minimal environment yet")
+    if minimal and keep is not None:
+        raise UserError("--minimal and --keep: give one of them")
+    if keep is not None:
+        for name in keep:
+            if name not in subject.elements:
+                raise UserError(f"--keep: the world has no removable model '{name}'")
+        return tuple(keep)
+    return subject.state.environment if minimal and subject.state else subject.elements
+
+
+def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
+    """Makes the runs in worker processes; yields what came out of each, in order, as plain data."""
+    pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
+    results: dict[int, dict[str, Any]] = {}
+    started = shown = 0
+    try:
+        while shown < len(trials):
+            while pool.idle and started < len(trials):
+                pool.submit(started, trials[started].keep, trials[started].seed, full=True)
+                started += 1
+            for index, result in pool.finished(1.0):
+                trial = trials[index]
+                asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
+                results[index] = asked | told(result, subject.failures)
+            while shown in results:
+                yield results.pop(shown)
+                shown += 1
+    finally:
+        pool.close()

@@ -1,0 +1,1 @@
+"""What reports and studies are made of, and how it becomes HTML and Markdown."""

@@ -1,0 +1,128 @@
+"""What a report is made of, whatever it is written as: headings, sentences, tables, pictures. Plain frozen data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from ddenv.errors import printable
+from ddenv.words import duration as duration
+from ddenv.words import percent as percent
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A name from a file: it may hold anything, and is shown as it is."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Strong:
+    """Words that stand out."""
+
+    text: str
+
+
+Part = str | Name | Strong
+Cell = Part | tuple[Part, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Paragraph:
+    """Sentences. A `notice` says what the reader must not overlook, such as that a run has not ended."""
+
+    parts: tuple[Part, ...]
+    notice: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of cells below a `head`. Columns with a number in `right` are aligned to the right; `strong` rows stand out."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    right: frozenset[int] = frozenset()
+    strong: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A drawing. `svg` takes its colours from the classes of `style.css`; `told` says it in words."""
+
+    name: str
+    svg: str
+    told: str
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """Lines to type or to read as they are. With `folded`, they are shown when the reader asks for what it says."""
+
+    lines: tuple[str, ...]
+    folded: str = ""
+
+
+Block = Paragraph | Table | Picture | Code
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A heading with what is below it."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole report: what it is of, the run in a few words, `figures` (number, what it counts), and all the rest."""
+
+    name: str
+    verdict: str
+    lead: tuple[Paragraph, ...]
+    figures: tuple[tuple[str, str], ...]
+    sections: tuple[Section, ...]
+    foot: str
+
+
+def parts(cell: Cell) -> tuple[Part, ...]:
+    """What a cell consists of."""
+    return cell if isinstance(cell, tuple) else (cell,)
+
+
+def plain(text: object) -> str:
+    """`text` on one line without what would steer a terminal or turn the direction of the text around it."""
+    return printable(" ".join(str(text).split()))
+
+
+def say(*words: Part, notice: bool = False) -> Paragraph:
+    """A paragraph of these words."""
+    return Paragraph(words, notice)
+
+
+def moment(time: float) -> str:
+    """Unix time, s, as date and time in UTC: a report is read anywhere. "" for what is no time."""
+    try:
+        return f"{datetime.fromtimestamp(time, UTC):%Y-%m-%d %H:%M:%S}"
+    except (OverflowError, OSError, ValueError):
+        return ""
+
+
+def place(values: tuple[float, ...]) -> str:
+    """x, y and z in m."""
+    # Adding zero makes -0.0 the same as 0.0.
+    return ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in values[:3])
+
+
+def thousands(number: int) -> str:
+    """12 345."""
+    return f"{number:,}".replace(",", " ")
+
+
+def section(data: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """A part of a scenario; an empty one where a damaged file has something else."""
+    value = data.get(key)
+    return value if isinstance(value, dict) else {}

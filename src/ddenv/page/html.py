@@ -1,0 +1,94 @@
+"""A report as one HTML page that needs nothing else: no script, no other file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+
+from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts, plain
+
+HERE = Path(__file__).parent
+# Nothing is fetched or run, whatever a name in a run file may try.
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def html(report: Report) -> str:
+    """The page."""
+    style = (HERE / "style.css").read_text() + (HERE / "page.css").read_text()
+    lines = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{_text(report.name)}: {_text(report.verdict)}</title>",
+        f"<style>\n{style}</style></head><body><main>",
+        f'<header><p class="of"><bdi>{_text(report.name)}</bdi></p>',
+        f"<h1>{_text(report.verdict)}</h1>",
+        *(_paragraph(each) for each in report.lead),
+        *_figures(report.figures),
+        "</header>",
+    ]
+    for section in report.sections:
+        lines += [f"<section><h2>{_text(section.title)}</h2>", *map(_block, section.blocks), "</section>"]
+    return "\n".join([*lines, f"<footer>{_text(report.foot)}</footer>", "</main></body></html>", ""])
+
+
+def _figures(figures: tuple[tuple[str, str], ...]) -> Iterator[str]:
+    yield '<dl class="figures">'
+    yield from (f"<div><dt>{_text(what)}</dt><dd>{_text(number)}</dd></div>" for number, what in figures)
+    yield "</dl>"
+
+
+def _block(block: Block) -> str:
+    match block:
+        case Paragraph():
+            return _paragraph(block)
+        case Table():
+            return _table(block)
+        case Picture():
+            words = escape(plain(block.told))
+            return f'<figure class="{block.name}" aria-label="{words}">\n{block.svg}\n</figure>'
+        case Code():
+            return _code(block)
+    raise TypeError(type(block).__name__)
+
+
+def _paragraph(block: Paragraph) -> str:
+    notice = ' class="notice"' if block.notice else ""
+    return f"<p{notice}>{''.join(map(_part, block.parts))}</p>"
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th{_side(table, column)}>{_text(title)}</th>" for column, title in enumerate(table.head))
+    rows = "\n".join(_row(table, number, row) for number, row in enumerate(table.rows))
+    return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>'
+
+
+def _row(table: Table, number: int, row: tuple[Cell, ...]) -> str:
+    strong = ' class="strong"' if number in table.strong else ""
+    cells = (f"<td{_side(table, column)}>{''.join(map(_part, parts(cell)))}</td>" for column, cell in enumerate(row))
+    return f"<tr{strong}>{''.join(cells)}</tr>"
+
+
+def _side(table: Table, column: int) -> str:
+    return ' class="number"' if column in table.right else ""
+
+
+def _code(code: Code) -> str:
+    text = "\n".join(escape("".join(char if char.isprintable() else "�" for char in line)) for line in code.lines)
+    shown = f"<pre>{text}</pre>"
+    return f"<details><summary>{_text(code.folded)}</summary>{shown}</details>" if code.folded else shown
+
+
+def _part(part: Part) -> str:
+    match part:
+        case Name(text):
+            return f"<bdi>{_text(text)}</bdi>"
+        case Strong(text):
+            return f"<strong>{_text(text)}</strong>"
+    return escape(part)
+
+
+def _text(text: str) -> str:
+    return escape(plain(text))

@@ -1,0 +1,128 @@
+"""A report as Markdown, with its pictures as SVG files beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+from ddenv.errors import printable
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Code,
+    Name,
+    Paragraph,
+    Part,
+    Picture,
+    Report,
+    Section,
+    Strong,
+    Table,
+    parts,
+    plain,
+)
+
+HERE = Path(__file__).parent
+_MARKUP = re.compile(r"([\\`*_\[\]<>|~$&])")
+# What would make a heading, a list or a quotation of a line that begins with it.
+_BEGINNING = re.compile(r"^(\d*)([#+=.)-])")
+
+
+def markdown(report: Report, stem: str) -> str:
+    """The text; its pictures are `pictures` of the same `stem`."""
+    figures = Table(
+        tuple(what for _, what in report.figures),
+        (tuple(number for number, _ in report.figures),),
+        frozenset(range(len(report.figures))),
+    )
+    lines = [f"# {_name(report.name)}: {_text(report.verdict)}", ""]
+    for block in (*report.lead, figures):
+        lines += [*_block(block, stem), ""]
+    for section in report.sections:
+        lines += _section(section, stem)
+    return "\n".join([*lines, "---", "", _text(report.foot), ""])
+
+
+def pictures(report: Report, stem: str) -> dict[str, str]:
+    """The SVG files that the text of the same `stem` shows, by name."""
+    style = (HERE / "style.css").read_text()
+    return {
+        _file(stem, block): _alone(block.svg, style)
+        for section in report.sections
+        for block in section.blocks
+        if isinstance(block, Picture)
+    }
+
+
+def _file(stem: str, picture: Picture) -> str:
+    return f"{stem}.{picture.name}.svg"
+
+
+def _alone(svg: str, style: str) -> str:
+    """A picture that brings its colours along."""
+    start = svg.index(">") + 1
+    ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
+    return f"{svg[:start]}\n<style>\n{style}</style>\n{ground}{svg[start:]}\n"
+
+
+def _section(section: Section, stem: str) -> Iterator[str]:
+    yield from (f"## {_text(section.title)}", "")
+    for block in section.blocks:
+        yield from (*_block(block, stem), "")
+
+
+def _block(block: Block, stem: str) -> list[str]:
+    match block:
+        case Paragraph():
+            words = "".join(map(_part, block.parts))
+            return [f"> {words}" if block.notice else _BEGINNING.sub(r"\1\\\2", words)]
+        case Table():
+            return _table(block)
+        case Picture():
+            return [f"![{_text(block.told)}]({quote(_file(stem, block))})"]
+        case Code():
+            return _code(block)
+    raise TypeError(type(block).__name__)
+
+
+def _table(table: Table) -> list[str]:
+    sides = ("---:" if column in table.right else "---" for column in range(len(table.head)))
+    rows = (_row(row, number in table.strong) for number, row in enumerate(table.rows))
+    return [_row(table.head, False), f"| {' | '.join(sides)} |", *rows]
+
+
+def _row(row: tuple[Cell, ...], strong: bool) -> str:
+    cells = ["".join(map(_part, parts(cell))) for cell in row]
+    return f"| {' | '.join(f'**{cell}**' if strong and cell else cell for cell in cells)} |"
+
+
+def _code(code: Code) -> list[str]:
+    text = [printable(line) for line in code.lines]
+    fence = "`" * max(3, 1 + max((len(run) for line in text for run in re.findall("`+", line)), default=0))
+    shown = [fence, *text, fence]
+    return ["<details>", f"<summary>{code.folded}</summary>", "", *shown, "", "</details>"] if code.folded else shown
+
+
+def _part(part: Part) -> str:
+    match part:
+        case Name(text):
+            return _name(text)
+        case Strong(text):
+            return f"**{_text(text)}**"
+    lead = part[: len(part) - len(part.lstrip(" "))]
+    tail = part[len(part.rstrip(" ")) :] if part.strip() else ""
+    return f"{lead}{_text(part)}{tail}"
+
+
+def _name(text: str) -> str:
+    """As code, in which nothing is markup and nobody is mentioned; a table's cell still ends at a bare bar."""
+    text = plain(text)
+    fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
+    space = " " if text.startswith("`") or text.endswith("`") else ""
+    return f"{fence}{space}{text}{space}{fence}".replace("|", "\\|") if text else ""
+
+
+def _text(text: str) -> str:
+    return _MARKUP.sub(r"\\\1", plain(text))

@@ -1,0 +1,89 @@
+"""How many models were left after each test, as steps; how many of them are known to be needed, as a line below."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from ddenv.map.frame import tick_step, tick_text, ticks
+from ddenv.runfile.state import Point, RunState
+from ddenv.words import count
+
+WIDTH, HEIGHT = 880.0, 300.0
+LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0
+# More steps cannot be told apart.
+MOST_POINTS = 2000
+
+Steps = list[tuple[float, float]]
+
+
+def chart(state: RunState) -> str:
+    """The chart as SVG, its colours as classes of `style.css`."""
+    last = max(1, state.tests_done, *(point.tests for point in state.history))
+    most = max(1, *(point.models for point in state.history))
+    points = _thinned(state.history)
+    points = [*points, replace(points[-1], tests=last)]
+    models = steps([(point.tests, point.models) for point in points])
+    needed = steps([(point.tests, point.needed) for point in points])
+
+    def at(tests: float, number: float) -> tuple[float, float]:
+        x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
+        return x, HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * number / most
+
+    line = "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*each) for each in models))
+    (first, floor), (end, _) = at(0, 0), at(last, 0)
+    bound = "L".join(f"{x:.1f} {y:.1f}" for x, y in (at(*each) for each in needed))
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}">',
+        *axes(at, last, most),
+        f'<path class="area" d="M{first:.1f} {floor:.1f}L{line}L{end:.1f} {floor:.1f}Z"/>',
+        f'<path class="steps" d="M{line}"/>',
+    ]
+    if any(number for _, number in needed):
+        parts.append(f'<path class="needed" d="M{bound}"/>')
+    parts += _told(state, at, last, most, any(number for _, number in needed))
+    return "\n".join([*parts, "</svg>"])
+
+
+def _thinned(history: Sequence[Point]) -> list[Point]:
+    """So many of the points that the picture is the same."""
+    step = max(1, -(-len(history) // MOST_POINTS))
+    return [*history[:-1:step], *history[-1:]]
+
+
+def steps(points: Sequence[tuple[int, int]]) -> Steps:
+    """Corners: each number holds until the next one."""
+    corners: Steps = []
+    for tests, number in points:
+        if corners:
+            corners.append((tests, corners[-1][1]))
+        corners.append((tests, number))
+    return corners
+
+
+def axes(at: Callable[[float, float], tuple[float, float]], last: int, most: int) -> Iterator[str]:
+    """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and of models, pixels."""
+    step = max(1.0, tick_step(most, 6))
+    for value in ticks(0, most, step):
+        left, y = at(0, value)
+        right, _ = at(last, value)
+        yield f'<path class="grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>'
+        yield f'<text class="tick" x="{left - 7:.1f}" y="{y + 4:.1f}" text-anchor="end">{tick_text(value, step)}</text>'
+    step = max(1.0, tick_step(last, 12))
+    for value in ticks(0, last, step):
+        x, y = at(value, 0)
+        yield f'<text class="tick" x="{x:.1f}" y="{y + 17:.1f}" text-anchor="middle">{tick_text(value, step)}</text>'
+    right, floor = at(last, 0)
+    yield f'<text class="tick" x="{right:.1f}" y="{floor + 36:.1f}" text-anchor="end">tests</text>'
+    yield f'<text class="tick" x="{LEFT - 7:.1f}" y="13" text-anchor="start">models left</text>'
+
+
+def _told(state: RunState, at, last: int, most: int, bounded: bool) -> Iterator[str]:
+    """The number at the end, and what the lower line is."""
+    x, y = at(last, len(state.environment))
+    yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'
+    words = f"{count(len(state.environment), 'model')} left"
+    yield f'<text class="said" x="{x - 8:.1f}" y="{y - 10:.1f}" text-anchor="end">{words}</text>'
+    if bounded and state.lower_bound < 0.6 * most:
+        yield '<g transform="translate(180 9)"><path class="needed" d="M0 0H26"/>'
+        yield '<text class="tick" x="34" y="4">known to be needed</text></g>'

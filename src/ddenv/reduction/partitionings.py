@@ -1,0 +1,93 @@
+"""Partitions by the manoeuvres of the robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+
+import numpy as np
+from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
+from threadpoolctl import threadpool_limits
+
+from ddenv.reduction.evidence import Evidence, Partition
+from ddenv.reduction.round import one_model_partitions
+
+
+def grouped(environment: Partition, labels: Iterable[int]) -> list[Partition]:
+    """The models of each label that occurs, by label; within a partition they stay in the environment's order."""
+    groups: dict[int, list[str]] = {}
+    for name, label in zip(environment, labels, strict=True):
+        groups.setdefault(int(label), []).append(name)
+    return [tuple(groups[label]) for label in sorted(groups)]
+
+
+# Above so many clusters or models k-means begins once instead of four times, and above so many clusters at random models: it
+# would take a second instead of a tenth.
+MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
+
+
+def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+    """Models that are near each other make a partition: k-means on their positions finds n clusters in space. Where it leaves a
+    cluster empty, because models stand in the same place, each model becomes a partition of its own for this round. Good when what
+    causes a failure stands close together.
+
+    Paper, Algorithm 2.
+    """
+    many = n_partitions > MANY_CLUSTERS or len(environment) > MANY_MODELS
+    clusters = KMeans(
+        n_clusters=n_partitions,
+        init="random" if n_partitions > MOST_CLUSTERS else "k-means++",
+        n_init=1 if many else 4,
+        random_state=evidence.seed,
+    )
+    # One thread, so that sums are added in one order and a resumed run sees the same clusters.
+    with warnings.catch_warnings(), threadpool_limits(1):
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        labels = clusters.fit(evidence.places(environment)).labels_
+    partitions = grouped(environment, labels)
+    return partitions if len(partitions) == n_partitions else one_model_partitions(environment)
+
+
+def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+    """The trajectory of the last similar run is cut into n spans of equal duration; a model belongs to the span whose path is
+    nearest to it. A robot that is stuck for long has many spans at one place, so that the models there come apart from the rest
+    early. Good when it matters when the robot met a model.
+    """
+    times = evidence.need("trajectory")[:, 0]
+    return by_span(environment, np.linspace(times[0], times[-1], n_partitions + 1)[1:-1], evidence)
+
+
+def by_span(environment: Partition, cuts: np.ndarray, evidence: Evidence) -> list[Partition]:
+    """The models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
+    return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
+
+
+def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+    """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
+    scenario's key `reduction.delta`); a model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
+    are kept, and where there are too few, the longest spans are halved. Good when the robot's turns tell where something happened.
+    """
+    trajectory = evidence.need("trajectory")
+    return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)
+
+
+def cuts(trajectory: np.ndarray, delta: float, n_spans: int) -> np.ndarray:
+    """Where the trajectory (N, 5) is cut into `n_spans`: sorted times, shape (n_spans - 1,), s."""
+    times, sharpness = turns(trajectory)
+    sharp = np.flatnonzero(sharpness > delta)
+    sharpest = sharp[np.argsort(-sharpness[sharp], kind="stable")][: n_spans - 1]
+    chosen = sorted({float(time) for time in times[sharpest]})
+    ends = [float(trajectory[0, 0]), *chosen, float(trajectory[-1, 0])]
+    while len(ends) - 1 < n_spans:
+        longest = int(np.argmax(np.diff(ends)))
+        ends.insert(longest + 1, (ends[longest] + ends[longest + 1]) / 2)
+    return np.array(ends[1:-1])
+
+
+def turns(trajectory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The inner times (s) of the trajectory (N, 5), and how much the angular velocity (rad/s) changes there: two (N - 2,)."""
+    times, yaw = trajectory[:, 0], np.unwrap(trajectory[:, 4])
+    lasted = np.diff(times)
+    rates = np.diff(yaw) / np.where(lasted > 0, lasted, np.inf)
+    return times[1:-1], np.abs(np.diff(rates))

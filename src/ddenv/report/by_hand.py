@@ -1,0 +1,124 @@
+"""What the user's hand did in a run: decisions, selections that were tried, and the tree of reductions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ddenv.page.blocks import Block, Cell, Section, Table, moment, plain, say
+from ddenv.report.run_data import Record
+from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.words import count
+
+# Of more decisions, trials or nodes, the first and the last ones are told.
+MOST = 120
+# A path without branches is told in one line, with so many steps at most.
+MOST_STEPS = 40
+HOW = {"start": "", "reduced": "", "adopted": "adopted by hand", "accepted": "another failure, accepted by hand"}
+
+
+def guiding(record: Record) -> Section | None:
+    """The section on decisions and the tree; None before there was either."""
+    state = record.state
+    blocks: list[Block] = []
+    if state.decisions:
+        blocks += _decisions(state)
+    elif state.baseline is not None:
+        blocks.append(say("Nobody intervened: every reduction was the algorithm's own."))
+    blocks += _trials(state)
+    blocks += _tree(state)
+    return Section("Decisions and branches", tuple(blocks)) if blocks else None
+
+
+def _decisions(state: RunState) -> list[Block]:
+    rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
+    told = say(
+        f"{count(len(rows), 'decision')} by hand, each with the tests made until then and the environment it was made in."
+    )
+    head = ("time", "tests", "at", "what the user did")
+    return [told, Table(head, _cut(rows, 3), frozenset({1, 2}))]
+
+
+def _trials(state: RunState) -> list[Block]:
+    if not state.trials:
+        return []
+    rows = [_trial(state, each) for each in state.trials]
+    head = ("tried by hand", "at", "models", "tests", "verdict")
+    return [Table(head, _cut(rows, 4), frozenset({1, 2, 3}))]
+
+
+def _trial(state: RunState, trial: Trial) -> tuple[Cell, ...]:
+    verdict = trial.verdict or ("not ended" if state.ended else "under way")
+    words = f"{verdict}, adopted" if trial.adopted else verdict
+    return trial.label, str(trial.node), str(trial.size), str(len(trial.tests)), words
+
+
+def _tree(state: RunState) -> list[Block]:
+    nodes = state.nodes
+    if len(nodes) < 2:
+        return []
+    straight = all(node.parent == node.number - 1 and node.how == "reduced" for node in nodes[1:])
+    if straight and state.node == len(nodes) - 1 and not any(node.rejected for node in nodes):
+        return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
+    order = list(_drawn(state))
+    rows = [_node(state, nodes[number], indent) for number, indent in order]
+    here = frozenset(index for index, (number, _) in enumerate(order) if number == state.node)
+    head = ("environment", "models", "came by", "round", "tests", "")
+    if len(rows) > MOST:
+        here = frozenset()
+    return [
+        say("The tree of reductions, each environment below the one it came from:"),
+        Table(head, _cut(rows, 2), frozenset({1, 3, 4}), here),
+    ]
+
+
+def _steps(nodes: Sequence[Node]) -> str:
+    sizes = [str(len(node.environment)) for node in nodes]
+    if len(sizes) > MOST_STEPS:
+        sizes = [*sizes[: MOST_STEPS // 2], "…", *sizes[-MOST_STEPS // 2 :]]
+    return f"{' → '.join(sizes)} models"
+
+
+def _drawn(state: RunState) -> Iterator[tuple[int, str]]:
+    """Each node's number with the lines before it. The branch where the run is now goes on without an indent."""
+    children: dict[int, list[int]] = {}
+    for node in state.nodes[1:]:
+        children.setdefault(node.parent, []).append(node.number)
+    path = _path(state)
+    waiting = [(0, "", "")]
+    while waiting:
+        number, line, below = waiting.pop()
+        yield number, line
+        mine = sorted(children.get(number, ()), key=lambda child: (child in path, child))
+        *branches, last = mine or (None,)
+        if last is not None:
+            waiting.append((last, f"{below}", below))
+        waiting += [(child, f"{below}├ ", f"{below}│ ") for child in reversed(branches)]
+
+
+def _path(state: RunState) -> frozenset[int]:
+    """The current node and all above it; a parent has a smaller number than its child."""
+    found, number = set(), state.node
+    while number is not None and number not in found:
+        found.add(number)
+        number = state.nodes[number].parent
+    return frozenset(found)
+
+
+def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
+    marks = ["taken back"] if node.rejected else []
+    marks += ["minimal"] if node.minimal else []
+    marks += ["here"] if node.number == state.node else []
+    how = HOW.get(node.how, "")
+    came = f"{plain(node.what)}, {how}" if how else plain(node.what)
+    round = "" if node.round is None else str(node.round)
+    return f"{indent}{node.number}", str(len(node.environment)), came, round, str(node.tests), ", ".join(marks)
+
+
+def _cut(rows: list[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:
+    """The first and the last rows, with what is between them told in the column `words`."""
+    if len(rows) <= MOST:
+        return tuple(rows)
+    half = MOST // 2
+    left_out = f"… {len(rows) - 2 * half} more …"
+    between = tuple(left_out if column == words else "" for column in range(len(rows[0])))
+    return (*rows[:half], between, *rows[-half:])

@@ -1,0 +1,206 @@
+"""What a report says: the run in a few words, and then everything on which they rest."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.page.blocks import (
+    Paragraph,
+    Report,
+    Strong,
+    duration,
+    moment,
+    percent,
+    place,
+    plain,
+    say,
+    section,
+    thousands,
+)
+from ddenv.page.html import html
+from ddenv.page.markdown import markdown, pictures
+from ddenv.report.by_hand import guiding
+from ddenv.report.outcomes import sureness
+from ddenv.report.repeat import repeat, settings
+from ddenv.report.result import result
+from ddenv.report.rounds import way
+from ddenv.report.run_data import Record, read_run
+from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.state import RunState
+from ddenv.version import __version__
+from ddenv.words import count
+from ddenv.world.files.access import write_file
+
+
+def content(record: Record) -> Report:
+    """The report on a run."""
+    state = record.state
+    sections = (result(record), way(record), guiding(record), sureness(record), settings(record), repeat(record))
+    return Report(
+        name=plain(state.scenario.get("name", record.path.stem)),
+        verdict=_verdict(state),
+        lead=(*_damage(record), *_standing(record), *_failure(state)),
+        figures=_figures(record),
+        sections=tuple(each for each in sections if each is not None),
+        foot=_foot(record),
+    )
+
+
+def _verdict(state: RunState) -> str:
+    left, all_of_them = len(state.environment), len(state.elements)
+    if state.baseline is None:
+        return "No failure is known yet"
+    if state.minimal and not left:
+        return f"None of the {count(all_of_them, 'model')} is needed to make the robot fail"
+    enough = "is" if left == 1 else "are"
+    if left == all_of_them:
+        return f"The robot fails among all {count(left, 'model')}; none is removed yet"
+    told = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
+    return told if state.minimal else f"{told} so far"
+
+
+def _damage(record: Record) -> list[Paragraph]:
+    return [
+        say(Strong("Not all of this run could be read."), f" {plain(each)}.", notice=True) for each in record.troubles
+    ]
+
+
+def _standing(record: Record) -> list[Paragraph]:
+    """Whether it is over, and why it ended."""
+    state = record.state
+    why = plain(state.reason).rstrip(".")
+    if state.status == "finished" and state.minimal:
+        return [_minimal(state)]
+    if state.status == "finished":
+        return [say(Strong("Not minimal."), f" The run ended before that: {why or 'no reason is known'}.", notice=True)]
+    if state.status == "stopped":
+        return [
+            say(Strong("Stopped"), f"{f': {why}' if why else ''}. What follows is what was known then.", notice=True)
+        ]
+    if state.status == "failed":
+        return [say(Strong("The engine could not go on"), f"{f': {why}' if why else ''}.", notice=True)]
+    if state.status == "created":
+        return [say(Strong("Not started yet:"), " no test has been made.", notice=True)]
+    at = f" at {moment(state.updated_at)} UTC" if moment(state.updated_at) else ""
+    if record.alive:
+        return [say(Strong("This run has not ended."), f" What follows is what was known{at}.", notice=True)]
+    gone = f" The engine is not there any more; its last word came{at}." if at else " The engine is not there any more."
+    return [say(Strong("This run has not ended."), gone, notice=True)]
+
+
+def _minimal(state: RunState) -> Paragraph:
+    sure = " Full runs confirm it." if state.confirming else ""
+    if not state.environment:
+        return say(Strong("Minimal."), f" Look at the robot, its goal, and what always stays.{sure}")
+    them = "it" if len(state.environment) == 1 else "any one of them"
+    return say(Strong("Minimal:"), f" without {them} the failure was not seen again.{sure}")
+
+
+def _failure(state: RunState) -> list[Paragraph]:
+    """The scenario in its author's words, and how the robot failed in it."""
+    description = plain(state.scenario.get("description", ""))
+    told = [say(description)] if description else []
+    base = state.baseline
+    if base is None:
+        seen = count(state.tests_done, "run")
+        words = f"The whole world is run first to fix the failure: {seen} ended so far."
+        return [*told, say(words)] if state.tests_done else told
+    words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m{_short_of(state)}{_after(state)}."
+    return [*told, say(words)]
+
+
+def _short_of(state: RunState) -> str:
+    goal = section(state.scenario, "goal")
+    x, y = goal.get("x"), goal.get("y")
+    if not all(isinstance(value, (int, float)) for value in (x, y)):
+        return ""
+    away = math.dist((x, y), state.baseline.position[:2])
+    return f", {away:.1f} m short of the goal at ({x:g}, {y:g})" if math.isfinite(away) else ""
+
+
+def _after(state: RunState) -> str:
+    number = state.baseline.failure_test
+    if not 0 < number <= len(state.tests) or state.failure not in DEEDS:
+        return ""
+    test = state.tests[number - 1]
+    if test.cut:
+        return f"; this was sure after {test.simulated_seconds:.1f} s"
+    return f"; it had {test.simulated_seconds:.1f} s" if state.failure in ("stuck", "out of time") else ""
+
+
+def _figures(record: Record) -> tuple[tuple[str, str], ...]:
+    state = record.state
+    before, after = len(state.elements), len(state.environment)
+    figures = [(f"{before} → {after}" if after != before else str(before), "models")]
+    if after < before:
+        figures.append((percent(1 - after / before), "smaller"))
+    spent, rounds = state.working_seconds, len(record.rounds)
+    if state.started_at is not None:
+        spent += max(0.0, state.updated_at - state.started_at)
+    return (
+        *figures,
+        (thousands(state.tests_done), "test" if state.tests_done == 1 else "tests"),
+        *(((thousands(rounds), "round" if rounds == 1 else "rounds"),) if rounds else ()),
+        (duration(spent), "of computing"),
+    )
+
+
+def _foot(record: Record) -> str:
+    version = plain(record.state.engine_version)
+    by = f"run by ddenv {version}, " if version and version != __version__ else ""
+    begun = moment(record.started)
+    when = f", begun {begun} UTC" if begun else ""
+    return f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m."
+
+
+KINDS = (".html", ".htm", ".md")
+PICTURES = ("map", "near", "chart", "interval")
+
+
+def files_of(file: Path) -> list[Path]:
+    """The files that a report called `file` may consist of."""
+    beside = PICTURES if file.suffix.lower() == ".md" else ()
+    return [file, *(file.with_name(f"{file.stem}.{name}.svg") for name in beside)]
+
+
+def write_report(run: Path, file: Path, force: bool = False) -> list[Path]:
+    """Writes what a run came to as an HTML page or as Markdown, by the ending of `file`; returns the files that were written.
+
+    Markdown has its pictures in files beside it. Raises UserError, also for files that exist, unless `force`.
+    """
+    _check(file)
+    report = content(read_run(run))
+    if file.suffix.lower() != ".md":
+        texts = {file: html(report)}
+    else:
+        drawn = pictures(report, file.stem)
+        texts = {file.with_name(name): svg for name, svg in drawn.items()} | {file: markdown(report, file.stem)}
+    there = [path for path in texts if is_there(path)]
+    if there and not force:
+        raise UserError(f"{there[-1]}: exists already; choose another name, or replace it with --force")
+    for path, text in texts.items():
+        write_file(path, text.encode(errors="replace"))
+    return list(reversed(texts))
+
+
+def is_there(path: Path) -> bool:
+    """Whether a file exists; of what cannot be known, writing it will tell."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def _check(file: Path) -> None:
+    """Says what is wrong before anything is read."""
+    if file.suffix.lower() not in KINDS:
+        raise UserError(f"{file}: a report's name ends in .html or .md")
+    try:
+        if file.is_dir():
+            raise UserError(f"{file}: is a folder; give the name of a file in it")
+        if not file.parent.is_dir():
+            raise UserError(f"{file}: there is no folder {file.parent}")
+    except OSError as error:
+        raise UserError(f"{file}: cannot be written: {error.strerror}") from None

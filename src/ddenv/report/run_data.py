@@ -1,0 +1,112 @@
+"""All that a report needs of a run file, read once."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ddenv.errors import UserError
+from ddenv.page.blocks import section
+from ddenv.runfile.fold import apply
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import Round, RunState
+from ddenv.runfile.store import Event, RunFile
+
+if TYPE_CHECKING:
+    from ddenv.world.model import World
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A run: its `state`, its `rounds` as they ended, what it was asked for first, and its world if that can be read.
+
+    `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
+    flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
+    removed, `kept` those of them that are left.
+    """
+
+    path: Path
+    state: RunState
+    rounds: tuple[Round, ...] = ()
+    asked: dict[str, Any] = field(default_factory=dict)
+    started: float = 0.0
+    alive: bool = False
+    world: World | None = None
+    original: array | None = None
+    evidence: array | None = None
+    troubles: tuple[str, ...] = ()
+    elements: frozenset[str] = frozenset()
+    kept: frozenset[str] = frozenset()
+
+
+def read_run(path: Path) -> Record:
+    """What a run file holds. Of a damaged one as much as makes sense is told. Raises UserError for what is no run file."""
+    alive = engine_is_alive(path)
+    with RunFile(path) as file:
+        events = file.events()
+        state, rounds, trouble = _story(events)
+        if not state.nodes:
+            raise UserError(trouble or f"{path}: damaged run file: there is nothing in it to report on")
+        troubles = [trouble] if trouble else []
+        world = _world(file, troubles)
+        first = None if state.baseline is None else state.baseline.failure_test
+        original = _path(file, first, troubles)
+        same = state.evidence_test == first
+        evidence = original if same else _path(file, state.evidence_test, troubles)
+    return Record(
+        path=path,
+        state=state,
+        rounds=rounds,
+        asked=section(events[0].data, "scenario"),
+        started=events[0].time,
+        alive=alive,
+        world=world,
+        original=original,
+        evidence=evidence,
+        troubles=tuple(troubles),
+        elements=frozenset(state.elements),
+        kept=frozenset(state.environment),
+    )
+
+
+def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
+    """The state at the end or before the first event that makes no sense, every round as it ended, and what is wrong."""
+    state = RunState()
+    rounds: dict[int, Round] = {}
+    trouble = ""
+    for event in events:
+        try:
+            after = apply(state, event)
+        except UserError as error:
+            trouble = f"{error}; what was before it is told"
+            break
+        # Between two rounds the old one does not change any more.
+        if event.kind == "round_started" and state.round is not None:
+            rounds[state.round.number] = state.round
+        state = after
+    if state.round is not None:
+        rounds[state.round.number] = state.round
+    return state, tuple(rounds.values()), trouble
+
+
+def _world(file: RunFile, troubles: list[str]) -> World | None:
+    from ddenv.runs.creation import read_parts
+
+    try:
+        return read_parts(file)[1]
+    except UserError as error:
+        troubles.append(str(error))
+        return None
+
+
+def _path(file: RunFile, test: int | None, troubles: list[str]) -> array | None:
+    try:
+        samples = None if test is None else file.motion(test)
+    except UserError as error:
+        troubles.append(str(error))
+        return None
+    return samples if samples and all(map(math.isfinite, samples)) else None

@@ -1,0 +1,163 @@
+"""Builds Drake's plant from plain data: a world's models and one robot.
+
+What never moves is registered directly on the world body, which keeps its many boxes out of the tree of moving geometry.
+There is no visual geometry: nobody looks at a worker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from ddenv.robot.drake.articulation import add_joint, anchored, is_fixed, spatial_inertia, transform
+from ddenv.robot.drake.drive import Drive
+from ddenv.robot.drake.shapes import drake_shapes, solid_bounds, surface, wheel_friction, world_friction
+from ddenv.world.extent import Bounds
+from ddenv.world.model import Link, Model, World
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Simulation
+
+
+@dataclass(frozen=True)
+class Body:
+    """A model in the plant: its links' bodies and start poses, the first link first, and the geometry of those that can move.
+
+    `bounds` are the boxes around the links, along each one's own axes; None for a link that cannot move or has no geometry.
+    """
+
+    name: str
+    instance: ModelInstanceIndex
+    links: tuple[RigidBody, ...]
+    poses: tuple[Pose, ...]
+    geometry: tuple[GeometryId, ...]
+    bounds: tuple[Bounds | None, ...]
+
+    @property
+    def base(self) -> RigidBody:
+        return self.links[0]
+
+
+@dataclass(frozen=True)
+class Built:
+    """The plant of a world: `moving` holds the dynamic models in the file's order, `static` what never moves of each model.
+
+    That is the geometry of static models, and of the links of dynamic ones that are fixed in the world.
+    """
+
+    diagram: Diagram
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    robot: Body
+    static: dict[str, tuple[GeometryId, ...]]
+    moving: dict[str, Body]
+
+
+def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
+    """The finished plant. `motor_gain` (N m s/rad) turns a wheel's speed error into torque.
+
+    Raises ValueError or RuntimeError for what cannot be simulated, such as a moving link without inertia.
+    """
+    config = MultibodyPlantConfig(
+        time_step=simulation.time_step,
+        contact_model="point",
+        discrete_contact_approximation=simulation.contact,
+        # Outputs that follow the state need no extra state, and nothing then has to be reset between two runs.
+        use_sampled_output_ports=False,
+    )
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlant(config, builder)
+    plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
+    wheels = wheel_friction(robot, drive)
+    static = {model.name: _add_static(plant, model, wheels) for model in world.models}
+    # The order in which moving models are added decides the order of the solver's unknowns, hence the last bits of every
+    # result: it is always the file's order, with the robot first.
+    driver = _add_moving(plant, scene_graph, robot, "robot", None)
+    _add_motors(plant, robot, drive, driver, motor_gain)
+    moving = {
+        model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
+        for model in world.models
+        if not model.static and model.links
+    }
+    filters = scene_graph.collision_filter_manager()
+    for body in moving.values():
+        own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
+        filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
+    plant.Finalize()
+    return Built(builder.Build(), plant, scene_graph, driver, static, moving)
+
+
+def _add_static(plant: MultibodyPlant, model: Model, wheels: float) -> tuple[GeometryId, ...]:
+    held = anchored(model)
+    links = [link for link in model.links if model.static or link.name in held]
+    return tuple(_register(plant, plant.world_body(), Pose(), links, wheels, corners=False))
+
+
+def _add_moving(
+    plant: MultibodyPlant, scene_graph: SceneGraph, model: Model, instance_name: str, wheels: float | None
+) -> Body:
+    """Adds a model of the world, or (`wheels` is None) the robot."""
+    instance = plant.AddModelInstance(instance_name)
+    bodies = [plant.AddRigidBody(link.name, instance, _inertia(model, link)) for link in model.links]
+    held = anchored(model)
+    geometry: list[GeometryId] = []
+    bounds: list[Bounds | None] = []
+    for link, body in zip(model.links, bodies, strict=True):
+        free = () if link.name in held else (link,)
+        geometry += _register(plant, body, link.pose.inverse(), free, wheels, corners=wheels is not None)
+        bounds.append(solid_bounds(link.collisions, link.pose.inverse()) if free else None)
+    if not model.self_collide:
+        scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry)))
+    by_name = {link.name: (link, body) for link, body in zip(model.links, bodies, strict=True)}
+    for joint in model.joints:
+        add_joint(plant, joint, by_name, instance_name)
+    if not model.gravity:
+        plant.set_gravity_enabled(instance, False)
+    poses = tuple(link.pose for link in model.links)
+    return Body(model.name, instance, tuple(bodies), poses, tuple(geometry), tuple(bounds))
+
+
+def _inertia(model: Model, link: Link) -> SpatialInertia:
+    if link.inertia is not None:
+        return spatial_inertia(link.inertia, link.pose)
+    if not _weighs(model, link):
+        why = "has no <inertial>, nor has any that is fixed to it"
+        raise ValueError(f"link '{link.name}' of the moving model '{model.name}' {why}")
+    return SpatialInertia.Zero()
+
+
+def _weighs(model: Model, link: Link) -> bool:
+    """Whether `link`, or anything that fixed joints hold to it, has a mass."""
+    together = {link.name}
+    pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
+    while new := {name for pair in pairs if pair & together for name in pair} - together:
+        together |= new
+    return any(each.inertia is not None for each in model.links if each.name in together)
+
+
+def _add_motors(plant: MultibodyPlant, robot: Model, drive: Drive, body: Body, gain: float) -> None:
+    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
+        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, body.instance), joint.effort)
+        actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))
+
+
+def _register(
+    plant: MultibodyPlant, body: RigidBody, frame: Pose, links: Iterable[Link], wheels: float | None, corners: bool
+) -> list[GeometryId]:
+    """Registers the collisions of `links` on `body`; `frame` is the world seen from the body."""
+    identities = []
+    for link in links:
+        for collision in link.collisions:
+            mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
+            for shape, pose in drake_shapes(collision, corners):
+                # Drake wants names that differ; nobody reads them.
+                name = str(plant.num_collision_geometries())
+                identities.append(
+                    plant.RegisterCollisionGeometry(body, transform(frame @ pose), shape, name, surface(mu))
+                )
+    return identities

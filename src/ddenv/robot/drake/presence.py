@@ -1,0 +1,98 @@
+"""Which geometry touches which in a context: models are removed and put back without building the plant anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet
+from pydrake.systems.framework import Context
+
+from ddenv.robot.drake.plant import Body, Built
+
+
+class Presence:
+    """The collision filters of one context.
+
+    Moving models touch nothing but what they are joined to with `join`. Only pairs of different models are ever excluded and
+    allowed again, so that what is filtered within a model stays so. (Filters that Drake could take back itself would copy all
+    pairs of the world: 170 ms instead of 3 in a world of 1300 boxes.)
+    """
+
+    def __init__(self, built: Built, context: Context) -> None:
+        self._built = built
+        self._filters = built.scene_graph.collision_filter_manager(
+            built.scene_graph.GetMyMutableContextFromRoot(context)
+        )
+        self._robot = GeometrySet(list(built.robot.geometry))
+        self._removed: frozenset[str] = frozenset()
+        self._kept = built.static
+        self._all_kept: GeometrySet | None = None
+        self.part(tuple(built.moving.values()), ())
+
+    def remove(self, removed: frozenset[str]) -> None:
+        """From now on the world is without what never moves of the models `removed`; moving ones are simply not joined.
+
+        Only what differs from the last time costs: a world is mostly run again, or with few models more or less.
+        """
+        gone, back = self._static(removed - self._removed), self._static(self._removed - removed)
+        if gone:
+            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._robot))
+        if back:
+            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._robot))
+        if gone or back:
+            self._removed, self._all_kept = removed, None
+            self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
+
+    @contextmanager
+    def without_robot(self) -> Iterator[None]:
+        """The world in which the robot touches nothing that is kept."""
+        self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(self._ground, self._robot))
+        try:
+            yield
+        finally:
+            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(self._ground, self._robot))
+
+    @property
+    def _ground(self) -> GeometrySet:
+        """All that never moves and is kept."""
+        if self._all_kept is None:
+            self._all_kept = _set(self._kept.values())
+        return self._all_kept
+
+    def _static(self, names: frozenset[str]) -> list[tuple[GeometryId, ...]]:
+        return [geometry for name in names if (geometry := self._built.static.get(name))]
+
+    def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
+        """Lets `bodies` touch each other, `others`, what never moves and is kept, and the robot."""
+        declaration = CollisionFilterDeclaration()
+        for body, rest in self._pairs(bodies, others, robot):
+            declaration.AllowBetween(body, rest)
+        self._filters.Apply(declaration)
+
+    def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
+        """Takes `join` back: `others` are those that `bodies` could touch besides each other."""
+        declaration = CollisionFilterDeclaration()
+        for body, rest in self._pairs(bodies, others, True):
+            declaration.ExcludeBetween(body, rest)
+        self._filters.Apply(declaration)
+
+    def _pairs(
+        self, bodies: Sequence[Body], others: Sequence[Body], robot: bool
+    ) -> Iterator[tuple[GeometrySet, GeometrySet]]:
+        for number, body in enumerate(bodies):
+            mine = GeometrySet(list(body.geometry))
+            yield mine, _set(other.geometry for other in (*bodies[number + 1 :], *others))
+            if robot:
+                yield mine, self._robot
+            yield mine, self._ground_of(body)
+
+    def _ground_of(self, body: Body) -> GeometrySet:
+        """What never moves, but for the model's own links: a door does not touch its frame."""
+        if not self._built.static.get(body.name):
+            return self._ground
+        return _set(geometry for name, geometry in self._kept.items() if name != body.name)
+
+
+def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:
+    return GeometrySet([member for group in groups for member in group])

@@ -1,0 +1,145 @@
+"""The shapes of collisions in Drake, and the small spheres on which moving ones rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydrake.geometry import AddContactMaterial, Convex, ProximityProperties
+from pydrake.geometry import Box as DrakeBox
+from pydrake.geometry import Capsule as DrakeCapsule
+from pydrake.geometry import Cylinder as DrakeCylinder
+from pydrake.geometry import Ellipsoid as DrakeEllipsoid
+from pydrake.geometry import Shape as DrakeShape
+from pydrake.geometry import Sphere as DrakeSphere
+from pydrake.multibody.plant import CoulombFriction
+
+from ddenv.robot.drake.drive import Drive, turned_links
+from ddenv.world.extent import Bounds, shape_bounds
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
+from ddenv.world.pose import Pose, Vector
+
+# Every surface has the same compliance, written down because Drake would otherwise derive it from the masses of the
+# world, and removing a model would change the contacts of all others. Two such surfaces in series give 1e5 N/m: a
+# Husky sinks in by 1.4 mm.
+STIFFNESS = 2e5  # N/m
+DISSIPATION = 5.0  # s/m, Hunt-Crossley
+
+
+def wheel_friction(robot: Model, drive: Drive) -> float:
+    """The friction coefficient of the robot's driven wheels, the largest if they differ."""
+    wheels = turned_links(robot, drive.joints)
+    return max((one.mu for link in robot.links if link.name in wheels for one in link.collisions), default=0.0)
+
+
+def world_friction(mu: float, wheels: float) -> float:
+    """The coefficient that Drake is given for a surface of the world, so that the robot's wheels grip it as in Gazebo.
+
+    Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake combines a and b as
+    2 a b / (a + b), which is m for b = wheels and 1 / a = 2 / m - 1 / b. The robot's own surfaces keep their coefficients. So
+    contact with the wheels is exact. Between two surfaces of the world the combination lies between half the smaller and
+    the smaller (each taken as at most `wheels`), and is the smaller if the other is at least as rough as the wheels. Between
+    another part of the robot and the world it lies between half the smaller and twice the smaller.
+    """
+    grip = min(mu, wheels)
+    return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
+
+
+def surface(mu: float) -> ProximityProperties:
+    """A surface with Drake's friction coefficient `mu`.
+
+    Static and dynamic friction are the same: a difference makes wheels stick and slip at the time step's rate.
+    """
+    properties = ProximityProperties()
+    AddContactMaterial(DISSIPATION, STIFFNESS, CoulombFriction(mu, mu), properties)
+    return properties
+
+
+CORNER_RADIUS = 0.002  # m
+RIM_CORNERS = 8
+MESH_CORNERS = 32
+
+
+def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | None:
+    """The box around `collisions` along the axes of `frame` (the world seen from it); None if there are none."""
+    boxes = [shape_bounds(one.shape, frame @ one.pose) for one in collisions]
+    if not boxes:
+        return None
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def drake_shapes(collision: Collision, corners: bool) -> list[tuple[DrakeShape, Pose]]:
+    """What `collision` is in Drake, and where; with `corners` also the spheres on which it rests when it moves.
+
+    A face that rests on one point of contact alone would creep.
+    """
+    shape, pose = collision.shape, collision.pose
+    shapes = [(drake_shape(shape), pose)]
+    if corners:
+        shapes += [(DrakeSphere(CORNER_RADIUS), pose @ Pose(corner)) for corner in corners_of(shape)]
+    return shapes
+
+
+def drake_shape(shape: Shape) -> DrakeShape:
+    match shape:
+        case Box(size):
+            return DrakeBox(*size)
+        case Cylinder(radius, length):
+            return DrakeCylinder(radius, length)
+        case Sphere(radius):
+            return DrakeSphere(radius)
+        case Capsule(radius, length):
+            return DrakeCapsule(radius, length)
+        case Ellipsoid(radii):
+            return DrakeEllipsoid(*radii)
+        case Mesh(origin, vertices):
+            return Convex(points=np.asfortranarray(vertices.T, dtype=float), label=origin)
+    raise ValueError(f"{type(shape).__name__} cannot be simulated")
+
+
+def corners_of(shape: Shape) -> list[Vector]:
+    """Centres of spheres just inside the corners of `shape`, in its frame; none for what has no flat face."""
+    match shape:
+        case Box(size):
+            x, y, z = (max(side / 2 - CORNER_RADIUS, 0.0) for side in size)
+            return [(sx * x, sy * y, sz * z) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
+        case Cylinder(radius, length):
+            inner, height = max(radius - CORNER_RADIUS, 0.0), max(length / 2 - CORNER_RADIUS, 0.0)
+            angles = [math.tau * number / RIM_CORNERS for number in range(RIM_CORNERS)]
+            return [(inner * math.cos(a), inner * math.sin(a), end * height) for end in (-1, 1) for a in angles]
+        case Mesh():
+            return _mesh_corners(shape)
+    return []
+
+
+def _mesh_corners(mesh: Mesh) -> list[Vector]:
+    """At most 32 of a convex mesh's vertices, far from each other, each moved inside the faces that meet in it."""
+    edges = mesh.vertices[mesh.faces[:, 1:]] - mesh.vertices[mesh.faces[:, :1]]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    areas = np.linalg.norm(normals, axis=1)
+    faces, normals = mesh.faces[areas > 0], normals[areas > 0] / areas[areas > 0, None]
+    used = np.unique(faces)
+    middle = mesh.vertices[used].mean(axis=0)
+    centers = []
+    for number in used[_spread(mesh.vertices[used], MESH_CORNERS)]:
+        vertex = mesh.vertices[number]
+        around = normals[(faces == number).any(axis=1)]
+        # As deep as the sphere's radius behind each face; least squares where more than three of them meet.
+        inward = -CORNER_RADIUS * np.linalg.lstsq(around, np.ones(len(around)), rcond=1e-3)[0]
+        # In a needle's point that would be beyond the middle.
+        furthest = np.linalg.norm(middle - vertex)
+        inward *= min(1.0, furthest / max(np.linalg.norm(inward), 1e-12))
+        x, y, z = (vertex + inward).tolist()
+        centers.append((x, y, z))
+    return centers
+
+
+def _spread(points: np.ndarray, count: int) -> list[int]:
+    """At most `count` of `points` (N, 3): the first, and then always the one farthest from all that were taken."""
+    taken = [0]
+    distances = np.linalg.norm(points - points[0], axis=1)
+    while len(taken) < min(count, len(points)):
+        taken.append(int(distances.argmax()))
+        distances = np.minimum(distances, np.linalg.norm(points - points[taken[-1]], axis=1))
+    return taken

@@ -1,0 +1,187 @@
+"""How the robot follows a path: it aims at a place ahead on it, and only goes where its footprint hits nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ddenv.robot.navigation.costmap import Footprint
+from ddenv.robot.navigation.route import Path
+from ddenv.robot.protocol import STOP, Setup, Twist
+from ddenv.robot.sensing.estimate import Estimate, wrap
+
+# Parts of the look-ahead at which the robot aims, the first whose arc is free.
+PARTS = (1.0, 0.6)
+# It can stop like this, m/s^2.
+BRAKE = 1.0
+# Standing, it aims at this part of the look-ahead: the slower, the closer it keeps to its path.
+NEAREST = 0.4
+# It turns on the spot when the path leads farther aside than this, until it is within the second, rad.
+ASIDE = 0.9
+ALONG = 0.25
+# Turned along its path to this (rad) and still not free, it stays.
+ALIGNED = 0.04
+# Slower turns than this (rad/s) are lost between the wheels and the ground.
+LEAST_TURN = 0.2
+BACK_SPEED = 0.25  # m/s
+# How much nearer (m) something within its margin may come in a step.
+GIVE = 0.001
+# With this much room (m) at its sides it goes at full speed, with none at this part of it.
+ROOM = 0.35
+SLOWEST = 0.25
+# With this much (m) it need not look again for this time, s.
+CALM = 0.1
+CALM_FOR = 0.1
+# Parts of an arc at which it is tested.
+PLACES = np.linspace(0.0, 1.0, 7)
+# An arc is bent at least so much, rad: too little to matter.
+BENT = 1e-6
+
+
+class Follower:
+    """Pure pursuit of `path` within the limits of `setup`. `stuck` tells that the last step found nowhere to go."""
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup = setup
+        self._gain = setup.settings.heading_gain
+        self._look_ahead = setup.settings.planner.look_ahead
+        self._body = Footprint.of(setup)
+        # Faster, it could not stop within what it knows to be free.
+        self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
+        self._turning = False
+        self._path: Path | None = None
+        self._points: np.ndarray | None = None
+        # What was free, with room, is not tested again for so many steps.
+        self._calm = round(CALM_FOR / setup.period)
+        self._left = 0
+        self._room = 0.0
+        self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
+        self.stuck = False
+
+    def step(self, path: Path, estimate: Estimate, points: np.ndarray) -> Twist:
+        """Where to go next on `path`, with `points` (3, N) near the robot: x and y (m) in the frame of the estimates, and 1."""
+        path.locate(estimate.x, estimate.y)
+        distance, bearing = self._aim(path, estimate, PARTS[0])
+        turning = abs(bearing) > (ALONG if self._turning else ASIDE)
+        same = path is self._path and turning == self._turning
+        # Standing, it waits for what it sees next.
+        if same and self.stuck and points is self._points:
+            return STOP
+        self._path, self._points, self._turning = path, points, turning
+        self._left = self._left - 1 if same else -1
+        self.stuck = False
+        if turning:
+            return self._turn(bearing, estimate, points)
+        if self._left >= 0:
+            return self._drive(path, distance, bearing, self._room)
+        for part in PARTS:
+            if part != PARTS[0]:
+                distance, bearing = self._aim(path, estimate, part)
+            room = self._room_on_arc(distance, bearing, estimate, points)
+            if room is not None:
+                self._room = room
+                self._left = self._calm if part == PARTS[0] and room >= CALM else 0
+                return self._drive(path, distance, bearing, room)
+        return self._turn(bearing, estimate, points)
+
+    def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
+        """How far away (m) and in which direction (rad, from straight ahead) the place is that the robot aims at."""
+        share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
+        x, y = path.ahead(part * share * self._look_ahead)
+        dx, dy = x - estimate.x, y - estimate.y
+        return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
+
+    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: np.ndarray) -> float | None:
+        """How far (m) from all `points` the robot stays on its arc to the place that it aims at; None if it touches one."""
+        if abs(bearing) > ASIDE:
+            return None
+        if not points.shape[1]:
+            return ROOM
+        return room(self._body, points, estimate, _arc(distance, bearing))
+
+    def _drive(self, path: Path, distance: float, bearing: float, room: float) -> Twist:
+        bend = 2 * math.sin(bearing) / max(distance, 1e-6)
+        arc = distance * bearing / math.sin(bearing) if abs(bearing) > 1e-3 else distance
+        fastest = self._fastest * (SLOWEST + (1 - SLOWEST) * min(room / ROOM, 1.0))
+        if abs(bend) > 1e-6:
+            fastest = min(fastest, self._setup.turn_rate / abs(bend))
+        # Nothing is known of what is beyond the arc; before the goal it brakes half as hard.
+        fastest = min(fastest, math.sqrt(2 * BRAKE * arc))
+        if path.final:
+            fastest = min(fastest, math.sqrt(BRAKE * path.left))
+        fastest *= max(math.cos(bearing), 0.0)
+        return Twist(fastest, fastest * bend)
+
+    def _turn(self, bearing: float, estimate: Estimate, points: np.ndarray) -> Twist:
+        """On the spot towards `bearing` (rad), by the other side if only that is free, or back to where there is room to turn."""
+        if abs(bearing) < ALIGNED:
+            self.stuck = True
+            return STOP
+        rate = min(max(self._gain * abs(bearing), LEAST_TURN), self._setup.turn_rate)
+        sides = (1.0, -1.0) if bearing > 0 else (-1.0, 1.0)
+        # What is nearly ahead is not looked for all the way round.
+        for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
+            if may_turn(self._body, points, estimate, side):
+                return Twist(0.0, side * rate)
+        if abs(bearing) > math.pi / 2 and may_back_up(self._body, points, estimate):
+            return Twist(-min(BACK_SPEED, self._setup.speed), 0.0)
+        self.stuck = True
+        return STOP
+
+
+def room(body: Footprint, points: np.ndarray, estimate: Estimate, places: np.ndarray) -> float | None:
+    """How far (m) `body` stays from `points` (3, N) at `places` (2, K, 3) as seen by the robot at `estimate`, the first its own.
+
+    None if it touches one: what is within the margin already may come a little nearer, so that it can turn away, but not be
+    touched, or touched harder.
+    """
+    apart = body.apart(points, places @ _seen_from(estimate))
+    least = float(apart.min())
+    if least >= 0:
+        return least
+    now, nearest = apart[0], apart[1:].min(axis=0)
+    may = np.minimum(now, np.maximum(np.minimum(now, 0.0) - GIVE, -body.margin))
+    return None if (nearest < may).any() else 0.0
+
+
+def may_turn(body: Footprint, points: np.ndarray, estimate: Estimate, side: float) -> bool:
+    """Whether the robot may turn on the spot a little, to its left if `side` is 1, else -1, past `points` (3, N)."""
+    return not points.shape[1] or room(body, points, estimate, LEFT if side > 0 else RIGHT) is not None
+
+
+def may_back_up(body: Footprint, points: np.ndarray, estimate: Estimate) -> bool:
+    """Whether the robot may go straight back a little past `points` (3, N)."""
+    return not points.shape[1] or room(body, points, estimate, BACK) is not None
+
+
+def _seen_from(estimate: Estimate) -> np.ndarray:
+    """What turns places (3,), the third number 1, in the frame of the estimates into those that the robot sees, (3, 3)."""
+    x, y = estimate.x, estimate.y
+    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
+    return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
+
+
+def _turned(angle: float) -> np.ndarray:
+    return _seen_from(Estimate(0.0, 0.0, angle))[:2]
+
+
+def _arc(distance: float, bearing: float) -> np.ndarray:
+    """Places on the arc from the robot to where it aims, for `Footprint.apart`."""
+    bearing = math.copysign(max(abs(bearing), BENT), bearing)
+    radius = distance / (2 * math.sin(bearing))
+    headings = PLACES * (2 * bearing)
+    places = np.empty((2, len(PLACES), 3))
+    along, across = places
+    along[:, 0] = across[:, 1] = cosines = np.cos(headings)
+    along[:, 1] = sines = np.sin(headings)
+    across[:, 0] = -sines
+    along[:, 2] = -radius * sines
+    across[:, 2] = radius - radius * cosines
+    return places
+
+
+# Turned on the spot, and a little back.
+LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
+BACK = np.stack([_seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

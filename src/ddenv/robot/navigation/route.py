@@ -1,0 +1,321 @@
+"""The way to the goal around what is on the map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ddenv.robot.navigation.costmap import Footprint, legs_beside
+from ddenv.robot.protocol import Setup
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """From (x, y) along (cosine, sine) for `length` (m)."""
+
+    x: float
+    y: float
+    cosine: float
+    sine: float
+    length: float
+
+
+class Path:
+    """Straight legs between `corners` (x, y; m), at least two.
+
+    `final` tells whether it ends where the robot wants to be in the end. `back` and `on` (m) are how much free ground each leg
+    was given before its start and after its end. `off` (m) is how far beside it the robot is.
+    """
+
+    def __init__(self, corners: list[Place], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
+        self.corners = corners
+        self.final = final
+        self.back, self.on = back, on
+        self.off = 0.0
+        self._legs = [_leg(*pair) for pair in pairwise(corners)]
+        # How long the rest is from the start of each leg.
+        self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
+        self._number = 0
+        self._along = 0.0
+
+    @property
+    def end(self) -> Place:
+        return self.corners[-1]
+
+    @property
+    def left(self) -> float:
+        """How long (m) the rest of it is."""
+        return self._rests[self._number] - self._along
+
+    def locate(self, x: float, y: float) -> None:
+        """Note that the robot is at (x, y): it never goes back, and reaches the legs in turn."""
+        self.off = math.inf
+        for number in range(self._number, min(self._number + 2, len(self._legs))):
+            leg = self._legs[number]
+            dx, dy = x - leg.x, y - leg.y
+            along = min(max(dx * leg.cosine + dy * leg.sine, 0.0), leg.length)
+            off = math.hypot(dx - along * leg.cosine, dy - along * leg.sine)
+            if off <= self.off:
+                self.off, self._number, self._along = off, number, along
+
+    def ahead(self, distance: float) -> Place:
+        """The place `distance` (m) further along it, or its end."""
+        number, along = self._number, self._along + distance
+        while along > self._legs[number].length and number + 1 < len(self._legs):
+            along -= self._legs[number].length
+            number += 1
+        leg = self._legs[number]
+        along = min(along, leg.length)
+        return leg.x + along * leg.cosine, leg.y + along * leg.sine
+
+    def rest(self) -> np.ndarray:
+        """The corners (K, 2) m that are left, beginning where the robot is along it."""
+        return np.array([self.ahead(0.0), *self.corners[self._number + 1 :]])
+
+
+def _leg(start: Place, end: Place) -> Leg:
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(dx, dy)
+    if not length:
+        return Leg(*start, 1.0, 0.0, 0.0)
+    return Leg(*start, dx / length, dy / length, length)
+
+
+# Steps from a cell in the order of their direction, counterclockwise from x; the axis of number k is k % 4.
+STEPS = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
+AXES = np.arange(8) % 4
+# Longer than any way: what cannot be passed is infinitely long.
+LONGEST = 1e9
+
+
+class Grid:
+    """`count` x `count` cells, numbered row by row: the cell at column x and row y of x first has the number x * count + y."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        cells = np.arange(count * count)
+        x, y = np.divmod(cells, count)
+        inside = [(x + dx >= 0) & (x + dx < count) & (y + dy >= 0) & (y + dy < count) for dx, dy in STEPS]
+        # A step out of the grid leads nowhere.
+        to = [np.where(there, cells + dx * count + dy, cells) for there, (dx, dy) in zip(inside, STEPS, strict=True)]
+        to = np.stack(to, axis=1).astype(np.int32)
+        # Where the factors (4, cells) of a step's two ends are, flat.
+        self._here = (AXES * len(cells) + cells[:, None]).ravel()
+        self._there = (AXES * len(cells) + to).ravel()
+        self._lengths = np.tile([np.hypot(dx, dy) / 2 for dx, dy in STEPS], len(cells))
+        starts = np.arange(0, to.size + 1, len(STEPS), dtype=np.int32)
+        self._graph = csr_matrix((np.ones(to.size), to.ravel(), starts), shape=(len(cells), len(cells)))
+
+    def search(self, factors: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
+        """How long, in cells, the cheapest way from `start` to each cell is, infinite if there is none, and from which it comes.
+
+        `factors` (4, cells) is how much longer than it is a step along x, along the first diagonal, along y and along the
+        second diagonal counts in each cell, at least 1, infinite where it cannot be; a step counts with the mean of its ends'.
+        """
+        flat = factors.ravel()
+        self._graph.data = (flat[self._here] + flat[self._there]) * self._lengths
+        return dijkstra(self._graph, indices=start, return_predecessors=True, limit=LONGEST)
+
+
+def way_to(cell: int, sources: np.ndarray) -> list[int]:
+    """The cells from the search's start to `cell`, both included."""
+    way = [cell]
+    while sources[way[-1]] >= 0:
+        way.append(int(sources[way[-1]]))
+    return way[::-1]
+
+
+# Ways are searched on a grid this much coarser than the map: places are kept to the centimetre, so that no gap is lost by it.
+COARSER = 2
+# How much longer than it is a way right beside an obstacle counts, less 1, and how fast that falls with the distance, 1/m.
+WEIGHT = 4.0
+FALL = 5.0
+# How many times longer a way counts along which only a shorter robot would fit: straightened, it may fit this one.
+TIGHT = 1.5
+# How much longer a blocked way counts where the robot already is: it has to get out of there.
+HEAVY = 50.0
+# Corners at which a way may be cut short are at most this many cells apart.
+APART = 3
+# A way cut short may come nearer to an obstacle by this, m.
+NEARER = 0.015
+# A way so little longer than the straight line is not searched again.
+STRAIGHT = 1.03
+# Before and after a narrow place the robot goes straight on for the first of these (m) for which there is room.
+STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
+# A turn there is no sharper than this, as the cosine of its angle.
+SHARPEST = -0.3
+DIRECTIONS = tuple((math.cos(axis * math.pi / 4), math.sin(axis * math.pi / 4)) for axis in AXES[:4])
+
+
+class Planner:
+    """Finds ways on which the robot, turned along each leg, touches nothing and keeps `padding` to its sides."""
+
+    def __init__(self, setup: Setup) -> None:
+        planner = setup.settings.planner
+        self._goal = setup.goal
+        self._tolerance = setup.tolerance
+        self._body = Footprint.of(setup)
+        self._side = self._body.side + planner.padding
+        self._reach = max(self._body.ahead, self._body.behind)
+        self._inflation = max(planner.inflation, self._side)
+        self._step = COARSER * planner.resolution
+        self._grid = Grid(max(round(planner.size / self._step), 3))
+        x, y = np.divmod(np.arange(self._grid.count**2), self._grid.count)
+        self._cells = np.stack([x, y], axis=1) * self._step
+        self._border = np.flatnonzero((np.minimum(x, y) == 0) | (np.maximum(x, y) == self._grid.count - 1))
+        middle = self._grid.count // 2
+        self._start = middle * (self._grid.count + 1)
+        self._close = np.flatnonzero(np.hypot(x - middle, y - middle) * self._step <= self._body.inscribed * 1.5)
+
+    def plan(self, points: np.ndarray, x: float, y: float) -> Path | None:
+        """From (x, y) to the goal, or to the best place at the map's border if it is outside, around `points` (N, 2); all in m.
+
+        None if there is none.
+        """
+        straight = Path([(x, y), self._goal], back=self._body.inscribed, on=self._body.inscribed)
+        if not len(points):
+            return straight
+        ends = np.array(straight.corners)
+        free, near = legs_beside(points, ends[:1], ends[1:], 0.0, self._body.ahead, self._side)
+        if free[0] and near[0] >= self._inflation:
+            return straight
+        return self._search(points, (x, y))
+
+    def room(self, path: Path, points: np.ndarray) -> float | None:
+        """How near (m) the nearest of `points` (N, 2) m is to what is left of `path`; None if one stands in it."""
+        rest = path.rest()
+        if not len(points) or len(rest) < 2:
+            return self._inflation
+        back = np.full(len(rest) - 1, path.back)
+        # What is beside the robot now is no matter of its way.
+        back[0] = -min(self._body.ahead, path.left)
+        free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
+        return min(float(near.min()), self._inflation) if free.all() else None
+
+    def is_best(self, path: Path, points: np.ndarray) -> bool:
+        """Whether no way can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+        room = self.room(path, points)
+        if room is None or room < self._inflation:
+            return False
+        return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
+
+    def _search(self, points: np.ndarray, start: Place) -> Path | None:
+        corner = (np.rint(np.array(start) / self._step) - self._grid.count // 2) * self._step
+        factors, near = self._costs(points - corner)
+        factors[:, self._close] = np.minimum(factors[:, self._close], HEAVY)
+        lengths, sources = self._grid.search(factors, self._start)
+        goal_is_free = bool(np.hypot(*(points - self._goal).T).min() >= self._side)
+        to = self._target(lengths, corner, goal_is_free)
+        if to is None:
+            return None
+        # Also where the robot is in the goal's cell already, a way has two ends.
+        way = way_to(to, sources) if to != self._start else [to, to]
+        places = self._cells[way] + corner
+        left = math.dist(places[-1], self._goal)
+        if goal_is_free and left <= self._step:
+            places[-1] = self._goal
+        elif to == self._start:
+            places[-1] = start
+        places[0] = start
+        corners = self._cut_short(places, near[way], points)
+        # A place at the map's border is on the way to a goal beyond it, however near to that it is.
+        final = left <= self._tolerance and self._is_on_map(corner)
+        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
+
+    def _is_on_map(self, corner: np.ndarray) -> bool:
+        ahead = np.array(self._goal) - corner
+        return bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
+
+    def _target(self, lengths: np.ndarray, corner: np.ndarray, goal_is_free: bool) -> int | None:
+        """The cell to go to, None if none can be reached."""
+        left = np.hypot(*(self._cells + corner - self._goal).T)
+        if left.min() < self._step:
+            # The goal is on the map: there, or as near to it as it counts as reached.
+            enough = max(self._tolerance, self._step) if goal_is_free else self._tolerance
+            left[~((lengths < np.inf) & (left <= enough))] = np.inf
+            best = int(left.argmin())
+            return best if left[best] < np.inf else None
+        whole = lengths[self._border] * self._step + left[self._border]
+        best = int(whole.argmin())
+        return int(self._border[best]) if whole[best] < np.inf else None
+
+    def _costs(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How much longer than it is a way counts along each axis (4, cells), and how near the nearest point is (cells,), m."""
+        count, step = self._grid.count, self._step
+        widest = max(self._inflation, math.hypot(self._reach, self._side))
+        around = np.arange(-math.ceil(widest / step), math.ceil(widest / step) + 1)
+        cells = np.rint(points / step).astype(int)[:, :, None] + around
+        apart = cells * step - points[:, :, None]
+        inside = (cells >= 0) & (cells < count)
+        near = (apart[:, 0, :, None] ** 2 + apart[:, 1, None, :] ** 2) <= widest**2
+        near &= inside[:, 0, :, None] & inside[:, 1, None, :]
+        dx = np.broadcast_to(apart[:, 0, :, None], near.shape)[near]
+        dy = np.broadcast_to(apart[:, 1, None, :], near.shape)[near]
+        numbers = (cells[:, 0, :, None] * count + cells[:, 1, None, :])[near]
+        nearest = np.full(count * count, self._inflation)
+        np.minimum.at(nearest, numbers, np.hypot(dx, dy))
+        costs = np.where(nearest < self._inflation, np.exp(FALL * (self._body.inscribed - nearest)), 0.0)
+        factors = np.tile(1.0 + WEIGHT * np.minimum(costs, 1.0), (4, 1))
+        for factor, (cosine, sine) in zip(factors, DIRECTIONS, strict=True):
+            tight = (np.abs(cosine * dx + sine * dy) < self._reach) & (np.abs(cosine * dy - sine * dx) < self._side)
+            is_tight = np.zeros(count * count, dtype=bool)
+            is_tight[numbers[tight]] = True
+            factor[is_tight] *= TIGHT
+        factors[:, nearest < self._side] = np.inf
+        return factors, nearest
+
+    def _cut_short(self, places: np.ndarray, near: np.ndarray, points: np.ndarray) -> list[Place]:
+        """The corners of a way over `places` (K, 2) m that is as free, but goes straight wherever it can.
+
+        `near` (K,) m is how near the nearest point is to each place: no leg comes nearer than the way it replaces.
+        """
+        turns = np.any(np.diff(places, 2, axis=0).round(6), axis=1)
+        kept = np.ones(len(places), dtype=bool)
+        kept[1:-1] = turns | (np.arange(1, len(places) - 1) % APART == 0)
+        chosen = np.flatnonzero(kept)
+        corners, at = [0], 0
+        while at < len(chosen) - 1:
+            ends = chosen[at + 1 :]
+            starts = np.broadcast_to(places[chosen[at]], (len(ends), 2))
+            back = 0.0 if at == 0 else self._reach
+            free, beside = legs_beside(points, starts, places[ends], back, self._reach, self._side)
+            least = np.minimum.accumulate(near[chosen[at] :])[ends - chosen[at]]
+            good = np.flatnonzero(free & (beside >= least - NEARER))
+            at += 1 + (int(good[-1]) if len(good) else 0)
+            corners.append(int(chosen[at]))
+        return [(float(x), float(y)) for x, y in self._ease(places[corners], points)]
+
+    def _ease(self, corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """`corners` (K, 2) m moved away from narrow places: the robot comes there already turned, and leaves them straight."""
+        for number in range(1, len(corners) - 1):
+            sides, here = corners[[number - 1, number + 1]], corners[number]
+            _, near = legs_beside(points, sides, np.stack([here, here]), 0.0, 0.0, self._side)
+            narrow = int(near.argmin())
+            way = here - sides[narrow]
+            if near[narrow] >= self._body.circumscribed or not way.any():
+                continue
+            tries = here + np.outer(STRAIGHT_ON, way / np.hypot(*way))
+            # Beside the robot as it stands there need not be room for it to be turned.
+            on = [0.0 if number + 2 * side - 1 == 0 else self._reach for side in (narrow, 1 - narrow)]
+            ends = np.repeat([sides[narrow], sides[1 - narrow]], len(tries), axis=0)
+            free, _ = legs_beside(
+                points, np.tile(tries, (2, 1)), ends, self._reach, np.repeat(on, len(tries)), self._side
+            )
+            good = free.reshape(2, -1).all(axis=0) & (_cosines(sides[narrow], tries, sides[1 - narrow]) >= SHARPEST)
+            if good.any():
+                corners[number] = tries[good.argmax()]
+        return corners
+
+
+def _cosines(start: np.ndarray, corners: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Of the angles by which ways from `start` to `end` (2,) turn at `corners` (K, 2)."""
+    come, go = corners - start, end - corners
+    lengths = np.hypot(*come.T) * np.hypot(*go.T)
+    return (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)

@@ -1,0 +1,1 @@
+"""Models that can move: which are simulated, held, or played back."""

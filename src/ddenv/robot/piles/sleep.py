@@ -1,0 +1,211 @@
+"""Which moving models the simulator works on: those that the robot, or something that moves, is near.
+
+All others are held where they are, or played back from a script (`ddenv.robot.piles.rehearsal`): they cost little, do not creep,
+and change no bit of what the simulator works on. So a model that takes no part can be removed without any trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from ddenv.robot.clock import Clock
+from ddenv.robot.drake.plant import Body, Built
+from ddenv.robot.drake.presence import Presence
+from ddenv.robot.piles.moving_models import Hold, Links, Motion, gaps, spread
+from ddenv.robot.piles.rehearsal import CALM, NEAR, SLOW, Script
+from ddenv.world.extent import Bounds
+
+TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the rules go by. Each is True or False for a model (M,) or for a pair of models (M, M).
+
+    `near` the robot is; `met` has to be simulated with something that moves; `stirred` is near something that is not slow;
+    `touching` is near enough to another to carry it; `together` are those that a script moves.
+    """
+
+    near: np.ndarray
+    met: np.ndarray
+    stirred: np.ndarray
+    touching: np.ndarray
+    together: np.ndarray
+
+
+class Sleep:
+    """The moving models that are kept in one run. They are awake, played back or asleep."""
+
+    def __init__(
+        self,
+        built: Built,
+        plant_context: Context,
+        presence: Presence,
+        hold: Hold,
+        clock: Clock,
+        floor: float,
+        kept: Sequence[Body],
+        scripts: Sequence[Script],
+        never: bool = False,
+    ) -> None:
+        """Models without a script are awake at first. With `never` they stay so."""
+        self._plant = built.plant
+        self._context = plant_context
+        self._presence = presence
+        self._hold = hold
+        self._period = clock.period
+        self._step = clock.step
+        self._floor = floor
+        self._kept = kept
+        self._never = never
+        self._links = Links.of(kept)
+        self._robot = Links.of([built.robot])
+        self._entries = [hold.entries([body]) for body in kept]
+        number_of = {body.name: number for number, body in enumerate(kept)}
+        self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
+        self._entries_of = [hold.entries([kept[number] for number in members]) for _, members in self._scripts]
+        count = len(kept)
+        self._awake = np.zeros(count, dtype=bool)
+        self._gone = np.zeros(count, dtype=bool)
+        # The script that moves a model, or -1.
+        self._played = np.full(count, -1)
+        for number, (_, members) in enumerate(self._scripts):
+            self._played[members] = number
+        # Whose script has ended, although they still move.
+        self._due = np.zeros(count, dtype=bool)
+        self._calm = np.zeros(count)  # s
+        self._motion = Motion.still(len(self._links.bodies))
+        self._pace = np.zeros(len(self._links.bodies))
+        self._tick = 0
+        self._now = 0
+        hold.begin()
+        self._wake(self._played < 0)
+        hold.apply()
+
+    def tick(self, step: int) -> None:
+        """Applies the rules; to be called at each step of the plant at which something is due, from the start on."""
+        if len(self._kept) and not self._never:
+            seconds = (step - self._now) * self._step
+            self._play()
+            self._look(np.flatnonzero(self._awake), seconds)
+            self._drop()
+            self._decide(seconds)
+        # Also with nothing kept: those that are removed are held, too.
+        self._hold.apply()
+        self._tick += 1
+        self._now = step
+
+    def boxes(self) -> Bounds:
+        """Lowest and highest corner, each shape (M, 3), m, of the boxes around the kept models at the last tick."""
+        if self._never:
+            self._look(np.arange(len(self._kept)), 0.0)
+        low, high = self._motion.low, self._motion.high
+        return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where all links of the kept models were at the last tick: places (L, 3) m and turns (L, 3, 3)."""
+        if self._never:
+            self._look(np.arange(len(self._kept)), 0.0)
+        return self._motion.places, self._motion.turns
+
+    def end(self) -> None:
+        """Leaves the context without any moving model that something could touch."""
+        self._presence.part([body for body, awake in zip(self._kept, self._awake, strict=True) if awake], ())
+
+    def _play(self) -> None:
+        """Puts the models that are played back where their scripts have them now."""
+        for number, (script, members) in enumerate(self._scripts):
+            if self._played[members[0]] != number:
+                continue
+            row = min(self._tick, len(script.motions) - 1)
+            self._hold.put(self._entries_of[number], script.states[row])
+            links = self._links.of_models(members)
+            self._motion.put(links, script.motions[row])
+            self._pace[links] = script.paces[row]
+            if row == len(script.motions) - 1:
+                self._due[members] = not script.rests
+                self._played[members] = -1 if script.rests else number
+
+    def _look(self, models: np.ndarray, seconds: float) -> None:
+        """Observes `models` in the simulation, so many seconds after the last time."""
+        links = self._links.of_models(models)
+        if not links:
+            return
+        before, now = self._motion.of(links), self._links.observe(self._plant, self._context, links)
+        self._motion.put(links, now)
+        if seconds:
+            self._pace[links] = self._links.pace(links, before, now, seconds)
+
+    def _drop(self) -> None:
+        """What has fallen out of the world is not worth simulating."""
+        self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
+        self._lay(self._awake & self._gone)
+
+    def _decide(self, seconds: float) -> None:
+        """Wakes and lays to sleep, so many seconds after the last time."""
+        slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
+        speed = np.maximum.reduceat(self._motion.speed, self._links.first)
+        near = self._near(speed)
+        if not (near.any() or self._awake.any() or (self._played >= 0).any()):
+            return
+        now = self._situation(speed, slow, near)
+        if (start := ~self._awake & (now.near | now.met | self._due)).any():
+            self._wake(spread(start, now.touching | now.together) & ~self._awake & ~self._gone)
+        self._calm = np.where(self._awake & slow, self._calm + seconds, 0.0)
+        restless = self._awake & ((self._calm < CALM) | now.near | now.stirred)
+        self._lay(self._awake & ~spread(restless, now.touching))
+
+    def _near(self, speed: np.ndarray) -> np.ndarray:
+        """Which models could meet the robot before the next tick but one."""
+        robot = self._robot.observe(self._plant, self._context, range(len(self._robot.bodies)))
+        reach = NEAR + (speed + robot.speed.max()) * self._period
+        return (gaps(self._robot, robot, self._links, self._motion)[0] < reach) & ~self._gone
+
+    def _situation(self, speed: np.ndarray, slow: np.ndarray, near: np.ndarray) -> Situation:
+        apart = gaps(self._links, self._motion, self._links, self._motion)
+        apart[self._gone] = apart[:, self._gone] = np.inf
+        np.fill_diagonal(apart, np.inf)
+        played = self._played >= 0
+        moving = self._awake | played
+        lively = moving & ~slow
+        together = played[:, None] & (self._played[:, None] == self._played)
+        touching = apart < TOUCH
+        stirring = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
+        meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
+        return Situation(near, meeting.any(axis=1), stirring.any(axis=1), touching, together)
+
+    def _wake(self, models: np.ndarray) -> None:
+        """Lets the simulator work on `models` (M,), from where they are now."""
+        if not models.any():
+            return
+        state = self._hold.state()
+        for number, (script, members) in enumerate(self._scripts):
+            if models[members].any() and self._played[members[0]] == number:
+                state[self._entries_of[number]] = script.states[self._tick]
+                # What the script would still do with those that it leaves, which have fallen out of the world, is no matter.
+                self._played[members] = -1
+        for number in np.flatnonzero(models):
+            self._hold.release(self._entries[number], state[self._entries[number]])
+        self._presence.join(self._bodies(models), self._bodies(self._awake))
+        self._awake |= models
+        self._due &= ~models
+        self._calm[models] = 0
+
+    def _lay(self, models: np.ndarray) -> None:
+        """Holds `models` (M,), which are awake, where they are now."""
+        if not models.any():
+            return
+        state = self._hold.state()
+        for number in np.flatnonzero(models):
+            self._hold.put(self._entries[number], state[self._entries[number]])
+        self._awake &= ~models
+        self._presence.part(self._bodies(models), self._bodies(self._awake))
+        links = self._links.of_models(np.flatnonzero(models))
+        self._motion.speed[links] = self._pace[links] = 0.0
+
+    def _bodies(self, models: np.ndarray) -> list[Body]:
+        return [body for body, chosen in zip(self._kept, models, strict=True) if chosen]

@@ -1,0 +1,262 @@
+"""What the user's decisions change in a run's state: pins, selections tried by hand, other settings, the way back and branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ddenv.runfile.events import Changes, Data, names, number, one_of
+from ddenv.runfile.state import Decision, Node, Point, RunState, Test, Trial, many
+
+
+def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
+    """One more decision of the user."""
+    one = Decision(at, state.tests_done, state.node, kind, words)
+    return {"decisions": (*state.decisions, one)}
+
+
+def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Changes:
+    """The run comes to another environment, a new node below the current one."""
+    environment = names(state.elements, data["environment"])
+    reduction = state.scenario.get("reduction", {})
+    node = Node(
+        number=len(state.nodes),
+        parent=state.node,
+        how=how,
+        what=what,
+        environment=environment,
+        round=None if state.round is None else state.round.number,
+        tests=state.tests_done,
+        time=at,
+        evidence_test=int(data["evidence_test"]),
+        method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
+    )
+    inside = set(environment) <= set(state.environment)
+    # What the other failure needs is not known yet.
+    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
+    changes = {} if how == "reduced" else left_round(state)
+    return changes | {
+        "nodes": (*state.nodes, node),
+        "node": node.number,
+        "environment": environment,
+        "evidence_test": node.evidence_test,
+        "lower_bound": needed,
+        "minimal": False,
+        "history": (*state.history, Point(state.tests_done, len(environment), needed)),
+    }
+
+
+def failures_at(state: RunState, number: int) -> tuple[int, ...]:
+    """The tests whose ends count as f in a node: f's own, and those of other failures that were accepted on the way there."""
+    accepted, node = [], state.nodes[number]
+    while node.parent is not None:
+        if node.how == "accepted":
+            accepted.append(node.evidence_test)
+        node = state.nodes[node.parent]
+    return (*state.failures[:1], *reversed(accepted))
+
+
+def left_round(state: RunState) -> Changes:
+    """The search that was on is over, and so is its round."""
+    changes: Changes = {"confirming": False, **waits_no_more(state)}
+    if state.round is not None and not state.round.done:
+        changes["round"] = replace(state.round, done=True)
+    return changes
+
+
+def waits_no_more(state: RunState) -> Changes:
+    """No candidate waits for accept or reject."""
+    working = "paused" if state.paused else "running"
+    return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
+
+
+def searched_anew(state: RunState) -> Changes:
+    """The search that was on is over; whether a model can be removed is open again."""
+    here = state.nodes[state.node]
+    nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
+    return {**left_round(state), "minimal": False, "nodes": nodes}
+
+
+# A decision names so many models, each with so many letters.
+NAMED, LONGEST = 3, 40
+
+
+def pinned(state: RunState, data: Data, at: float) -> Changes:
+    models = names(state.elements, data["models"])
+    words = f"pinned {told(models)}"
+    return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
+
+
+def unpinned(state: RunState, data: Data, at: float) -> Changes:
+    models = names(state.elements, data["models"])
+    words = f"unpinned {told(models)}"
+    return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
+
+
+def trial_started(state: RunState, data: Data, at: float) -> Changes:
+    trial = Trial(int(data["trial"]), names(state.elements, data["models"]), state.node)
+    if trial.number != len(state.trials) + 1 or len(set(trial.models)) != len(trial.models):
+        raise ValueError(trial.number)
+    inside = frozenset(trial.models)
+    without = [name for name in state.environment if name not in inside]
+    what = f"without {told(without)}" if 0 < len(without) <= trial.size else f"with {told(trial.models)} alone"
+    words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
+    return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
+
+
+def trial_judged(state: RunState, data: Data, _: float) -> Changes:
+    tests = tuple(map(int, data["tests"]))
+    trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar")
+    return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=int(data["known"])))
+
+
+def adopted(state: RunState, data: Data, at: float) -> Changes:
+    trial = replace(tried(state, data["trial"]), adopted=True)
+    words = f"adopted {trial.label}: {many(trial.size)}"
+    return {
+        **_with_trial(state, trial),
+        **arrived(state, data, at, "adopted", trial.label),
+        **decision(state, at, "adopt", words),
+    }
+
+
+def accepted_other(state: RunState, data: Data, at: float) -> Changes:
+    """Another failure counts as f from here on, and where it showed becomes the environment."""
+    test = state.tests[_index(data["test"])]
+    # A trial that led there is known by its number; else it was a candidate.
+    trial = None if data.get("trial") is None else tried(state, data["trial"])
+    what = trial.label if trial else str(data["what"])
+    judged = with_outcomes(state, data)
+    changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
+    return {
+        "tests": judged.tests,
+        "tally": judged.tally,
+        "failures": (*state.failures, test.id),
+        **changes,
+        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
+        **decision(state, at, "accept_other", f"took another failure for as good: {what}, test {test.id}"),
+    }
+
+
+def went_back(state: RunState, data: Data, at: float) -> Changes:
+    node = state.nodes[_node(state, data["node"])]
+    undone = data.get("rejected")
+    nodes = list(state.nodes)
+    nodes[node.number] = replace(node, rejected=False)
+    if undone is None:
+        words = f"went to {place(node)}"
+    else:
+        last = nodes[_node(state, undone)]
+        nodes[last.number] = replace(last, rejected=True)
+        words = f"took back {last.what}: {many(len(node.environment))} again"
+    # What is not there cannot stay.
+    gone = state.pinned.difference(node.environment)
+    if gone:
+        words += f"; unpinned {told([name for name in state.elements if name in gone])}"
+    # Where another failure was accepted in between, it counts there alone.
+    judged = with_outcomes(state, data) if "outcomes" in data else state
+    return {
+        **left_round(state),
+        "tests": judged.tests,
+        "tally": judged.tally,
+        "failures": failures_at(state, node.number),
+        "nodes": tuple(nodes),
+        "node": node.number,
+        "environment": node.environment,
+        "pinned": state.pinned - gone,
+        "evidence_test": node.evidence_test,
+        "lower_bound": 0,
+        "minimal": False,
+        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        **decision(state, at, "undo" if undone is not None else "go_back", words),
+    }
+
+
+def changed(state: RunState, data: Data, at: float) -> Changes:
+    settings = dict(data["settings"])
+    before = dict(state.scenario["reduction"])
+    words = ", ".join(f"{key} {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
+    scenario = {**state.scenario, "reduction": before | settings}
+    # A search goes the same way whatever its budget is.
+    anew = {} if set(settings) == {"budget"} else searched_anew(state)
+    return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
+
+
+def leg_started(state: RunState, data: Data, _: float) -> Changes:
+    """A new search begins from the environment as it is."""
+    n_partitions = data["n_partitions"]
+    if type(data["round"]) is not int or not (n_partitions is None or (type(n_partitions) is int and n_partitions > 0)):
+        raise ValueError(data)
+    return searched_anew(state)
+
+
+def command_refused(state: RunState, data: Data, _: float) -> Changes:
+    return {"refusal": (int(data["command"]), str(data["why"]))}
+
+
+def tried(state: RunState, number: int) -> Trial:
+    """The trial of this number. Raises IndexError if there is none."""
+    return state.trials[_index(number)]
+
+
+def told(models: Sequence[str]) -> str:
+    """The first names of some models."""
+    shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
+    more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
+    return ", ".join(shown) + more
+
+
+def place(node: Node) -> str:
+    """A node in words."""
+    models = many(len(node.environment))
+    return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+
+
+def _limit(value: object) -> object:
+    """A setting in words: a budget may be none."""
+    return "no limit" if value is None else value
+
+
+def _with_trial(state: RunState, trial: Trial) -> Changes:
+    trials = list(state.trials)
+    trials[trial.number - 1] = trial
+    return {"trials": tuple(trials)}
+
+
+def _index(number: int) -> int:
+    if type(number) is not int or number < 1:
+        raise IndexError(number)
+    return number - 1
+
+
+def _node(state: RunState, number: int) -> int:
+    if type(number) is not int or not 0 <= number < len(state.nodes):
+        raise IndexError(number)
+    return number
+
+
+def with_outcomes(state: RunState, data: Data) -> RunState:
+    """The state with what tests turned out to be, now that f is known, or that another failure counts as f."""
+    for test, outcome in data["outcomes"].items():
+        distance = data["distances"].get(test)
+        values = {"outcome": str(outcome), "distance": None if distance is None else number(distance)}
+        state = state.changed(**with_test(state, int(test), values))
+    return state
+
+
+def with_test(state: RunState, id: int, values: Data) -> Changes:
+    if id < 1:
+        raise IndexError(id)
+    before = state.tests[id - 1]
+    after = replace(before, **values)
+    return {"tests": state.tests.changed(id - 1, after), **counts(state, before, after)}
+
+
+def counts(state: RunState, before: Test | None, after: Test) -> Changes:
+    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
+    # An outcome that nobody knows has no entry: a KeyError, and a tally that no file can make long.
+    tally[after.outcome] += 1
+    if before is not None:
+        tally[before.outcome] -= 1
+        reruns -= before.is_deflake_run
+    return {"tally": tally, "deflake_runs": reruns}

@@ -1,0 +1,67 @@
+"""Run files: how one is made from a scenario, and what it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile, create
+from ddenv.runs.scenarios import check_parts, load_parts
+from ddenv.world.files.access import read_bytes
+from ddenv.world.files.resources import Stored
+from ddenv.world.model import Model, World
+from ddenv.world.read import parse_model, parse_world
+from ddenv.world.scenario import Scenario
+
+# How the names of documents begin that were read of other files.
+RESOURCE = "resource "
+
+
+def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | None = None) -> World:
+    """Writes a new run file that holds all a reduction needs; returns its world. Raises UserError, with nothing written.
+
+    `tell` is called with a line before something that takes longer.
+    """
+    world, _ = load_parts(scenario, tell)
+    documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
+    documents |= {
+        "scenario": scenario.model_dump_json().encode(),
+        "world": world.text,
+        "robot": read_bytes(scenario.robot.model),
+    }
+    elements = world.elements(frozenset(scenario.protected))
+    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+    return world
+
+
+def create_like(run: Path, scenario: Scenario, path: Path) -> None:
+    """Writes a new run file at `path` for the world and the robot that `run` holds, with another `scenario` for them.
+
+    Nothing else is read: neither the world's own file nor the robot's need be there any more. Raises UserError, with nothing
+    written.
+    """
+    with RunFile(run) as file:
+        _, world, robot = read_parts(file)
+        documents = {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
+        documents |= {name: file.document(name) for name in ("world", "robot")}
+    check_parts(scenario, world, robot)
+    documents["scenario"] = scenario.model_dump_json().encode()
+    elements = world.elements(frozenset(scenario.protected))
+    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+
+
+def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
+    """What a run file was made from: its scenario, its world and its robot."""
+    try:
+        scenario = Scenario.model_validate_json(run.document("scenario"))
+    except ValueError:
+        raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
+    # Whatever a run file says, nothing else on this machine is opened for it.
+    stored = Stored(run.documents(RESOURCE))
+    world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
+    robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
+    if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
+        raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
+    return scenario, world, robot

@@ -1,0 +1,126 @@
+"""The world that a run has left, as files: its SDF text, and a scenario that runs the robot in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import RESOURCE, read_parts
+from ddenv.world.files.access import Missing, Unusable, write_file
+from ddenv.world.files.resolve import find
+from ddenv.world.files.resources import Stored
+from ddenv.world.model import Mesh, World
+from ddenv.world.read import parse_model, parse_world
+from ddenv.world.scenario import Scenario
+from ddenv.world.subworld import without
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """The files that were written, and the URIs of other files that the written world names."""
+
+    files: list[Path]
+    needs: list[str]
+
+
+class _Asked:
+    """Stored resources that keep in `names` what was asked of them: each URI with the folder of the file that names it."""
+
+    def __init__(self, stored: Stored) -> None:
+        self.taken = stored.taken
+        self.names: dict[tuple[str, Path], None] = {}
+        self._stored = stored
+
+    def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
+        self.names[uri, base] = None
+        return self._stored.sdf(uri, base)
+
+    def mesh(self, uri: str, base: Path, **how: Any) -> Mesh:
+        self.names[uri, base] = None
+        return self._stored.mesh(uri, base, **how)
+
+
+def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
+    """Writes the environment that a run has left as an SDF world, and a scenario for it. Raises UserError."""
+    with RunFile(run) as file:
+        scenario, world, _ = read_parts(file)
+        robot, stored = file.document("robot"), Stored(file.documents(RESOURCE))
+        state = fold(file.events())
+    if not state.elements:
+        raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
+    removed = frozenset(state.elements) - frozenset(state.environment)
+    try:
+        text = without(world, removed)
+    except ValueError as error:
+        raise UserError(f"{run}: damaged run file: its world has {error}") from None
+    write_file(sdf, text)
+    asked = _Asked(stored)
+    minimal = parse_world(text, scenario.world, scenario.reading, asked)
+    needs = list(dict.fromkeys(uri for uri, base in asked.names if base == scenario.world.parent))
+    if scenario_file is None:
+        return Exported([sdf], needs)
+    model = scenario_file.with_suffix(f".robot{_suffix(scenario.robot.model)}")
+    write_file(model, robot)
+    data = scenario.model_dump(mode="json")
+    folder = scenario_file.parent.resolve()
+    # Only programs of the user's own are searched there.
+    if scenario.oracle is None and ":" not in scenario.controller.use:
+        del data["folder"]
+    else:
+        data["folder"] = _name(scenario.folder, folder)
+    data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
+    data["protected"] = _renamed(scenario.protected, world, removed, minimal)
+    needed = (*_folders(scenario, asked, robot, stored), *_packages(scenario.robot.model, robot))
+    model_path = (*scenario.reading.model_path, *needed)
+    data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
+    write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+    return Exported([sdf, model, scenario_file], needs)
+
+
+def _name(path: Path, folder: Path) -> str:
+    """What `path` is called in a scenario of `folder`: relative if it goes along when that folder is moved."""
+    path = path.resolve()
+    return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
+
+
+def _suffix(robot: Path) -> str:
+    return ".urdf" if robot.suffix.lower() == ".urdf" else ".sdf"
+
+
+def _packages(file: Path, robot: bytes) -> list[Path]:
+    """The folders around the robot's file that it names as packages."""
+    around = (folder for folder in file.absolute().parents if folder.name and folder.is_dir())
+    return [folder for folder in around if f"package://{folder.name}/".encode() in robot]
+
+
+def _renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> list[str]:
+    """The names that protected models have in the minimal world: copies of one name are numbered by their order."""
+    kept = [model.name for model in world.models if model.name not in removed]
+    names = dict(zip(kept, (model.name for model in minimal.models), strict=True))
+    return [names[name] for name in protected]
+
+
+def _folders(scenario: Scenario, asked: _Asked, robot: bytes, stored: Stored) -> list[Path]:
+    """The folders of the original world and robot, as far as something that is named in these is found only there."""
+    file = scenario.robot.model
+    asked_by_robot = _Asked(stored)
+    parse_model(robot, file, scenario.reading, asked_by_robot)
+    both = ((scenario.world.parent, asked), (file.parent, asked_by_robot))
+    return [folder for folder, each in both if any(_leans_on(folder, uri, base) for uri, base in each.names)]
+
+
+def _leans_on(folder: Path, uri: str, base: Path) -> bool:
+    """Whether `uri`, named in a file of `base`, is relative to the world in `folder`, or a model beside it."""
+    if "://" not in uri:
+        return base == folder and not uri.strip().startswith("/")
+    folder = folder.resolve()
+    try:
+        return find(uri, folder, (folder,)).is_relative_to(folder)
+    except (Missing, Unusable):
+        return False

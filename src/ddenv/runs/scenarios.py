@@ -1,0 +1,112 @@
+"""Scenarios put together from what a user gives: an SDF world with two places, or options over a scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.world.command import command_words
+from ddenv.world.files.access import read_bytes
+from ddenv.world.load import SDF, validate
+from ddenv.world.model import Model, World
+from ddenv.world.placement import check_spawn
+from ddenv.world.read import disk_of, parse_model, read_world
+from ddenv.world.scenario import PLAIN, Reading, Scenario
+from ddenv.world.sdf.standin import parse_option
+
+
+def reading_of(
+    reading: Reading = PLAIN,
+    *,
+    model_path: Sequence[Path] = (),
+    stand_in: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+) -> Reading:
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`) and ignored kinds of elements. Raises UserError."""
+    for folder in model_path:
+        if not folder.is_dir():
+            raise UserError(f"--model-path: there is no folder {folder}")
+    folders = (*(folder.resolve() for folder in model_path), *reading.model_path)
+    stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
+    ignored = dict.fromkeys((*reading.ignore, *ignore))
+    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored))
+
+
+def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
+    """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
+    data = {
+        "name": world.stem[:80] or "world",
+        "world": str(world.resolve()),
+        "robot": {
+            "model": str(SDF / "robots" / "husky.sdf"),
+            "spawn": dict(zip(("x", "y", "z", "yaw"), spawn, strict=True)),
+        },
+        "goal": dict(zip(("x", "y"), goal, strict=True)),
+    }
+    return validate(data, str(world))
+
+
+def with_options(
+    scenario: Scenario,
+    *,
+    timeout: float | None = None,
+    epsilon: float | None = None,
+    early_stop: bool | None = None,
+    similarity: str | None = None,
+    budget: int | None = None,
+    spawn: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
+    world: Path | None = None,
+    reading: Reading | None = None,
+    **reduction: str | int | float | None,
+) -> Scenario:
+    """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
+
+    `timeout` is in simulated s, `epsilon` in m, `early_stop` and `similarity` as in the section `failure`, `budget` the
+    most tests in all, 0 for any number, `spawn` x, y, z m and yaw rad (0 if
+    left out), `goal` x, y m. All others are keys of the scenario's section `reduction`.
+    """
+    data = scenario.model_dump(mode="json")
+    failure = {"timeout": timeout, "epsilon": epsilon, "early_stop": early_stop, "similarity": similarity}
+    data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
+    data["failure"].update({key: value for key, value in failure.items() if value is not None})
+    if budget is not None:
+        data["reduction"]["budget"] = budget or None
+    if spawn is not None:
+        data["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
+    if goal is not None:
+        data["goal"].update(zip(("x", "y"), goal, strict=True))
+    if world is not None:
+        data["world"] = str(world.resolve())
+    if reading is not None:
+        data["reading"] = reading.model_dump(mode="json")
+    return validate(data, "options")
+
+
+def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) -> tuple[World, Model]:
+    """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
+
+    `tell` is called with a line before something that takes longer. Raises UserError.
+    """
+    if scenario.oracle is not None:
+        command_words(scenario)
+    reading, robot_file = scenario.reading, scenario.robot.model
+    world = read_world(scenario.world, reading, tell)
+    around_robot = disk_of(robot_file, reading, tell)
+    robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
+    world = replace(world, resources={**world.resources, **around_robot.taken})
+    check_parts(scenario, world, robot)
+    return world, robot
+
+
+def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
+    """Whether a scenario fits its world and its robot. Raises UserError."""
+    known = {model.name for model in world.models}
+    for name in scenario.protected:
+        if name not in known:
+            raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
+    if not world.elements(frozenset(scenario.protected)):
+        raise UserError(f"{scenario.world}: has no model that could be removed")
+    check_spawn(world, robot, scenario.robot.spawn)

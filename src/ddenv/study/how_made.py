@@ -1,0 +1,131 @@
+"""How a study was made: what it was asked, where and when it was worked on, what its words mean, and how to do it again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from ddenv.page.blocks import Block, Code, Name, Section, Table, duration, moment, plain, say, thousands
+from ddenv.study.plan import Plan
+from ddenv.study.results import Found
+from ddenv.study.study_folder import RUNS, Sitting
+from ddenv.world.scenario import Scenario
+
+# Of the section `reduction`, what is asked of every cell.
+ASKED = (
+    "n_partitions",
+    "iterations",
+    "candidates",
+    "complement_order",
+    "growth",
+    "skip",
+    "baseline_runs",
+)
+# And of some: by the algorithms and partitionings that look at it.
+FOR_SOME = {"prior": ("probdd", "splitting"), "delta": ("trajectoryseg",)}
+COLUMNS = (
+    (
+        "tests",
+        "runs of the robot: the baseline, those behind each verdict, and the full runs at the end where tests were ended "
+        "early. Runs that idle workers made ahead of time and nobody needed are not among them.",
+    ),
+    ("% reduction", "the part of the models that was removed."),
+    ("minutes", "what these tests took, one after another, as the paper's were made."),
+    ("re-runs", "the share of tests that run a candidate again which did not show f at first (the paper's deflaking)."),
+    ("f in the whole world", "runs of the whole world that ended as f did."),
+    (
+        "left out once more",
+        "when all was over: what is left, run again with seeds that no reduction had used, and again without each of its models.",
+    ),
+    (
+        "least tests",
+        "what no method can do without: the baseline, f once in what is left, and each of its models left out in vain, with all "
+        "re-runs.",
+    ),
+)
+
+
+def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:
+    """The section on all that."""
+    blocks: list[Block] = [
+        *_settings(plan),
+        *_sittings(sittings),
+        *_computed(found),
+        say("What the columns mean:"),
+        Table(("column", "meaning"), COLUMNS),
+        *_again(plan, folder),
+    ]
+    return Section("How it was made", tuple(blocks))
+
+
+def _settings(plan: Plan) -> list[Block]:
+    """What differs between scenarios has a column for each."""
+    keys = [*ASKED, *(key for key, names in FOR_SOME.items() if any(_uses(plan, name) for name in names))]
+    told = [(key, [_value(scenario, key) for scenario in plan.scenarios]) for key in keys]
+    told += [
+        ("seeds", [", ".join(map(str, _seeds(plan, scenario))) for scenario in plan.scenarios]),
+        ("epsilon, m", [f"{scenario.failure.epsilon:g}" for scenario in plan.scenarios]),
+        ("simulated time of a test, s", [f"{scenario.failure.timeout:g}" for scenario in plan.scenarios]),
+        ("ends when stuck for good", ["yes" if each.failure.early_stop else "no" for each in plan.scenarios]),
+    ]
+    head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
+    rows = tuple((key.replace("_", " "), *values) for key, values in told)
+    return [Table(head, rows, frozenset(range(1, len(head))))]
+
+
+def _uses(plan: Plan, name: str) -> bool:
+    return any(name in (method.algorithm, *method.parts) for method in plan.methods)
+
+
+def _seeds(plan: Plan, scenario: Scenario) -> list[int]:
+    return sorted({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name})
+
+
+def _value(scenario: Scenario, key: str) -> str:
+    value = getattr(scenario.reduction, key)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
+    rows = tuple(
+        (
+            f"{moment(each.begun)} UTC",
+            duration(each.seconds),
+            str(each.jobs),
+            thousands(each.tests),
+            Name(each.machine),
+            Name(each.versions),
+        )
+        for each in sittings
+    )
+    head = ("worked on", "for", "workers", "tests made", "machine", "versions")
+    return [Table(head, rows, frozenset({1, 2, 3}))] if rows else []
+
+
+def _computed(found: Sequence[Found]) -> list[Block]:
+    """Several versions in one study are told: their tests may differ."""
+    drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
+    told = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
+    taken = sum(each.taken for each in found)
+    words = f"Computed with {told[0]}." if len(told) == 1 else f"Not all of it was computed alike: {'; '.join(told)}."
+    blocks: list[Block] = [say(words, notice=len(told) > 1)] if told else []
+    if taken:
+        blocks.append(
+            say(
+                f"{thousands(taken)} tests that another cell of the study had made, of the same models with the same seed, were "
+                "not made again: the simulation is deterministic to the last bit. They count in each cell all the same, with "
+                "their time."
+            )
+        )
+    return blocks
+
+
+def _again(plan: Plan, folder: Path) -> list[Block]:
+    # A name that begins with a dash would be an option.
+    start = f"./{folder}" if str(folder).startswith("-") else folder
+    example = plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv")
+    return [
+        say("Each cell is a run: to watch, to go on with, to report on."),
+        Code((f"ddenv open {shlex.quote(example)}", f"ddenv test {shlex.quote(example)} --minimal --leave-each-out")),
+    ]

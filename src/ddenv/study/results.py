@@ -1,0 +1,159 @@
+"""What a cell came to, read of its run file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply
+from ddenv.runfile.state import Baseline, RunState
+from ddenv.runfile.store import Event, RunFile
+from ddenv.study.check import Check, read_check
+from ddenv.study.plan import Cell
+from ddenv.study.study_folder import run_path
+from ddenv.words import count
+from ddenv.world.files.access import read_bytes
+
+
+def difference(file: RunFile, cell: Cell) -> str:
+    """What it was made of that the cell has not, "" if nothing. Raises UserError where that cannot be read."""
+    first = next(iter(file.events(most=1)), None)
+    if first is None:
+        raise UserError(f"{file.path}: damaged run file: it has no events")
+    asked = json.loads(cell.scenario.model_dump_json())
+    if _told(first.data.get("scenario")) != _told(asked):
+        return "another scenario, or with other options"
+    if file.document("world") != read_bytes(cell.scenario.world):
+        return "another world"
+    return "" if file.document("robot") == read_bytes(cell.scenario.robot.model) else "another robot"
+
+
+def _told(scenario: object) -> object:
+    """A scenario without its words, and without where its files are: a study may go on in another place."""
+    if not isinstance(scenario, dict):
+        return None
+    kept = {key: value for key, value in scenario.items() if key not in ("description", "world", "folder")}
+    for part, key in (("robot", "model"), ("reading", "model_path")):
+        if isinstance(kept.get(part), dict):
+            kept[part] = {name: value for name, value in kept[part].items() if name != key}
+    return kept
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """`tests` are those that the result rests on: the baseline's, those behind each verdict, the full runs at the end; so many of
+    them are `reruns`. They do not depend on the number of workers, as do those that were made `ahead` of time and not needed.
+
+    `sizes` are (tests, models left) from the end of the baseline on. `seconds` is what the tests took, one after another.
+    `taken` of all tests were taken over from other cells, which had made them. `problem` says why there is no minimal
+    environment, "" where there is one.
+    """
+
+    cell: Cell
+    ended: bool = False
+    minimal: bool = False
+    problem: str = "not made yet"
+    elements: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+    tests: int = 0
+    reruns: int = 0
+    ahead: int = 0
+    taken: int = 0
+    seconds: float = 0.0
+    version: str = ""
+    simulator: str = ""
+    baseline: Baseline | None = None
+    baseline_runs: int = 0
+    sizes: tuple[tuple[int, int], ...] = ()
+    check: Check | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is minimal, and was so when it was tried once more."""
+        return self.minimal and self.check is not None and self.check.holds
+
+    @property
+    def trouble(self) -> str:
+        """Why it is not shown to be minimal; "" where it is."""
+        if not self.minimal:
+            return self.problem
+        if self.check is None:
+            return "not tried once more yet"
+        if not self.check.shown:
+            return f"f did not show again in {count(self.check.runs, 'run')} of what is left, with other seeds"
+        names = ", ".join(name for name, shown in self.check.without.items() if shown)
+        return f"with other seeds f showed also without {names}: it is a matter of chance there" if names else ""
+
+    @property
+    def smaller(self) -> float:
+        """Which part of the models was removed."""
+        return 1 - len(self.left) / len(self.elements) if self.elements else 0.0
+
+
+def read_cell(folder: Path, cell: Cell) -> Found:
+    """What there is of a cell; one that cannot be read says so as its problem."""
+    path = run_path(folder, cell)
+    if not path.exists():
+        return Found(cell)
+    try:
+        with RunFile(path) as file:
+            state, needed, sizes = _story(file.events())
+            if other := difference(file, cell):
+                return Found(cell, problem=f"its run was made of {other}")
+    except UserError as error:
+        return Found(cell, problem=str(error))
+    if not all(0 < number <= len(state.tests) for number in needed):
+        return Found(cell, problem=f"{path}: damaged run file: a verdict rests on tests that are not there")
+    tests = [state.tests[number - 1] for number in needed]
+    return Found(
+        cell,
+        ended=state.ended,
+        minimal=state.minimal,
+        problem=_problem(state),
+        elements=state.elements,
+        left=state.environment,
+        tests=len(tests),
+        reruns=sum(test.is_deflake_run for test in tests),
+        ahead=state.tests_done - len(tests),
+        taken=sum(test.taken for test in state.tests),
+        seconds=sum(test.wall_seconds for test in tests),
+        version=state.engine_version,
+        simulator=state.simulator,
+        baseline=state.baseline,
+        baseline_runs=sum(test.phase == "baseline" for test in tests),
+        sizes=sizes,
+        check=read_check(folder, cell, state.environment) if state.minimal else None,
+    )
+
+
+def _problem(state: RunState) -> str:
+    if state.minimal:
+        return ""
+    if state.status == "finished":
+        return state.reason
+    return state.reason if state.ended else "not at its end"
+
+
+def _story(events: Iterable[Event]) -> tuple[RunState, list[int], tuple[tuple[int, int], ...]]:
+    """The state at the end, the tests that the result rests on in their order, and the sizes of the environment."""
+    state = RunState()
+    needed: dict[int, None] = {}
+    sizes: list[tuple[int, int]] = []
+    for event in events:
+        state = apply(state, event)
+        match event.kind:
+            case "test_finished" if _counts_at_once(state, event):
+                needed[event.data["test"]] = None
+            case "candidate_judged":
+                needed |= dict.fromkeys(event.data["tests"])
+            case "baseline_finished" | "reduced" | "finished":
+                sizes.append((len(needed), len(state.environment)))
+    return state, list(needed), tuple(sizes)
+
+
+def _counts_at_once(state: RunState, event: Event) -> bool:
+    """Tests of the baseline and of the confirmation are made because they are needed, never ahead of time."""
+    return state.tests[event.data["test"] - 1].phase in ("baseline", "confirm")

@@ -1,0 +1,121 @@
+"""The folder of a study: its run files, what is written of them, and who made them, when and where."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.lock import held
+from ddenv.runs.folder import SUFFIX
+from ddenv.study.plan import Cell
+from ddenv.version import __version__
+from ddenv.world.files.access import read_bytes, write_file
+
+RUNS, ABOUT, LOCK = "runs", "study.json", "study.lock"
+# What makes the numbers of a run: another version may come to another result.
+PACKAGES = ("drake", "numpy", "scipy", "scikit-learn")
+# A machine's own name for itself may be anything.
+LONGEST_NAME = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Sitting:
+    """One time that the study was worked on. `begun` is Unix time, s; it took `seconds` so far, and made so many `tests`."""
+
+    begun: float
+    seconds: float
+    jobs: int
+    tests: int
+    versions: str
+    machine: str
+
+
+def run_path(folder: Path, cell: Cell) -> Path:
+    """The run file of a cell."""
+    return folder / RUNS / f"{cell.name}{SUFFIX}"
+
+
+def check_path(folder: Path, cell: Cell) -> Path:
+    """Where it is written what came of leaving out each model that is left once more."""
+    return folder / RUNS / f"{cell.name}.check.json"
+
+
+@contextmanager
+def opened(folder: Path) -> Iterator[None]:
+    """Makes the folder if it is not there, and keeps other studies out of it. Raises UserError."""
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"{folder}: is a file; give the name of a folder")
+        if folder.is_dir() and any(folder.iterdir()) and not (folder / ABOUT).exists() and not (folder / LOCK).exists():
+            raise UserError(f"{folder}: holds other files; give the name of a new or an empty folder")
+        (folder / RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o") from None
+    if not os.access(folder / RUNS, os.W_OK):
+        raise UserError(f"{folder}: cannot be written: no permission; choose another folder with -o")
+    taken = f"{folder}: another study works in this folder; wait for it, or choose another folder with -o"
+    with held(folder / LOCK, taken, f"{folder}: cannot be written", "choose another folder with -o"):
+        yield
+
+
+def sittings(folder: Path) -> tuple[Sitting, ...]:
+    """When the study was worked on so far. Raises UserError for a damaged file."""
+    path = folder / ABOUT
+    if not path.exists():
+        return ()
+    try:
+        return tuple(_sitting(each) for each in json.loads(read_bytes(path))["sittings"])
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        raise UserError(f"{path}: makes no sense; delete it (the runs beside it are not touched)") from None
+
+
+def _sitting(data: dict) -> Sitting:
+    numbers = {key: float(data[key]) for key in ("begun", "seconds")}
+    whole = {key: int(data[key]) for key in ("jobs", "tests")}
+    words = {key: str(data[key]) for key in ("versions", "machine")}
+    return Sitting(**numbers, **whole, **words)
+
+
+def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
+    """Writes them, whole or not at all."""
+    text = json.dumps({"sittings": [asdict(each) for each in all_of_them]}, indent=1)
+    write_file(folder / ABOUT, text.encode())
+
+
+def versions() -> str:
+    """ddenv, Python and what computes, with their versions; nothing is imported for it."""
+    told = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
+    for name in PACKAGES:
+        try:
+            told.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    return ", ".join(told)
+
+
+def machine() -> str:
+    """The processor, its cores and the system."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    name = _processor()[:LONGEST_NAME]
+    return f"{name}, {cores} {'core' if cores == 1 else 'cores'}, {platform.system()}" if name else f"{cores} cores"
+
+
+def _processor() -> str:
+    if sys.platform == "linux":
+        try:
+            lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+        except OSError:
+            lines = []
+        for line in lines:
+            key, _, value = line.partition(":")
+            if key.strip() in ("model name", "Model", "Hardware"):
+                return " ".join(value.split())
+    return platform.processor() or platform.machine()

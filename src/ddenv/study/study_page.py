@@ -1,0 +1,156 @@
+"""What a study says: the claim in a few words, a section for each scenario, which method is best where, and how it was made."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import mean
+
+from ddenv.page.blocks import Paragraph, Report, duration, percent, say, thousands
+from ddenv.page.html import html
+from ddenv.page.markdown import markdown, pictures
+from ddenv.study.best import best
+from ddenv.study.how_made import making
+from ddenv.study.plan import Plan
+from ddenv.study.results import Found, read_cell
+from ddenv.study.rows import groups, least_of, least_to_find, least_to_show, theirs
+from ddenv.study.study_folder import Sitting, run_path
+from ddenv.study.tables import section
+from ddenv.version import __version__
+from ddenv.words import count
+from ddenv.world.files.access import write_file
+
+
+def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:
+    """The page of a study; `found` are the cells of `plan` in its order."""
+    rows = groups(plan, found)
+    minimal = [each for each in found if each.holds]
+    sections = [best(rows), *(section(folder, group) for group in rows), making(plan, found, sittings, folder)]
+    return Report(
+        name="ddenv study",
+        verdict=_verdict(found, minimal),
+        lead=tuple(_lead(found, minimal)),
+        figures=_figures(found, minimal, sittings),
+        sections=tuple(each for each in sections if each is not None),
+        foot=f"Written by ddenv {__version__}. Lengths in m, times in UTC.",
+    )
+
+
+def _verdict(found: Sequence[Found], minimal: Sequence[Found]) -> str:
+    if not minimal:
+        open_ones = any(not each.ended for each in found)
+        return f"None of {count(len(found), 'world')} is minimal{' yet' if open_ones else ''}"
+    every = "Every" if len(minimal) == len(found) else f"{len(minimal)} of {len(found)}"
+    worlds = "world is" if len(minimal) == len(found) else "worlds are"
+    return f"{every} {worlds} minimal: {percent(mean(each.smaller for each in minimal))} smaller on average"
+
+
+def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
+    told = [
+        say(
+            "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
+            "models that make the robot fail: smaller and smaller parts of it are run, and kept while the same failure f shows, "
+            "until no single model can be left out."
+        )
+    ]
+    pairs = [(each, theirs(each.cell)) for each in minimal]
+    beside = [(each, paper) for each, paper in pairs if paper is not None]
+    if beside:
+        better = sum(each.smaller >= paper.smaller for each, paper in beside)
+        fewer = sum(each.tests <= paper.tests for each, paper in beside)
+        ours, hours = sum(each.seconds for each, _ in beside), sum(paper.minutes for _, paper in beside) / 60
+        told.append(
+            say(
+                f"Beside the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
+                f"tests in {fewer}. They took {hours:.0f} hours there; here their tests take {duration(ours)}, one after another. "
+                "The worlds follow the paper's descriptions but are not its worlds, and the simulator is another one: the methods "
+                "can be compared with each other, the minutes only roughly with the paper's."
+            )
+        )
+    if missing := len(found) - len(minimal):
+        told.append(
+            say(
+                f"{count(missing, 'cell')} without a world that is shown to be minimal: the tables say why.",
+                notice=True,
+            )
+        )
+    return told
+
+
+def _figures(
+    found: Sequence[Found], minimal: Sequence[Found], sittings: Sequence[Sitting]
+) -> tuple[tuple[str, str], ...]:
+    seconds, jobs = sum(each.seconds for each in sittings), sorted({each.jobs for each in sittings})
+    figures = [(f"{len(minimal)} of {len(found)}", "minimal")]
+    if minimal:
+        figures.append((percent(mean(each.smaller for each in minimal)), "smaller, mean"))
+    figures.append((thousands(sum(each.tests for each in found)), "tests"))
+    if sittings:
+        workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
+        made = thousands(sum(each.tests for each in sittings))
+        figures.append((duration(seconds), f"with {workers}, {made} made"))
+    return tuple(figures)
+
+
+STEM = "study"
+# The columns of the table of all cells.
+HEADER = (
+    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "minimal", "problem"),
+    *("models", "left", "reduction", "names", "tests", "reruns", "ahead", "taken_over", "seconds"),
+    *(
+        "baseline_runs",
+        "baseline_f",
+        "least_to_show",
+        "least_to_find",
+        "check_runs",
+        "check_f",
+        "check_without",
+        "check_without_f",
+    ),
+    *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
+)
+
+
+def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[Path, tuple[Found, ...]]:
+    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and what it is of. Raises UserError."""
+    found = tuple(read_cell(folder, cell) for cell in plan.cells)
+    report = content(plan, found, sittings, folder)
+    texts = {f"{STEM}.csv": table(folder, found), **pictures(report, STEM)}
+    texts |= {f"{STEM}.md": markdown(report, STEM), f"{STEM}.html": html(report)}
+    for name, text in texts.items():
+        write_file(folder / name, text.encode(errors="replace"))
+    return folder / f"{STEM}.html", found
+
+
+def table(folder: Path, found: Sequence[Found]) -> str:
+    """All cells as CSV, a row each; what a cell does not have is empty."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(HEADER)
+    writer.writerows(_row(folder, each) for each in found)
+    return out.getvalue()
+
+
+def _row(folder: Path, each: Found) -> tuple[object, ...]:
+    cell, base, check, paper = each.cell, each.baseline, each.check, theirs(each.cell)
+    used = dict(zip(("partitioning", "prioritization"), cell.method.parts, strict=True))
+    of_check = ("", "", "", "")
+    if check is not None:
+        without = check.runs * len(check.without), sum(check.without.values())
+        of_check = (check.runs, check.shown, *without)
+    return (
+        *(cell.scenario.name, cell.method.algorithm, *used.values(), cell.seed, each.minimal, each.trouble),
+        *(len(each.elements), len(each.left), round(each.smaller, 4), " ".join(each.left)),
+        *(each.tests, each.reruns, each.ahead, each.taken, round(each.seconds, 2)),
+        *(("", "") if base is None else (base.runs, base.failures)),
+        *((least_of(each, least_to_show), least_of(each, least_to_find)) if each.minimal else ("", "")),
+        *of_check,
+        *(("", "", "") if paper is None else (paper.tests, paper.smaller, paper.minutes)),
+        *(
+            each.version,
+            each.simulator if cell.scenario.oracle is None else "",
+            run_path(folder, cell).relative_to(folder),
+        ),
+    )

@@ -1,0 +1,1 @@
+"""The dialog that writes what a run left."""

@@ -1,0 +1,268 @@
+"""The dialog that writes what a run has left: its world, a scenario for it, and a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Button, Checkbox, Input, Static
+
+from ddenv.errors import UserError
+from ddenv.workbench.background import is_open, tell
+from ddenv.workbench.wording import count, plain
+
+# What can be written: its id, what it is called, and which endings its name may have.
+KINDS = (
+    ("world", "world (SDF)", (".sdf", ".world")),
+    ("scenario", "scenario (YAML)", (".yaml", ".yml")),
+    ("report", "report (HTML)", (".html", ".htm", ".md")),
+)
+# So many files are named before they are replaced; so many that a world needs, each with so many letters.
+MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """The files to write, None for what is not wanted. A scenario goes with a world."""
+
+    world: Path | None
+    scenario: Path | None
+    report: Path | None
+
+
+class Tick(Checkbox):
+    """A checkbox that is empty when it is off: nothing is told by colour alone."""
+
+    def render(self) -> Content:
+        self.BUTTON_INNER = "X" if self.value else " "
+        return super().render()
+
+
+class ExportScreen(ModalScreen[None]):
+    """Asks what to write and where, writes it, and says what was written."""
+
+    CSS_PATH = "export.tcss"
+    AUTO_FOCUS = "#export-write"
+    BINDINGS: ClassVar = [
+        Binding("ctrl+s", "write", "write", id="export.write", tooltip="write the chosen files", priority=True),
+        Binding("escape", "dismiss", "close", id="export.close", tooltip="close this dialog"),
+        Binding("up", "app.focus_previous", show=False, id="export.previous", tooltip="the field before"),
+        Binding("down", "app.focus_next", show=False, id="export.next", tooltip="the next field"),
+    ]
+
+    def __init__(self, run: Path) -> None:
+        super().__init__()
+        # `run` is taken: a screen runs things itself.
+        self._file = run
+        self._agreed: frozenset[Path] = frozenset()
+        self._busy = False
+
+    def compose(self) -> ComposeResult:
+        names = suggested(self._file)
+        with Vertical(id="export") as dialog:
+            dialog.border_title = "Export"
+            dialog.border_subtitle = "enter or ctrl+s writes   escape closes"
+            yield Static("", id="export-left", markup=False)
+            with Horizontal(classes="row"):
+                yield Static("folder", classes="name", markup=False)
+                yield Input(str(_here()), id="export-folder", compact=True)
+            for (id, title, _), name in zip(KINDS, names, strict=True):
+                with Horizontal(classes="row"):
+                    yield Tick(title, True, id=f"export-{id}", compact=True, classes="name")
+                    yield Input(name, id=f"export-{id}-name", compact=True)
+            with VerticalScroll(id="export-told", can_focus=False):
+                yield Static("", id="export-words", markup=False)
+                yield Static("", id="export-wrong", markup=False)
+            with Horizontal(id="export-buttons"):
+                yield Button("Write", id="export-write", variant="primary", compact=True)
+                yield Button("Close", id="export-close", compact=True)
+
+    def on_mount(self) -> None:
+        self._look()
+
+    @work(thread=True, group="look")
+    def _look(self) -> None:
+        words = what_is_left(self._file)
+        tell(self, self._show_left, words)
+
+    def _show_left(self, words: str) -> None:
+        self.query_one("#export-left", Static).update(words)
+
+    @on(Checkbox.Changed)
+    def _chosen(self, event: Checkbox.Changed) -> None:
+        """A scenario runs the robot in the world that is written with it."""
+        self._forget()
+        if event.checkbox.id == "export-scenario" and event.value:
+            self.query_one("#export-world", Checkbox).value = True
+        if event.checkbox.id == "export-world" and not event.value:
+            self.query_one("#export-scenario", Checkbox).value = False
+
+    @on(Input.Changed)
+    def _typed(self) -> None:
+        self._forget()
+
+    def _forget(self) -> None:
+        """Other files are asked about anew."""
+        self._agreed = frozenset()
+        self.query_one("#export-write", Button).label = "Write"
+
+    @on(Input.Submitted)
+    @on(Button.Pressed, "#export-write")
+    def _submitted(self) -> None:
+        self.action_write()
+
+    @on(Button.Pressed, "#export-close")
+    def _closed(self) -> None:
+        self.dismiss()
+
+    def action_write(self) -> None:
+        if self._busy:
+            return
+        try:
+            wanted = self._wanted()
+        except UserError as error:
+            self._tell("", str(error))
+            return
+        self._busy = True
+        self._tell("writing ...")
+        self._write(wanted, self._agreed)
+
+    def _wanted(self) -> Wanted:
+        """Raises UserError for names that cannot be used."""
+        folder = _home(Path(self._value("folder") or "."))
+        files = [self._path(folder, id, title, endings) for id, title, endings in KINDS]
+        if not any(files):
+            raise UserError("nothing is chosen: tick what to write (space)")
+        return Wanted(*files)
+
+    def _path(self, folder: Path, id: str, title: str, endings: tuple[str, ...]) -> Path | None:
+        if not self.query_one(f"#export-{id}", Checkbox).value:
+            return None
+        name = self._value(f"{id}-name")
+        if not name or not f"{folder}{name}".isprintable():
+            raise UserError(f"{title}: give a name that ends in {endings[0]}")
+        path = folder / _home(Path(name))
+        if path.suffix.lower() not in endings:
+            raise UserError(f"{title}: '{name}' does not end in {' or '.join(endings)}")
+        return path
+
+    def _value(self, id: str) -> str:
+        return self.query_one(f"#export-{id}", Input).value.strip()
+
+    @work(thread=True, group="write")
+    def _write(self, wanted: Wanted, agreed: frozenset[Path]) -> None:
+        from ddenv.report.report import is_there
+
+        there = [path for path in files_of(wanted) if is_there(path)]
+        if there and not agreed.issuperset(there):
+            tell(self, self._ask, there)
+            return
+        written: list[str] = []
+        wrong = ""
+        try:
+            written.extend(write(self._file, wanted))
+        except UserError as error:
+            wrong = str(error)
+        self.app.call_from_thread(self._done, written, wrong)
+
+    def _ask(self, there: list[Path]) -> None:
+        self._busy, self._agreed = False, frozenset(there)
+        names = ", ".join(plain(path.name) for path in there[:MOST_NAMED])
+        more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
+        verb = "exists" if len(there) == 1 else "exist"
+        self._tell("", f"{names}{more} {verb} already. Write again to replace, or give other names.")
+        self.query_one("#export-write", Button).label = "Replace"
+
+    def _done(self, written: list[str], wrong: str) -> None:
+        if not is_open(self):
+            self.app.notify(wrong or "\n".join(written), severity="error" if wrong else "information", markup=False)
+            return
+        self._busy = False
+        self._forget()
+        self._tell("\n".join(written), wrong)
+
+    def _tell(self, words: str, wrong: str = "") -> None:
+        """Shows what was done, and what went wrong."""
+        self.query_one("#export-words", Static).update(words)
+        self.query_one("#export-wrong", Static).update(wrong)
+
+
+def suggested(run: Path) -> tuple[str, str, str]:
+    """Names for world, scenario and report of a run."""
+    stem = "".join(char if char.isprintable() else "-" for char in run.stem)
+    return f"{stem}.minimal.sdf", f"{stem}.minimal.yaml", f"{stem}.html"
+
+
+def _home(path: Path) -> Path:
+    """`path` with what `~` stands for. Raises UserError for a user that nobody knows."""
+    try:
+        return path.expanduser()
+    except RuntimeError:
+        raise UserError(f"{path}: there is no such user here") from None
+
+
+def _here() -> Path:
+    try:
+        return Path.cwd()
+    except OSError:
+        return Path.home()
+
+
+def what_is_left(run: Path) -> str:
+    """How much of the world would be written; why nothing can be, where that is so."""
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+
+    try:
+        with RunFile(run) as file:
+            state = fold(file.events())
+    except UserError as error:
+        return str(error)
+    left = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
+    if state.baseline is None:
+        return f"{left}: no failure is known yet, so this is the whole world."
+    if not state.minimal:
+        return f"{left} so far: not minimal yet."
+    pinned = len(state.pinned.intersection(state.environment))
+    if not pinned:
+        return f"{left}, and no single one can be removed."
+    if pinned == len(state.environment):
+        return f"{left}, all pinned: whether they are needed was not tried."
+    return f"{left}; {pinned} pinned, and none of the others can be removed."
+
+
+def files_of(wanted: Wanted) -> Iterator[Path]:
+    """All files that may be written."""
+    from ddenv.report.report import files_of as files_of_report
+
+    if wanted.world is not None:
+        yield wanted.world
+    if wanted.scenario is not None:
+        yield from (wanted.scenario, *(wanted.scenario.with_suffix(f".robot{kind}") for kind in (".sdf", ".urdf")))
+    if wanted.report is not None:
+        yield from files_of_report(wanted.report)
+
+
+def write(run: Path, wanted: Wanted) -> Iterator[str]:
+    """Writes the files, and says so in a line each. Raises UserError for the first that cannot be written."""
+    from ddenv.map.names import shortened
+    from ddenv.report.report import write_report
+    from ddenv.runs.export import export_world
+
+    if wanted.world is not None:
+        exported = export_world(run, wanted.world, wanted.scenario)
+        yield from (f"wrote {plain(path)}" for path in exported.files)
+        if exported.needs:
+            needs = [shortened(uri, LONGEST_NEED) for uri in exported.needs[:MOST_NEEDS]]
+            more = f" and {len(exported.needs) - MOST_NEEDS} more" if len(exported.needs) > MOST_NEEDS else ""
+            yield f"the world still needs {', '.join(needs)}{more}"
+    if wanted.report is not None:
+        yield from (f"wrote {plain(path)}" for path in write_report(run, wanted.report, force=True))

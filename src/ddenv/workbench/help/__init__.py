@@ -1,0 +1,1 @@
+"""Keys, commands, settings and dialogs that every screen uses."""

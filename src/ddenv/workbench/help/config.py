@@ -1,0 +1,159 @@
+"""What a user wants otherwise: the theme, and the keys of actions, from a file in the folder for settings."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ddenv.errors import UserError
+from ddenv.workbench.help.keys import Action, actions, written
+from ddenv.workbench.terminal.themes import DARK, theme_names
+
+KNOWN = ("theme", "keys")
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """`theme` is "" where the terminal decides. `keys` are Textual's names of keys by the ids of actions."""
+
+    theme: str = ""
+    keys: Mapping[str, str] = field(default_factory=dict)
+
+
+def config_path() -> Path:
+    """Where the file is looked for: `$DDENV_CONFIG`, or `config.yaml` in the user's folder for settings."""
+    named = os.environ.get("DDENV_CONFIG")
+    if named:
+        return Path(named)
+    import platformdirs
+
+    return Path(platformdirs.user_config_dir("ddenv", appauthor=False)) / "config.yaml"
+
+
+def read_config() -> Config:
+    """What the file says; without a file all is as it comes. Raises UserError: what is wrong, and where."""
+    path = config_path()
+    data = _load(path) if path.exists() else {}
+    if not data:
+        if os.environ.get("DDENV_CONFIG") and not path.exists():
+            raise UserError(f"{path}: no such file; make it, or unset DDENV_CONFIG")
+        return Config()
+    from ddenv.workbench.help.keys import checked
+    from ddenv.workbench.terminal.themes import nearest, theme_called
+
+    for key in data:
+        if key not in KNOWN:
+            raise UserError(
+                f"{path}: '{key}' is not known here{nearest(str(key), KNOWN)}; known are {' and '.join(KNOWN)}"
+            )
+    theme, keys = data.get("theme"), data.get("keys")
+    if theme is not None and not isinstance(theme, str):
+        raise UserError(f"{path}: theme: expected a name, such as ddenv-light; found {theme!r}")
+    wanted = _wanted(keys, path)
+    return Config(theme_called(theme, f"{path}: theme") if theme else "", checked(wanted, str(path)) if wanted else {})
+
+
+def _load(path: Path) -> dict[Any, Any]:
+    import yaml
+
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', '') or 'is no UTF-8 text'}") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f"line {mark.line + 1}: " if mark else ""
+        raise UserError(
+            f"{path}: {line}is no YAML: {getattr(error, 'problem', None) or 'it cannot be read'}; "
+            f"keys such as '?' go in quotes"
+        ) from None
+    except RecursionError:
+        raise UserError(f"{path}: is nested too deeply") from None
+    except ValueError as error:
+        # A date that no calendar has.
+        raise UserError(f"{path}: is no YAML: {error}; put it in quotes") from None
+    if data is not None and not isinstance(data, dict):
+        raise UserError(f"{path}: expected lines such as 'theme: ddenv-light'; 'ddenv config --example' prints some")
+    return data or {}
+
+
+def _wanted(keys: Any, path: Path) -> dict[str, str]:
+    """What the section `keys` says, as text."""
+    if keys is None:
+        return {}
+    if not isinstance(keys, dict):
+        raise UserError(f"{path}: keys: expected lines such as 'run.pause: p'; found {keys!r}")
+    for id, value in keys.items():
+        # A digit is a number in YAML, and a key here.
+        if not isinstance(value, str) and (isinstance(value, bool) or not isinstance(value, int)):
+            raise UserError(f"{path}: keys: {id}: expected a key such as p, in quotes if it is a sign; found {value!r}")
+    return {str(id): str(value) for id, value in keys.items()}
+
+
+# Before the sections of an example.
+INTRODUCTION = """# Settings of the ddenv workbench: {path}
+# Take away the '# ' in front of a line to change it. '?' and other signs go in quotes.
+
+# {themes}
+# theme: {theme}
+
+# The key of each action. Several keys are separated by commas.
+keys:"""
+
+
+def lines() -> list[str]:
+    """The file, the theme, and every action with its keys. Raises UserError for a file that is wrong."""
+    config, path = read_config(), config_path()
+    chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
+    told = [
+        f"file    {path}{'' if path.exists() else ' (there is none; ddenv config --example prints one)'}",
+        f"theme   {chosen}",
+        f"themes  {', '.join(theme_names())}",
+    ]
+    width = max(len(id) for id in actions())
+    keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}
+    room = max(len(key) for key in keys.values())
+    section = ""
+    for id, action in sorted(actions().items(), key=_place):
+        if section != _section(action):
+            section = _section(action)
+            told.append("")
+        changed = "*" if id in config.keys else " "
+        told.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+    return [*told, "", "* is yours"] if config.keys else told
+
+
+def example_lines() -> list[str]:
+    """A file that changes nothing, with every action as a comment."""
+    begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
+    told = begin.splitlines()
+    section = ""
+    for id, action in sorted(actions().items(), key=_place):
+        if section != _section(action):
+            section = _section(action)
+            told.append(f"  # {section}")
+        told.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
+    return told
+
+
+def _written(keys: str) -> str:
+    return ", ".join(written(key) for key in keys.split(","))
+
+
+def _quoted(keys: str) -> str:
+    """As YAML takes it for text."""
+    return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
+
+
+def _section(action: Action) -> str:
+    return action.id.split(".")[0]
+
+
+def _place(entry: tuple[str, Action]) -> tuple[int, str]:
+    """The app first, then what one sees most."""
+    order = ("app", "setup", "run", "map", "runs")
+    section = _section(entry[1])
+    return (order.index(section) if section in order else len(order), section)

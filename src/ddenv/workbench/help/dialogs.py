@@ -1,0 +1,277 @@
+"""Dialogs above the screens: help, the method, quit, the scene, and choosing a file."""
+
+from __future__ import annotations
+
+import getpass
+import socket
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+from urllib.parse import urlsplit
+
+from rich.style import Style
+from rich.table import Table
+from rich.text import Text, TextType
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.screen import ModalScreen, Screen
+from textual.widgets import Button, DirectoryTree, Input, Static
+
+from ddenv.errors import shortened
+from ddenv.workbench.help.shortcuts import Group, groups
+from ddenv.workbench.run.processes import Scene
+from ddenv.workbench.setup.beginnings import is_file
+from ddenv.workbench.wording import plain
+
+if TYPE_CHECKING:
+    from ddenv.schemas import Kind
+
+SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
+
+
+class Help(ModalScreen[None]):
+    """Every key with what it does: those of the focused pane first."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
+    ]
+
+    def __init__(self, keys: Iterable[tuple[str, str]] = (), groups: Iterable[Group] = ()) -> None:
+        """`keys` are (key, what it does), for those that no binding tells of."""
+        super().__init__()
+        self._keys, self._groups = tuple(keys), tuple(groups)
+
+    @classmethod
+    def of(cls, screen: Screen) -> Help:
+        """The help for a screen as it is now."""
+        return cls(groups=groups(screen))
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Keys"
+            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
+            with VerticalScroll():
+                yield Static(self._table(), markup=False)
+
+    def _table(self) -> Table:
+        table = Table.grid(padding=(0, 2))
+        table.add_column(justify="right", style="bold", max_width=24)
+        table.add_column(overflow="fold")
+        for group in self._groups:
+            if table.row_count:
+                table.add_row()
+            table.add_row("", Text(group.title, "bold underline"))
+            for shortcut in group.shortcuts:
+                table.add_row(Text(shortcut.keys), Text(shortcut.words))
+            for hint in group.hints:
+                table.add_row("", Text(hint))
+        for key, what in self._keys:
+            table.add_row(Text(key), Text(what))
+        return table
+
+
+class Method(ModalScreen[None]):
+    """What a run is reduced by, each with its explanation."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("escape,e,q,enter", "dismiss", "close", id="method.close", tooltip="close this dialog"),
+    ]
+
+    def __init__(self, algorithm: str, pair: str) -> None:
+        super().__init__()
+        self._algorithm, self._pair = algorithm, pair
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "How this run is reduced"
+            dialog.border_subtitle = "escape closes"
+            with VerticalScroll():
+                yield Static(self._words(), markup=False)
+
+    def _words(self) -> Text:
+        from ddenv.workbench.run.methods import chosen
+
+        names = chosen(self._algorithm, self._pair)
+        return Text("\n\n").join(self._paragraph(kind, name) for kind, name in names.items())
+
+    def _paragraph(self, kind: Kind, name: str) -> Text:
+        from ddenv.workbench.run.methods import note, paragraph
+
+        text = Text(f"{kind} ").append(plain(name), "bold").append("\n")
+        unused = note(kind, self._algorithm)
+        if unused:
+            text.append(unused, "bold").append(" ")
+        return text.append(paragraph(kind, name))
+
+
+class Quit(ModalScreen[str]):
+    """What becomes of the engine: "stop", "leave" or "cancel"."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("s", "answer('stop')", "stop the engine", id="quit.stop", tooltip="stop the engine and leave"),
+        Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave, the engine goes on"),
+        Binding("escape,c", "answer('cancel')", "cancel", id="quit.cancel", tooltip="stay here"),
+        Binding("left", "app.focus_previous", show=False, id="quit.previous", tooltip="previous button"),
+        Binding("right", "app.focus_next", show=False, id="quit.next", tooltip="next button"),
+    ]
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Quit"
+            dialog.border_subtitle = "l let it run on   s stop   c cancel"
+            yield Static("The engine works on this run in a process of its own.", markup=False)
+            with Horizontal(classes="buttons"):
+                yield Button("Let it run on", id="leave", variant="primary")
+                yield Button("Stop the engine", id="stop", variant="warning")
+                yield Button("Cancel", id="cancel")
+
+    def on_button_pressed(self, event: Button.Pressed) -> None:
+        self.dismiss(event.button.id or "cancel")
+
+    def action_answer(self, answer: str) -> None:
+        self.dismiss(answer)
+
+
+class SceneDialog(ModalScreen[None]):
+    """The scene's address, and how to reach it over SSH."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("c", "copy", "copy the address", id="scene.copy", tooltip="copy the address to the clipboard (OSC 52)"),
+        Binding("s", "copy_ssh", "copy the ssh line", id="scene.ssh", tooltip="copy the ssh line to the clipboard"),
+        Binding("x", "stop", "stop the scene", id="scene.stop", tooltip="end the scene's process"),
+        Binding("escape,m,enter", "dismiss", "close", id="scene.close", tooltip="close; the scene stays on"),
+    ]
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__()
+        self._scene = scene
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Scene in 3-D"
+            dialog.border_subtitle = "c copy address   s copy ssh line   x stop   escape close"
+            yield Static("", id="address", markup=False)
+
+    def on_mount(self) -> None:
+        self.refresh_address()
+
+    def refresh_address(self) -> None:
+        """Shows what is known of the scene now."""
+        self.query_one("#address", Static).update(self._words())
+
+    def _words(self) -> Text:
+        if self._scene.trouble:
+            return Text(self._scene.trouble, Style.parse(self.app.theme_variables["text-error"]))
+        url = self._scene.url
+        if not url:
+            return Text("The scene starts ...", "dim")
+        text = Text("Open in a browser on this machine:\n\n  ")
+        text.append(url, Style(bold=True, underline=True, link=url))
+        text.append("\n\nFrom another machine, first type there:\n\n  ")
+        return text.append(ssh_line(url), "bold").append("\n\nand open the same address.")
+
+    def action_copy(self) -> None:
+        self._copy(self._scene.url, "address")
+
+    def action_copy_ssh(self) -> None:
+        self._copy(ssh_line(self._scene.url) if self._scene.url else "", "ssh line")
+
+    def _copy(self, text: str, what: str) -> None:
+        if text:
+            self.app.copy_to_clipboard(text)
+            self.notify(f"{what} copied, if the terminal allows it", timeout=3)
+        else:
+            self.notify("the scene has no address yet", severity="warning", timeout=3)
+
+    def action_stop(self) -> None:
+        self._scene.stop()
+        self.dismiss()
+
+
+def ssh_line(url: str) -> str:
+    """The command that makes the scene of this machine reachable from another one."""
+    port = urlsplit(url).port
+    return f"ssh -L {port}:127.0.0.1:{port} {getpass.getuser()}@{socket.gethostname()}"
+
+
+class WorldTree(DirectoryTree):
+    """Folders, and files that may hold a scenario or a world."""
+
+    ICON_NODE_EXPANDED = "▾ "
+    ICON_NODE = "▸ "
+    ICON_FILE = "  "
+
+    def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
+        return [path for path in paths if not path.name.startswith(".") and (_is_folder(path) or _fits(path))]
+
+    def process_label(self, label: TextType) -> Text:
+        return Text(plain(label))
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def _fits(path: Path) -> bool:
+    return path.suffix.lower() in SUFFIXES
+
+
+class OpenFile(ModalScreen[Path | None]):
+    """Asks for a scenario or world file."""
+
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="open.cancel", tooltip="choose no file")]
+
+    def __init__(self, folder: Path, check: Callable[[Path], str] | None = None) -> None:
+        super().__init__()
+        self._folder, self._check = folder, check or complain_about
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog tall") as dialog:
+            dialog.border_title = "Open a scenario (.yaml) or a world (.sdf, .world)"
+            dialog.border_subtitle = "enter opens   escape cancels"
+            yield Input(placeholder="path of a file", id="path", compact=True)
+            yield Static("", id="wrong", markup=False)
+            yield WorldTree(self._folder, id="tree")
+
+    @on(DirectoryTree.FileSelected)
+    def _chosen(self, event: DirectoryTree.FileSelected) -> None:
+        self._take(event.path)
+
+    @on(Input.Submitted)
+    def _typed(self, event: Input.Submitted) -> None:
+        path = Path(event.value.strip())
+        with suppress(RuntimeError):
+            # Nobody knows every user's home; then the path as it is does not exist.
+            path = path.expanduser()
+        self._take(path)
+
+    def _take(self, path: Path) -> None:
+        wrong = self._check(path)
+        self.query_one("#wrong", Static).update(Text(shortened(plain(wrong))))
+        if not wrong:
+            self.dismiss(path)
+
+    def action_cancel(self) -> None:
+        self.dismiss(None)
+
+
+def complain_about(path: Path) -> str:
+    """Why a path cannot be opened, or nothing."""
+    if not str(path) or path == Path():
+        return "give the path of a file"
+    if _is_folder(path):
+        return f"{path}: is a folder; expected a file"
+    if not is_file(path):
+        return f"{path}: no such file"
+    return "" if _fits(path) else f"{path.name}: expected a name that ends in {', '.join(SUFFIXES)}"

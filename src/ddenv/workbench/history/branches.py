@@ -1,0 +1,76 @@
+"""The tree of a run's reductions as lines: the way to where the run is goes straight down, other branches leave it to the right."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ddenv.runfile.state import Node
+
+HERE, MINIMAL, REJECTED, OTHER = "●", "◆", "✗", "○"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A node with the lines before it."""
+
+    lines: str
+    node: Node
+
+
+def rows(nodes: Sequence[Node], here: int) -> list[Row]:
+    """All nodes, parents before children."""
+    children: dict[int, list[int]] = defaultdict(list)
+    for node in nodes:
+        if node.parent is not None:
+            children[node.parent].append(node.number)
+    way = set(path(nodes, here))
+    found: list[Row] = []
+    # What is still to be drawn: a branch's first node, and what stands before its lines.
+    todo = [(0, "", "")] if nodes else []
+    while todo:
+        number, before, fork = todo.pop()
+        found.append(Row(f"{before}{fork}", nodes[number]))
+        after = before + ("│ " if fork else "")
+        straight = _straight(children[number], way)
+        if straight is not None:
+            todo.append((straight, after, ""))
+        sides = [child for child in children[number] if child != straight]
+        # The first of them is drawn last: above what was made later.
+        todo += [(child, after, "├─") for child in reversed(sides)]
+    return found
+
+
+def path(nodes: Sequence[Node], number: int) -> list[int]:
+    """The nodes from the whole world to one of them, both included."""
+    found: list[int] = []
+    step: int | None = number if nodes else None
+    while step is not None and len(found) < len(nodes):
+        found.append(step)
+        step = nodes[step].parent
+    return found[::-1]
+
+
+def sign(node: Node, here: int) -> str:
+    """What a node is, in one character."""
+    if node.number == here:
+        return HERE
+    if node.rejected:
+        return REJECTED
+    return MINIMAL if node.minimal else OTHER
+
+
+def words(node: Node, here: int) -> str:
+    """What a node is, in words."""
+    told = ["here"] if node.number == here else []
+    if node.minimal:
+        told.append("minimal")
+    if node.rejected:
+        told.append("taken back")
+    return ", ".join(told)
+
+
+def _straight(children: Sequence[int], way: set[int]) -> int | None:
+    """The child that goes on straight down: the one on the way to where the run is, or else the latest."""
+    return next((child for child in children if child in way), children[-1] if children else None)

@@ -1,0 +1,96 @@
+"""Two environments of a run side by side: what they share, and in what they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from ddenv.map.names import shortened
+from ddenv.runfile.state import Node, RunState
+from ddenv.workbench.history import branches
+from ddenv.workbench.map.world_map import Place, WorldMap
+from ddenv.workbench.run import guiding
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.widgets.lines import Lines
+from ddenv.workbench.wording import count, plain
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Models' names in the order of the world file."""
+
+    common: tuple[str, ...]
+    only_first: tuple[str, ...]
+    only_second: tuple[str, ...]
+
+
+def compare(first: Node, second: Node) -> Comparison:
+    """Both environments, model by model."""
+    left, right = frozenset(first.environment), frozenset(second.environment)
+    return Comparison(
+        common=tuple(name for name in first.environment if name in right),
+        only_first=tuple(name for name in first.environment if name not in right),
+        only_second=tuple(name for name in second.environment if name not in left),
+    )
+
+
+class Compare(ModalScreen[None]):
+    """Facts, maps where there is room, and the models: those of both, and those of one alone."""
+
+    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
+    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-small"), (110, "-large")]
+    AUTO_FOCUS = "Lines"
+    BINDINGS: ClassVar = [
+        Binding("escape,c,q,enter", "dismiss", "close", id="compare.close", tooltip="back to the history"),
+    ]
+
+    def __init__(self, first: Node, second: Node, state: RunState, place: Place) -> None:
+        super().__init__()
+        self._sides = (first, second)
+        self._state, self._place = state, place
+
+    def compose(self) -> ComposeResult:
+        found = compare(*self._sides)
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Two environments side by side"
+            dialog.border_subtitle = "tab to the lists   escape closes"
+            with Horizontal(classes="sides"):
+                for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+                    with Vertical(classes="side"):
+                        yield Static(self._facts(name, node), classes="facts", markup=False)
+                        yield WorldMap(id=f"map-{name}")
+                        yield Static(_heading(f"only in {name}", alone), classes="facts", markup=False)
+                        yield Lines(_name, nothing="none", id=f"only-{name}")
+            yield Static(_heading("in both", found.common), classes="facts", markup=False)
+            yield Lines(_name, nothing="none", id="common")
+
+    def on_mount(self) -> None:
+        found = compare(*self._sides)
+        for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+            self.query_one(f"#only-{name}", Lines).show(alone)
+            world = self.query_one(f"#map-{name}", WorldMap)
+            world.set_place(self._place)
+            world.show(Snapshot(self._state.changed(environment=node.environment, round=None, trials=())), None)
+        self.query_one("#common", Lines).show(found.common)
+
+    def _facts(self, name: str, node: Node) -> Text:
+        told = branches.words(node, self._state.node)
+        text = Text(f"{name}  {guiding.place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
+        after = f"\nafter {count(node.tests, 'test')}"
+        return text.append(after + (f"; {told}" if told else ""), "not bold dim")
+
+
+def _heading(what: str, names: Sequence[str]) -> Text:
+    return Text(f"{what}: {count(len(names), 'model')}", "bold")
+
+
+def _name(name: str, width: int) -> Text:
+    return Text(f"  {shortened(name, max(4, width - 2))}", no_wrap=True)

@@ -1,0 +1,246 @@
+"""The history of a run: the tree of its reductions, and the user's decisions beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from textwrap import wrap
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.screen import Screen
+from textual.widgets import DataTable, Static
+
+from ddenv.errors import UserError
+from ddenv.runfile.state import Decision, Node
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.history import branches
+from ddenv.workbench.history.compare import Compare
+from ddenv.workbench.map.world_map import Place
+from ddenv.workbench.run import guiding
+from ddenv.workbench.run.log import decision_line
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.widgets.footer import KeyFooter
+from ddenv.workbench.widgets.lines import Lines
+from ddenv.workbench.wording import count, plain, shorten
+
+# How often the run is looked at, s.
+PERIOD = 0.5
+# Name and width of the tree's columns behind the tree itself; the last is for wide terminals.
+COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("", 22), ("method", 36))
+ROOM = 90
+# Of the tree so many columns, besides the lines of its branches.
+TREE = 15
+MARK = "marked"
+# Where the words of a decision begin, behind its time.
+INDENT = 10
+
+
+class Tree(DataTable):
+    """With a cursor of whole rows, home and end mean the first and the last of them."""
+
+    def action_scroll_home(self) -> None:
+        self.action_scroll_top()
+
+    def action_scroll_end(self) -> None:
+        self.action_scroll_bottom()
+
+
+class History(Screen[int | None]):
+    """The node to go on from, or None. It follows the run while it is open."""
+
+    CSS_PATH: ClassVar = ["history.tcss"]
+    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
+    BINDINGS: ClassVar = [
+        Binding(
+            "enter",
+            "go",
+            "go on from here",
+            id="history.go",
+            tooltip="go back to this environment, or on to it: the run pauses there (branch)",
+            priority=True,
+        ),
+        Binding("m", "mark", "mark", id="history.mark", tooltip="mark this environment, to compare another with it"),
+        Binding(
+            "c", "compare", "compare", id="history.compare", tooltip="compare the marked environment with this one"
+        ),
+        Binding("question_mark,f1", "app.help", "help", id="history.help", tooltip="show every key", key_display="?"),
+        Binding("escape,h,q", "close", "close", id="history.close", tooltip="back to the run", key_display="esc"),
+    ]
+
+    def __init__(self, look: Callable[[], Snapshot], place: Place, *, may_go: bool = True) -> None:
+        """`look` gives the run as it is now. Without `may_go` it is only looked at."""
+        super().__init__()
+        self._look_at, self._place, self._may_go = look, place, may_go
+        self._tree: tuple[Node, ...] = ()
+        self._here = -1
+        self._rows: list[branches.Row] = []
+        self._marked: int | None = None
+        self._decided: tuple[tuple[Decision, ...], int] = ((), 0)
+
+    def compose(self) -> ComposeResult:
+        with Horizontal(id="both"):
+            with Vertical(id="tree-panel", classes="panel") as panel:
+                panel.border_title = "Reductions"
+                yield Tree(id="tree", cursor_type="row", cell_padding=1)
+            with Vertical(id="past-decisions", classes="panel") as panel:
+                panel.border_title = "What you decided"
+                yield Lines(_as_it_is, nothing="nothing was decided by hand yet", tail=True, id="decisions")
+        yield Static("", id="about", markup=False)
+        shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
+        yield KeyFooter(shown, shown)
+
+    def on_mount(self) -> None:
+        self.query_one(Tree).focus()
+        self.set_interval(PERIOD, self._look)
+
+    # What is shown.
+
+    def _look(self) -> None:
+        state = self._look_at().state
+        self._show_decisions(state.decisions)
+        if (state.nodes, state.node) != (self._tree, self._here):
+            at = self.under_cursor
+            followed = at is None or at.number == self._here
+            self._tree, self._here = state.nodes, state.node
+            self._rows = branches.rows(state.nodes, state.node)
+            self._fill(self._here if followed else at.number)
+
+    def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
+        """Whole: this is where they are read."""
+        lines = self.query_one(Lines)
+        made_of = decisions, lines.scrollable_content_region.width
+        if made_of != self._decided and made_of[1] > 0:
+            at_end = lines.scroll_offset.y >= lines.max_scroll_y or not self._decided[1]
+            self._decided = made_of
+            lines.show([line for each in decisions for line in decision_lines(each, made_of[1])])
+            if at_end:
+                lines.call_after_refresh(lines.scroll_end, animate=False)
+
+    def _fill(self, cursor: int) -> None:
+        table = self.query_one(Tree)
+        table.clear(columns=True)
+        branched = max((len(row.lines) for row in self._rows), default=0)
+        table.add_column("environment", width=TREE + min(branched, 20))
+        for name, width in COLUMNS if table.size.width >= ROOM else COLUMNS[:-1]:
+            table.add_column(Text(name, justify=_side(name)), width=width)
+        for row in self._rows:
+            table.add_row(*self._cells(row)[: len(table.columns)])
+        place = next((place for place, row in enumerate(self._rows) if row.node.number == cursor), 0)
+        table.move_cursor(row=place)
+        self._tell()
+
+    def _cells(self, row: branches.Row) -> tuple[Text, ...]:
+        node = row.node
+        here = node.number == self._here
+        style = "bold" if here else "dim" if node.rejected else ""
+        sign = branches.sign(node, self._here)
+        size = len(node.environment)
+        marked = MARK if node.number == self._marked else ""
+        told = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
+        texts = (str(node.number), plain(node.what), str(node.tests), told, plain(node.method))
+        cells = (
+            Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
+        )
+        return Text(f"{row.lines}{sign} {count(size, 'model')}", style, no_wrap=True), *cells
+
+    @property
+    def under_cursor(self) -> Node | None:
+        row = self.query_one(Tree).cursor_row
+        return self._rows[row].node if 0 <= row < len(self._rows) else None
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._arrange)
+
+    def _arrange(self) -> None:
+        """Makes table and lines for the room that there is."""
+        self._show_decisions(self._look_at().state.decisions)
+        at = self.under_cursor
+        if at is None:
+            self._look()
+        else:
+            self._fill(at.number)
+
+    def on_data_table_row_highlighted(self) -> None:
+        self._tell()
+
+    def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
+        event.stop()
+
+    def _tell(self) -> None:
+        node = self.under_cursor
+        if node is None:
+            return
+        names = guiding.first_of([plain(shorten(name, 40)) for name in node.environment], 12)
+        how = HOW.get(node.how, node.how)
+        text = Text(f"{guiding.place(node)}: {how}", "bold", no_wrap=True)
+        text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
+        text.append(f"\n{names or 'no models'}", "not bold dim")
+        self.query_one("#about", Static).update(text)
+
+    # What is done.
+
+    def action_go(self) -> None:
+        node = self.under_cursor
+        if node is None:
+            return
+        if not self._may_go:
+            self._refuse("watching only: open the run without --watch to go on from here")
+            return
+        try:
+            question = guiding.go_back(self._look_at().state, node.number).question
+        except UserError as error:
+            self._refuse(str(error))
+            return
+        self.app.push_screen(Question(question), lambda yes: self.dismiss(node.number) if yes else None)
+
+    def action_mark(self) -> None:
+        node = self.under_cursor
+        if node is None:
+            return
+        self._marked = None if self._marked == node.number else node.number
+        self._fill(node.number)
+        if self._marked is not None:
+            self.notify("marked; c compares another one with it", timeout=3)
+
+    def action_compare(self) -> None:
+        node = self.under_cursor
+        if node is None or self._marked is None:
+            self._refuse("mark one environment first (m), then move to another and press c")
+        elif node.number == self._marked:
+            self._refuse("this one is marked: move to another to compare it with")
+        else:
+            first = self._tree[self._marked]
+            self.app.push_screen(Compare(first, node, self._look_at().state, self._place))
+
+    def action_close(self) -> None:
+        self.dismiss(None)
+
+    def _refuse(self, why: str) -> None:
+        self.notify(why, severity="warning", timeout=4, markup=False)
+
+
+def decision_lines(decision: Decision, width: int) -> list[Text]:
+    """A decision with its time of day, in lines that fit."""
+    first, *rest = wrap(plain(decision.words), max(width - INDENT, 12)) or [""]
+    lines = [decision_line(replace(decision, words=first), width)]
+    return lines + [Text(" " * INDENT + line) for line in rest]
+
+
+def _as_it_is(line: Text, width: int) -> Text:
+    return line.copy()
+
+
+def _side(name: str) -> str:
+    return "right" if name in ("#", "tests") else "left"
+
+
+HOW = {
+    "start": "where the run began",
+    "reduced": "reduced to what shows f",
+    "adopted": "a try by hand that showed f",
+    "accepted": "another failure, taken for as good as f",
+}

@@ -1,0 +1,206 @@
+"""How each model is drawn on the map: its part of the environment, and whether it is kept, left out, removed or protected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from ddenv.map import arrays as np
+from ddenv.map.cells import Signs
+from ddenv.map.paint import RGB, Canvas
+from ddenv.map.raster import EMPTY
+from ddenv.runfile.state import Candidate, RunState, partition_letter
+from ddenv.workbench.map.map_colors import (
+    FLOOR,
+    FLOOR_OUT,
+    KEPT,
+    LEFT_OUT,
+    MANY,
+    PATTERNS,
+    PINNED,
+    PROTECTED,
+    REMOVED,
+    SELECTED,
+    Palette,
+    Tone,
+    mixed,
+)
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
+
+GONE = ord("·")
+# A model so many times larger than the median is a floor that others stand on.
+FLOOR_FACTOR = 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """One entry per footprint: `kinds` (KEPT ... SELECTED), `tones` as indices into `looks`, and what stands on it in `signs`."""
+
+    kinds: np.ndarray
+    tones: np.ndarray
+    looks: tuple[Tone, ...]
+    palette: Palette
+    signs: Signs
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """What stands on each model, "" for nothing."""
+        return self.signs.texts
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Who is in the environment, and the number of each model's part; `shown` are the models of the candidate looked at."""
+
+    elements: frozenset[str] = frozenset()
+    environment: frozenset[str] = frozenset()
+    shown: frozenset[str] | None = None
+    parts: dict[str, int] = field(default_factory=dict)
+    pinned: frozenset[str] = frozenset()
+    selected: frozenset[str] = frozenset()
+    sensed: dict[str, int] = field(default_factory=dict)
+
+
+def kept(state: RunState, candidate: Candidate | None) -> Kept:
+    """What the map needs of a run's state; `candidate` may be the user's own trial, too."""
+    partitions = state.round.partitions if state.round else ()
+    parts = {name: index for index, part in enumerate(partitions) for name in part}
+    shown = frozenset(candidate.models) if candidate else None
+    return Kept(frozenset(state.elements), frozenset(state.environment), shown, parts, state.pinned)
+
+
+def looks(prints: Sequence[Footprint], who: Kept, back: RGB, fore: RGB, palette: Palette | None = None) -> Looks:
+    """The looks of all models on a background `back` with text colour `fore`, or in a `palette`."""
+    palette = palette or mixed(back, fore)
+    names, floor = _known(tuple(prints))
+    kinds = _kinds(names, floor, who)
+    parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
+    # Few of many parts look different, and only those are mixed.
+    short = np.where(parts < 0, -1, parts % palette.tones)
+    found, tones = np.unique(kinds * (palette.tones + 1) + short + 1, return_inverse=True)
+    mixes = [divmod(value, palette.tones + 1) for value in found.tolist()]
+    alike = tuple(palette.tone(kind, part - 1) for kind, part in mixes)
+    return Looks(kinds, tones.astype(np.int32), alike, palette, _signs(names, kinds, parts, who))
+
+
+@lru_cache(maxsize=4)
+def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
+    """The names of models, and which are floors: what stays the same in all rounds."""
+    areas = np.array([each.area for each in prints])
+    return [each.name for each in prints], areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
+
+
+def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
+    """A letter for each model of a part, with its number in the order of sensing if that is shown."""
+    groups = kinds * (int(parts.max(initial=-1)) + 2) + parts + 1
+    found, which = np.unique(groups, return_inverse=True)
+    letters = [_label(*divmod(value, int(parts.max(initial=-1)) + 2)) for value in found.tolist()]
+    texts = [letters[number] for number in which.tolist()]
+    rank = np.zeros(len(names))
+    if who.sensed:
+        order = [who.sensed.get(name, 0) for name in names]
+        rank = np.where(np.array(order) > 0, order, math.inf)
+        texts = [f"{text}{number}" if number else text for text, number in zip(texts, order, strict=True)]
+    return Signs(texts, groups, rank, np.isin(kinds, (PINNED, SELECTED)))
+
+
+def _label(kind: int, part: int) -> str:
+    """The sign of a model of part 1, 2, ... or of none: 0."""
+    if kind in (PROTECTED, PINNED, REMOVED):
+        return {PROTECTED: "#", PINNED: "+", REMOVED: ""}[kind]
+    letter = partition_letter(part - 1) if part else ""
+    if kind == SELECTED:
+        return f"*{letter}"
+    return letter.lower() if kind in (LEFT_OUT, FLOOR_OUT) else letter
+
+
+def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
+    """What each model is; of several the last one in this order counts."""
+    kinds = np.where(floor, FLOOR, KEPT)
+    if who.shown is not None:
+        out = ~_among(names, who.shown)
+        kinds[out] = np.where(floor, FLOOR_OUT, LEFT_OUT)[out]
+    kinds[_among(names, who.pinned)] = PINNED
+    kinds[_among(names, who.selected)] = SELECTED
+    kinds[~_among(names, who.environment)] = REMOVED
+    kinds[~_among(names, who.elements)] = PROTECTED
+    return kinds
+
+
+def _among(names: Sequence[str], those: frozenset[str]) -> np.ndarray:
+    if not those:
+        return np.zeros(len(names), dtype=bool)
+    return np.fromiter(map(those.__contains__, names), dtype=bool, count=len(names))
+
+
+def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
+    """Draws the models of an owner grid (two pixels a cell) as half blocks, with seams between those that look alike."""
+    if not len(how.kinds) or not canvas.back.size:
+        return
+    # The last entry of each stands for EMPTY, which is -1.
+    assert EMPTY == -1
+    ground = how.palette.back
+    tone = np.append(how.tones, len(how.looks))
+    fills = np.array([*(each.fill for each in how.looks), ground], dtype=np.int32)
+    inks = np.array([*(each.ink for each in how.looks), ground], dtype=np.int32)
+    glyphs = np.array([ord(char) for char in (*(each.glyph for each in how.looks), " ")], dtype=np.uint32)
+    halves = np.array([*(each.halves for each in how.looks), True])
+    top, bottom = grid[0::2], grid[1::2]
+    upper, lower = tone[top], tone[bottom]
+    # What has no half takes the whole cell; the model that is drawn later wins.
+    whole = (upper == lower) | ~halves[upper] | ~halves[lower]
+    upper = np.where(whole, tone[np.maximum(top, bottom)], upper)
+    canvas.chars[:] = np.where(whole, glyphs[upper], ord("▀"))
+    canvas.fore[:] = np.where(whole, inks[upper], fills[upper])
+    canvas.back[:] = np.where(whole, fills[upper], fills[lower])
+    # The terminal's own colour can only be behind a block.
+    under = ~whole & (top == EMPTY)
+    canvas.chars[under], canvas.fore[under], canvas.back[under] = ord("▄"), fills[lower[under]], ground
+    _seams(canvas, grid, tone, how)
+
+
+def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
+    """Lines between neighbours that look alike and are not one model."""
+    pixels, many = tone[grid], how.palette.colors == MANY
+    beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
+    beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])
+    above[1:] = (pixels[:-1] == pixels[1:]) & (grid[:-1] != grid[1:])
+    solid = np.array([*(each.halves and each.glyph != " " for each in how.looks), False])
+    seams = np.array([*(each.seam for each in how.looks), 0], dtype=np.int32)
+    fills = np.array([*(each.fill for each in how.looks), 0], dtype=np.int32)
+    upper, lower = pixels[0::2], pixels[1::2]
+    full = solid[upper] & (upper == lower)
+    # Behind a full block nothing is seen: with one style for all, a row is few pieces of text.
+    block = full & (canvas.chars == ord("█"))
+    canvas.back[block] = seams[upper[block]]
+    for where, fine, coarse in ((above[0::2], "▇", "▄"), (beside[0::2] | beside[1::2], "▉", "▌")):
+        canvas.chars[where & block] = ord(fine if many else coarse)
+    halved = full & above[1::2] if many else np.zeros_like(full)
+    canvas.chars[halved] = ord("─")
+    canvas.fore[halved], canvas.back[halved] = seams[upper[halved]], fills[upper[halved]]
+    # Of dithered models, those that are kept or left out.
+    dithered = np.isin(canvas.chars, [ord(char) for char in PATTERNS[1:] + ("" if many else "▒")])
+    for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
+        canvas.chars[where & dithered] = ord(line)
+    for half, quarter, sides in (("▀", "▘", beside[0::2]), ("▄", "▖", beside[1::2])):
+        canvas.chars[(canvas.chars == ord(half)) & sides & ~full] = ord(quarter)
+
+
+def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:
+    """Dots where removed models stood: `removed` is their owner grid. They hide nothing that is kept, but floors.
+
+    Which cells they are in, shape (rows, columns).
+    """
+    if not len(how.kinds):
+        return np.zeros(canvas.chars.shape, dtype=bool)
+    solid = np.append(~np.isin(how.kinds, (FLOOR, FLOOR_OUT, PROTECTED, REMOVED)), False)
+    gone = np.maximum(removed[0::2], removed[1::2]) != EMPTY
+    gone &= ~solid[grid[0::2]] & ~solid[grid[1::2]]
+    canvas.chars[gone] = GONE
+    canvas.fore[gone] = color
+    return gone

@@ -1,0 +1,1 @@
+"""The run screen: one run, watched and guided."""

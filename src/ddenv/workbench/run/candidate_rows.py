@@ -1,0 +1,173 @@
+"""The rows of the table beside the map, in words: trials and candidates, or the baseline's runs, or the full runs at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+from ddenv.map.names import shortened
+from ddenv.runfile.settings import settings
+from ddenv.runfile.state import Candidate, Test, Trial
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain
+
+# Of a model's name so many columns, behind a sign and a space.
+NAME = 8
+# So many judged trials stay in the table, the latest.
+TRIALS = 3
+SIGNS = ("similar", "other", "pass", "error", "timeout", "failed")
+
+Item = Trial | Candidate | Test
+Words = dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """`width` in cells, with the space before it. The greater `spare`, the sooner it is left out; 0 always stays."""
+
+    name: str
+    width: int
+    right: bool = False
+    spare: int = 0
+
+
+# The verdict gets all the width that is left.
+COLUMNS = (
+    Column("#", 2),
+    Column("candidate", 11),
+    Column("models", 7, right=True),
+    Column("distance", 9, right=True, spare=4),
+    Column("tests", 6, right=True),
+    Column("evidence", 10, spare=1),
+    Column("to f", 7, right=True, spare=3),
+    Column("time", 8, right=True, spare=2),
+    Column("verdict", 14),
+)
+# What runs of the whole world and of what is left have no words for.
+OF_CANDIDATES = ("distance", "evidence")
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """What the table lists: `of` names it, `trials` stand above the `rest`."""
+
+    of: tuple = ()
+    trials: Sequence[Trial] = ()
+    rest: Sequence[Candidate | Test] = ()
+
+    def __len__(self) -> int:
+        return len(self.trials) + len(self.rest)
+
+    def item(self, row: int) -> Item | None:
+        """What stands in a row; None if there is no such row."""
+        if not 0 <= row < len(self):
+            return None
+        return self.trials[row] if row < len(self.trials) else self.rest[row - len(self.trials)]
+
+    def row(self, item: Trial | Candidate) -> int | None:
+        """The row of a trial or of a candidate of the round."""
+        if isinstance(item, Candidate):
+            return len(self.trials) + item.index
+        return next((row for row, each in enumerate(self.trials) if each.number == item.number), None)
+
+
+def listed(snapshot: Snapshot) -> Listed:
+    """What there is to list now."""
+    state = snapshot.state
+    if state.confirming and not state.ended:
+        return Listed(("confirm",), (), state.confirm_tests)
+    here = [trial for trial in state.trials if trial.node == state.node]
+    judged = {trial.number for trial in [trial for trial in here if trial.verdict][-TRIALS:]}
+    trials = tuple(trial for trial in here if not trial.verdict or trial.number in judged)
+    if state.round is not None:
+        return Listed(("round", state.node, state.round.number), trials, state.round.candidates)
+    return Listed(("baseline",), trials, tuple(takewhile(lambda test: test.phase == "baseline", state.tests)))
+
+
+def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, ...]:
+    """The columns that have room in so many cells, each with its width; `narrow` leaves out all that can be."""
+    first = listing.rest[0] if listing.rest else None
+    unused = () if isinstance(first, Candidate) else OF_CANDIDATES
+    if isinstance(first, Candidate) and first.distance is None:
+        unused = ("distance",)
+    columns = [each for each in COLUMNS if each.name not in unused and not (narrow and each.spare)]
+    number = Column("#", max(2, len(str(len(listing.rest)))))
+    while (over := number.width - 2 + sum(each.width for each in columns) - width) > 0:
+        most = max(columns, key=lambda each: each.spare)
+        if not most.spare:
+            break
+        columns.remove(most)
+    rest = max(0, -over)
+    return (number, *columns[1:-1], Column("verdict", columns[-1].width + rest))
+
+
+def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
+    """The words of a row by column."""
+    item = listing.item(row)
+    if item is None:
+        return {}
+    if isinstance(item, Test):
+        return _run(snapshot, item, row + 1 - len(listing.trials))
+    tests = [snapshot.state.tests[id - 1] for id in item.tests if 0 < id <= len(snapshot.state.tests)]
+    done = [test for test in tests if test.is_finished]
+    running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
+    distances = [test.distance for test in done if test.distance is not None]
+    seconds = sum(test.wall_seconds for test in done)
+    candidate = isinstance(item, Candidate)
+    return {
+        "#": str(item.index + 1) if candidate else "",
+        "candidate": item.label,
+        "models": str(item.size),
+        "distance": metres(item.distance) if candidate else "",
+        "tests": f"{len(done)}/{1 + settings(snapshot.state).iterations}" if done or running else "",
+        "evidence": _evidence(done),
+        "to f": metres(min(distances)) if distances else "",
+        "time": brief(seconds) if done else "",
+        "verdict": _verdict(snapshot, item, tests),
+    }
+
+
+def _evidence(tests: Sequence[Test]) -> str:
+    """How tests ended, in signs with their counts."""
+    outcomes = [test.outcome for test in tests]
+    counts = [f"{outcomes.count(name)}{OUTCOME[name][0]}" for name in SIGNS if name in outcomes]
+    spaced = " ".join(counts)
+    return spaced if len(spaced) < 9 else "".join(counts)
+
+
+def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test]) -> str:
+    state = snapshot.state
+    if isinstance(item, Trial) and item.verdict == "similar" and not state.ended:
+        return "● adopted" if item.adopted else "● a adopts it"
+    if isinstance(item, Candidate) and state.waiting_candidate == item.index:
+        return "? a or x"
+    if item.verdict:
+        return VERDICT.get(item.verdict, plain(item.verdict))
+    running = [test for test in tests if test.outcome == "running"]
+    if not running or snapshot.engine != "alive":
+        return ""
+    return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
+
+
+def _seconds(snapshot: Snapshot, test: Test) -> str:
+    seconds = snapshot.seconds(test.id)
+    return "" if seconds is None else f" {seconds:.1f} s"
+
+
+def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
+    """One run of the whole world, or of what is left, or of that without one model."""
+    running = test.outcome == "running" and snapshot.engine == "alive"
+    left, name = len(snapshot.state.environment), f"run {test.run + 1}"
+    run = ""
+    if test.phase == "confirm":
+        run, name = name, "all left" if test.without is None else f"- {shortened(test.without, NAME)}"
+    return {
+        "#": str(number),
+        "candidate": name,
+        "models": str(left - (test.without is not None)),
+        "tests": run,
+        "to f": metres(test.distance),
+        "time": brief(test.wall_seconds) if test.is_finished else "",
+        "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),
+    }

@@ -1,0 +1,248 @@
+"""The table of this round's candidates, of the baseline's runs before the first round, or of the full runs after the last."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.cells import cell_len, set_cell_size
+from rich.segment import Segment
+from rich.style import Style
+from rich.text import Text
+from textual import events
+from textual.binding import Binding
+from textual.geometry import Region, Size
+from textual.message import Message
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+from ddenv.runfile.state import Candidate, Test, Trial
+from ddenv.workbench.run.candidate_rows import Column, Listed, Words, fitting, listed, words
+from ddenv.workbench.run.poll import Snapshot
+
+STRONG, WEAK = Style(bold=True), Style(dim=True)
+
+
+def _binding(keys: str, action: str, name: str, tooltip: str) -> Binding:
+    return Binding(keys, action, name, show=False, id=f"candidates.{name}", tooltip=tooltip)
+
+
+class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
+    """Only rows in sight are ever made into text, and only lines that changed are drawn again.
+
+    The cursor follows the run until it is moved by hand.
+    """
+
+    HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long"
+    ALLOW_SELECT = False
+    COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
+    DEFAULT_CSS = """
+    Candidates {
+        background: $background;
+        color: $foreground;
+        scrollbar-size: 1 1;
+        overflow-x: hidden;
+        & > .candidates--header { color: $text-muted; }
+        & > .candidates--cursor { background: $primary 25%; color: $foreground; }
+        &:focus > .candidates--cursor { background: $primary 45%; color: $foreground; }
+        &:nocolor > .candidates--cursor { text-style: underline; }
+        &:nocolor:focus > .candidates--cursor { text-style: reverse; }
+        &:ansi > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: underline; }
+        &:ansi:focus > .candidates--cursor { background: ansi_default; color: ansi_default; text-style: reverse; }
+    }
+    """
+    BINDINGS: ClassVar = [
+        _binding("up", "move(-1)", "up", "the candidate above: the map shows its models"),
+        _binding("down", "move(1)", "down", "the candidate below: the map shows its models"),
+        _binding("pageup", "page(-1)", "page_up", "one page of candidates up"),
+        _binding("pagedown", "page(1)", "page_down", "one page of candidates down"),
+        _binding("home,ctrl+home", "first", "first", "the first candidate"),
+        _binding("end,ctrl+end", "last", "last", "the last candidate"),
+        _binding("enter", "choose", "choose", "stay on this candidate"),
+    ]
+
+    class Chosen(Message):
+        """The cursor was moved by hand, or given back to the run."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self.following = True
+        self.cursor_row = 0
+        self.columns: tuple[Column, ...] = fitting(Listed(), 0)
+        self._snapshot = Snapshot()
+        self._listed = Listed()
+        self._narrow = False
+        self._drawn: dict[int, Words] = {}
+
+    # What is listed.
+
+    @property
+    def row_count(self) -> int:
+        return len(self._listed)
+
+    @property
+    def under_cursor(self) -> Candidate | Trial | None:
+        item = self._listed.item(self.cursor_row)
+        return None if isinstance(item, Test) else item
+
+    @property
+    def chosen(self) -> Candidate | Trial | None:
+        """The candidate or trial that was chosen by hand."""
+        return None if self.following else self.under_cursor
+
+    def get_row_at(self, row: int) -> list[Text]:
+        """The cells of a row, in the order of the columns."""
+        cells = words(self._snapshot, self._listed, row)
+        return [_text(column, cells.get(column.name, "")) for column in self.columns]
+
+    def get_cell(self, key: str, name: str) -> Text:
+        """A cell of the candidate whose index is `key`."""
+        row = len(self._listed.trials) + int(key)
+        return Text(words(self._snapshot, self._listed, row).get(name, ""))
+
+    def set_narrow(self, narrow: bool) -> None:
+        """With little room all columns go that can be spared."""
+        self._narrow = narrow
+        self._arrange()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """The run as it is now."""
+        before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
+        if self._listed.of != before.of:
+            self.following, self.cursor_row = True, 0
+            self.scroll_to(y=0, animate=False, force=True)
+        elif shift := len(self._listed.trials) - len(before.trials):
+            # What is looked at stays where it is.
+            self.cursor_row += shift
+            if self.scroll_offset.y:
+                self.scroll_to(y=self.scroll_offset.y + shift, animate=False, force=True)
+        self.cursor_row = min(self.cursor_row, max(0, len(self._listed) - 1))
+        self._arrange()
+        if self.following and snapshot.focus is not None:
+            self._put(self._listed.row(snapshot.focus))
+        self._redraw()
+
+    def follow(self) -> None:
+        """Gives the cursor back to the run."""
+        self.following = True
+        self.post_message(self.Chosen())
+
+    # Keys and mouse.
+
+    def action_move(self, rows: int) -> None:
+        self._by_hand(self.cursor_row + rows)
+
+    def action_page(self, pages: int) -> None:
+        self._by_hand(self.cursor_row + pages * self._page)
+
+    def action_first(self) -> None:
+        self._by_hand(0)
+
+    def action_last(self) -> None:
+        self._by_hand(len(self._listed) - 1)
+
+    def action_choose(self) -> None:
+        self._by_hand(self.cursor_row)
+
+    def on_click(self, event: events.Click) -> None:
+        row = event.y - 1 + self.scroll_offset.y
+        if event.y > 0 and row < len(self._listed):
+            event.stop()
+            self._by_hand(row)
+
+    def _by_hand(self, row: int) -> None:
+        self.following = False
+        self._put(min(max(row, 0), max(0, len(self._listed) - 1)), reveal=True)
+        self.post_message(self.Chosen())
+
+    # From rows to lines: the first one is the header, and does not scroll.
+
+    @property
+    def _page(self) -> int:
+        return max(1, self.size.height - 1)
+
+    def _in_sight(self, row: int) -> bool:
+        return self.scroll_offset.y <= row < self.scroll_offset.y + self._page
+
+    def _put(self, row: int | None, reveal: bool = False) -> None:
+        """Moves the cursor. The view goes with it, if the cursor was in sight."""
+        if row is None:
+            return
+        reveal = reveal or self._in_sight(self.cursor_row)
+        for each in (self.cursor_row, row) if row != self.cursor_row else ():
+            self._refresh_row(each)
+        self.cursor_row = row
+        if reveal:
+            self._reveal()
+
+    def _reveal(self) -> None:
+        top = self.scroll_offset.y
+        if not self.size.height or self._in_sight(self.cursor_row):
+            return
+        y = self.cursor_row if self.cursor_row < top else self.cursor_row - self._page + 1
+        self.scroll_to(y=y, animate=False, force=True)
+
+    def on_resize(self) -> None:
+        self._arrange()
+        self._reveal()
+
+    def _arrange(self) -> None:
+        """Makes room for the rows and columns."""
+        columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
+        if columns != self.columns:
+            self.columns = columns
+            self.refresh()
+        size = Size(0, len(self._listed) + 1)
+        if size != self.virtual_size:
+            self.virtual_size = size
+            self.refresh()
+
+    def _redraw(self) -> None:
+        top = self.scroll_offset.y
+        rows = range(top, min(top + self._page, len(self._listed)))
+        drawn = {row: words(self._snapshot, self._listed, row) for row in rows}
+        for row, cells in drawn.items():
+            if self._drawn.get(row) != cells:
+                self._refresh_row(row)
+        self._drawn = drawn
+
+    def _refresh_row(self, row: int) -> None:
+        if self._in_sight(row):
+            self.refresh(Region(0, row + 1 - self.scroll_offset.y, self.size.width, 1))
+
+    def render_line(self, y: int) -> Strip:
+        row = y - 1 + self.scroll_offset.y
+        if y == 0:
+            style = self.get_component_rich_style("candidates--header")
+            return self._strip({column.name: column.name for column in self.columns}, style)
+        cells = words(self._snapshot, self._listed, row)
+        if not cells:
+            return Strip.blank(self.size.width, self.rich_style)
+        is_cursor = row == self.cursor_row
+        style = self.get_component_rich_style("candidates--cursor") if is_cursor else self.rich_style
+        return self._strip(cells, style)
+
+    def _strip(self, cells: Words, style: Style) -> Strip:
+        *others, last = self.columns
+        row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
+        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
+        segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
+        return Strip(segments).adjust_cell_length(self.size.width, style)
+
+
+def _aligned(column: Column, text: str) -> str:
+    """As wide as its column, with a space before it but in the first."""
+    if column.right:
+        return " " * (column.width - cell_len(text)) + text
+    before = "" if column.name in ("#", "verdict") else " "
+    room = column.width - len(before)
+    return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
+
+
+def _emphasis(words: str) -> Style:
+    if words.startswith(("●", "▶", "?")):
+        return STRONG
+    return WEAK if words.startswith(("○", "⊘")) else Style.null()
+
+
+def _text(column: Column, words: str) -> Text:
+    return Text(words, _emphasis(words), justify="right" if column.right else "left", no_wrap=True)

@@ -1,0 +1,128 @@
+"""Choosing models by their names: one, or several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from ddenv.map.names import shortened
+from ddenv.workbench.wording import count
+
+# So many names are listed at once; typing brings others.
+LISTED = 100
+WIDTH = 58
+
+
+class ChooseModels(ModalScreen[tuple[str, ...] | None]):
+    """The names that were chosen, None if that was left. Typing filters them; a part of a name in any case is enough."""
+
+    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
+    BINDINGS: ClassVar = [
+        Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
+        Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
+        Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
+        Binding("tab", "toggle", show=False, id="choose.toggle", tooltip="choose this one too, or not"),
+    ]
+
+    def __init__(self, title: str, names: Sequence[str], *, several: bool, pinned: Iterable[str] = ()) -> None:
+        """`title` says what becomes of them; `pinned` ones are marked with +."""
+        super().__init__()
+        self._title, self._names, self._several = title, tuple(names), several
+        self._pinned = frozenset(pinned)
+        self._chosen: set[str] = set()
+        self._listed: list[str] = []
+        self._part: str | None = None
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = Text(self._title)
+            keys = "tab or click chooses more   enter takes them" if self._several else "enter takes it"
+            dialog.border_subtitle = f"{keys}   escape cancels"
+            yield Input(placeholder="part of a name", id="filter", compact=True)
+            yield OptionList(id="names", compact=True, markup=False)
+            yield Static("", id="found", markup=False)
+
+    def on_mount(self) -> None:
+        self.query_one(Input).focus()
+        self._filter()
+
+    @on(Input.Changed)
+    def _filter(self) -> None:
+        """Lists what is called so. Before any key acts on the list, too: who types fast is ahead of the message that says so."""
+        part = self.query_one(Input).value.strip().casefold()
+        if part != self._part:
+            self._part = part
+            self._list(part)
+
+    def _list(self, part: str) -> None:
+        found = [name for name in self._names if part in name.casefold()]
+        self._listed = found[:LISTED]
+        options = self.query_one(OptionList)
+        options.clear_options()
+        options.add_options([Option(self._prompt(name)) for name in self._listed])
+        if self._listed:
+            options.highlighted = 0
+        self._tell(len(found))
+
+    def _tell(self, found: int | None = None) -> None:
+        words = f"{count(len(self._chosen), 'model')} chosen" if self._several else ""
+        if found is not None:
+            self._rest = f"{found - len(self._listed)} more: type to see them" if found > len(self._listed) else ""
+            self._rest = self._rest or ("" if found else "no model is called so")
+        self.query_one("#found", Static).update(Text("   ".join(part for part in (words, self._rest) if part)))
+
+    _rest = ""
+
+    def _prompt(self, name: str) -> Text:
+        mark = ("[x] " if name in self._chosen else "[ ] ") if self._several else ""
+        return Text(f"{mark}{'+ ' if name in self._pinned else ''}{shortened(name, WIDTH)}", no_wrap=True)
+
+    def action_move(self, by: int) -> None:
+        self._filter()
+        options = self.query_one(OptionList)
+        if by > 0:
+            options.action_cursor_down()
+        else:
+            options.action_cursor_up()
+
+    def action_toggle(self) -> None:
+        self._filter()
+        place = self.query_one(OptionList).highlighted
+        if self._several and place is not None:
+            self._toggle(place)
+
+    def _toggle(self, place: int) -> None:
+        name = self._listed[place]
+        self._chosen ^= {name}
+        self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
+        self._tell()
+
+    @on(Input.Submitted)
+    def _entered(self) -> None:
+        """What is chosen, or the one under the cursor."""
+        self._filter()
+        place = self.query_one(OptionList).highlighted
+        if self._chosen:
+            self.dismiss(tuple(name for name in self._names if name in self._chosen))
+        elif place is not None:
+            self.dismiss((self._listed[place],))
+
+    @on(OptionList.OptionSelected)
+    def _clicked(self, event: OptionList.OptionSelected) -> None:
+        if self._several:
+            self._toggle(event.option_index)
+            self.query_one(Input).focus()
+        else:
+            self.dismiss((self._listed[event.option_index],))
+
+    def action_cancel(self) -> None:
+        self.dismiss(None)

@@ -1,0 +1,328 @@
+"""What is happening, in words: the line of the algorithm a run is at, and what it does there and why. Pure text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.settings import Settings, settings
+from ddenv.runfile.state import Candidate, Round, RunState, Test
+from ddenv.workbench.run.explain_decisions import (
+    arrival,
+    by_hand,
+    last_reduction,
+    older_engine,
+    out_of_budget,
+    to_adopt,
+)
+from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import count, metres, percent, plain
+
+# A list of kept models longer than this is cut, so that the sentence stays one.
+NAMED = 8
+
+
+Happening = tuple[Step | None, tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """`line` is the number of one of the `lines` of the algorithm's listing, or None when the algorithm stands nowhere."""
+
+    line: int | None
+    sentences: tuple[str, ...]
+    lines: Lines = DDENV.lines
+
+
+def explain(snapshot: Snapshot) -> Explanation:
+    """What happens now, and why."""
+    state = snapshot.state
+    options = settings(state)
+    shown = listing(options.algorithm, options.growth)
+    step, sentences = _happening(snapshot)
+    if not snapshot.error:
+        sentences = (*older_engine(snapshot), *to_adopt(state), *sentences, *by_hand(state))
+    line = None if step is None else shown.line(step, state.round)
+    return Explanation(line, sentences, shown.lines)
+
+
+def _happening(snapshot: Snapshot) -> Happening:
+    """The step the run is at, and the sentences on it."""
+    state, options = snapshot.state, settings(snapshot.state)
+    if snapshot.gone:
+        return None, (
+            f"{plain(snapshot.error)}.",
+            "Nothing can be asked for any more: y copies names, R lists the runs, q leaves.",
+        )
+    if snapshot.error:
+        return None, (snapshot.error,)
+    if snapshot.status == "finished":
+        return _finished(state)
+    if snapshot.status in STANDING:
+        return None, STANDING[snapshot.status](state)
+    if state.baseline is None:
+        return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
+    if state.confirming:
+        return _with_pause(state, ("returned", _confirming(snapshot)))
+    if state.round is None or state.round.done:
+        return _with_pause(state, ("split", _between(snapshot, options)))
+    if state.waiting_candidate is not None:
+        return "waiting", _waiting(state, state.round, options)
+    return _with_pause(state, _testing(snapshot, state.round, options))
+
+
+def baseline_sentence(state: RunState, iterations: int) -> str:
+    """How often the whole world fails, with Wilson's interval, and what that means for flaky candidates."""
+    base = state.baseline
+    if base is None:
+        return ""
+    others = f"; {count(state.other_failures, 'run')} failed in another way" if state.other_failures else ""
+    others += f"; {count(state.broken_runs, 'run')} broke" if state.broken_runs else ""
+    sentence = (
+        f"Baseline: the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')} "
+        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){others}."
+    )
+    if base.rate >= 1.0:
+        return sentence
+    tests = count(1 + iterations, "test")
+    need = "" if base.iterations_95 <= iterations else f"; for 95 % certainty set iterations to {base.iterations_95}"
+    return f"{sentence} The chance that {tests} of a candidate all miss f is {percent(base.miss_chance)}{need}."
+
+
+def _with_pause(state: RunState, happening: Happening) -> Happening:
+    if not state.paused:
+        return happening
+    rest = "what runs now is finished first" if state.tally["running"] else "nothing runs now"
+    first = f"Paused: no new test is started; {rest}. space resumes, s runs one test."
+    step, sentences = happening
+    return step, (first, *sentences)
+
+
+def _starting(_: RunState) -> tuple[str, ...]:
+    return ("The engine starts. It works in a process of its own and outlives this screen.",)
+
+
+def _created(_: RunState) -> tuple[str, ...]:
+    return ("No engine has worked on this run yet. r starts one.",)
+
+
+def _failed(state: RunState) -> tuple[str, ...]:
+    return (
+        f"The engine could not go on: {plain(state.reason).rstrip('.')}.",
+        "Everything so far is kept; r tries again.",
+    )
+
+
+def _stopped(state: RunState) -> tuple[str, ...]:
+    reason = plain(state.reason).rstrip(".")
+    said = reason if reason.startswith("stopped") else f"stopped: {reason}" if reason else "stopped"
+    then = out_of_budget(state) or ("Everything so far is kept; r resumes.",)
+    return (f"The engine was {said}.", *then)
+
+
+def _lost(state: RunState) -> tuple[str, ...]:
+    flying = state.tally["running"]
+    lost = f" Only {count(flying, 'test')} that ran then must run again." if flying else ""
+    return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
+
+
+# Nothing moves in these states.
+STANDING: dict[str, Callable[[RunState], tuple[str, ...]]] = {
+    "starting": _starting,
+    "created": _created,
+    "failed": _failed,
+    "stopped": _stopped,
+    "lost": _lost,
+}
+
+
+def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
+    tests = state.finished_tests
+    reached = sum(test.outcome == "pass" for test in tests)
+    failed = sum(test.outcome == "failed" for test in tests)
+    first = (
+        f"The whole world is run {count(options.baseline_runs, 'time')}, each with its own seed, to fix the failure f."
+    )
+    if not tests:
+        return (first,)
+    return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
+
+
+def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
+    state = snapshot.state
+    number = 1 if state.round is None else state.round.number + 1
+    first = f"Round {number}: {beginning(options, len(state.environment))}"
+    arrived = arrival(state)
+    if arrived:
+        return (arrived, first)
+    then = baseline_sentence(state, options.iterations) if state.round is None else follows(options, state.round)
+    return (first, then) if then else (first,)
+
+
+def _waiting(state: RunState, current: Round, options: Settings) -> tuple[str, ...]:
+    candidate = current.candidates[state.waiting_candidate]
+    before, after = len(state.environment), candidate.size
+    return (
+        f"{candidate.label} shows f: {_ended(state, candidate, options)}",
+        f"The reduction waits for you: a accepts it ({before} → {count(after, 'model')}), x rejects it and goes on.",
+    )
+
+
+def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
+    test = _last(state, candidate, "similar")
+    if test is None or not metres(test.distance, 2):
+        return "the robot failed as in f."
+    did = deed(test.failure) if test.failure in DEEDS else "ended"
+    return f"the robot {did} {metres(test.distance, 2)} from f's end (similar is up to {options.epsilon:g} m)."
+
+
+def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
+    state = snapshot.state
+    if current.winner is not None:
+        return _reduced(state, current, options)
+    candidate = snapshot.focus or next((each for each in current.candidates if not each.verdict), None)
+    if candidate is None:
+        return "nothing", _nothing_found(state, current, options)
+    running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]
+    ahead = len({test.candidate for test in snapshot.running if test.round == current.number} - {candidate.index})
+    place = _place(candidate, current, options)
+    if not running:
+        return "next", (*last_reduction(state), _next(state, candidate, place, options))
+    # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
+    test = running[0]
+    sentences = _first_run(place, options) if test.run == 0 else _rerun(state, candidate, test, place, options)
+    if ahead:
+        sentences = (*sentences, f"Idle workers run ahead: {count(ahead, 'later candidate')} at the same time.")
+    return "test" if test.run == 0 else "rerun", sentences
+
+
+def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
+    if not 0 < len(candidate.tests) <= options.iterations:
+        return f"Next is {place}."
+    again = _why_again(_last(state, candidate))
+    return f"Next is re-run {len(candidate.tests)} of {options.iterations} of {place}: {again}"
+
+
+def _place(candidate: Candidate, current: Round, options: Settings) -> str:
+    """A candidate, and where it stands among the others."""
+    models, gone = count(candidate.size, "model"), len(current.environment) - candidate.size
+    if options.algorithm not in GROUPS:
+        return f"{candidate.label} ({models}), candidate {candidate.index + 1} of {len(current.candidates)}"
+    if not is_sweep(current):
+        return f"{candidate.label} ({models}), which leaves out a group of {gone}"
+    return f"{candidate.label} ({models}), model {candidate.index + 1} of {len(current.candidates)} in the last sweep"
+
+
+def _first_run(place: str, options: Settings) -> tuple[str, ...]:
+    return (
+        f"First run of {place}.",
+        f"f again means: goal not reached in {options.timeout:g} s, and the end within {options.epsilon:g} m of f's end.",
+    )
+
+
+def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, options: Settings) -> tuple[str, ...]:
+    before = _last(state, candidate)
+    return (
+        f"Re-run {test.run} of {options.iterations} of {place}: {_why_again(before)}",
+        f"A failure can be flaky: only {count(1 + options.iterations, 'test')} without f make it dissimilar.",
+    )
+
+
+def _why_again(before: Test | None) -> str:
+    if before is None:
+        return "another seed is tried at the same time."
+    reasons = {
+        "pass": "the goal was reached.",
+        "other": _otherwise(before),
+        "error": "the simulation broke.",
+        "timeout": "the test took too long on the clock.",
+    }
+    return f"last time {reasons.get(before.outcome, 'f was not seen.')}"
+
+
+def _otherwise(test: Test) -> str:
+    away = metres(test.distance)
+    if not away:
+        return f"the robot {deed(test.failure)}, but not as in f."
+    return f"the robot {deed(test.failure)}{'' if test.failure in DEEDS else ' elsewhere,'} {away} from f's end."
+
+
+def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
+    """The rounds are over, and what they rest on is made sure of."""
+    first = "Confirming what is left with full runs: tests were ended as soon as the robot was stuck for good."
+    running = [test for test in snapshot.running if test.phase == "confirm"]
+    if not running:
+        return (first,)
+    what = f"all that is left but {plain(running[0].without)}" if running[0].without else "all that is left"
+    return (first, f"Now run {running[0].run + 1} of {what}.")
+
+
+def _reduced(state: RunState, current: Round, options: Settings) -> Happening:
+    candidate = current.candidates[current.winner]
+    before, after = len(current.environment), candidate.size
+    gone = "the others take no part in f" if before - after > 1 else "the other one takes no part in f"
+    return "reduced", (
+        f"{candidate.label} shows f: {_ended(state, candidate, options)}",
+        f"E is now {candidate.label}: {before} → {count(after, 'model')}; {gone}.",
+    )
+
+
+def _nothing_found(state: RunState, current: Round, options: Settings) -> tuple[str, ...]:
+    first = f"No candidate of round {current.number} showed f."
+    return (first, fruitless(options, current, len(state.environment)))
+
+
+def _finished(state: RunState) -> Happening:
+    options, kept = settings(state), count(len(state.environment), "model")
+    if state.baseline is None:
+        return None, (_reason(state, "The run ended in the baseline."),)
+    if not state.minimal:
+        return "returned", (
+            _reason(state, "The run ended early."),
+            *out_of_budget(state),
+            f"{kept} left: {_names(state)}.",
+        )
+    if not state.environment:
+        none = "f is seen without any of the models that can be removed: look at the robot, its goal and what always stays."
+        return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
+    single = len(state.environment) == 1
+    pinned = state.pinned.intersection(state.environment)
+    if pinned:
+        return "returned", (f"Ended: {kept} left. {_proof_with_pins(state, len(pinned))}", f"Kept: {_names(state)}.")
+    proof = f"without {'it' if single else 'any one of them'} f is not seen again"
+    sure = "; full runs confirm it" if state.confirming else ""
+    return "returned", (
+        f"Minimal: {kept} left, and {proof}{sure}.",
+        f"Kept: {_names(state)}.",
+        baseline_sentence(state, options.iterations),
+    )
+
+
+def _proof_with_pins(state: RunState, pinned: int) -> str:
+    if pinned == len(state.environment):
+        what = "it is" if pinned == 1 else "all of them are"
+        return f"{what[:1].upper()}{what[1:]} pinned: whether f is seen with less was not tried. p unpins."
+    others = "the other one" if len(state.environment) - pinned == 1 else "any one of the others"
+    return f"Without {others} f is not seen again; {count(pinned, 'model')} pinned by you always stayed."
+
+
+def _reason(state: RunState, otherwise: str) -> str:
+    text = plain(state.reason) or otherwise
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _names(state: RunState) -> str:
+    names = [plain(name) for name in state.environment]
+    if len(names) <= NAMED:
+        return ", ".join(names)
+    return f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
+
+
+def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> Test | None:
+    tests = [state.tests[id - 1] for id in candidate.tests if 0 < id <= len(state.tests)]
+    for test in reversed(tests):
+        if test.outcome == outcome or (outcome is None and test.is_finished):
+            return test
+    return None

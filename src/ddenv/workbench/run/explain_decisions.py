@@ -1,0 +1,96 @@
+"""What the user's hand has to do with what happens now, in sentences: tries, pins, other ways, other settings. Pure text."""
+
+from __future__ import annotations
+
+from ddenv.runfile.settings import settings
+from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.workbench.run.guiding import named
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import count, plain
+
+HOW = {
+    "adopted": "You adopted {what}",
+    "accepted": "You took the other failure of {what} for as good as f",
+}
+
+
+def to_adopt(state: RunState) -> tuple[str, ...]:
+    """The last try that showed f and could become the environment."""
+    similar = [trial for trial in state.trials if _can_be_adopted(state, trial)]
+    if not similar:
+        return ()
+    return (f"{similar[-1].label} shows f with {count(similar[-1].size, 'model')}: a on its row adopts it.",)
+
+
+def by_hand(state: RunState) -> tuple[str, ...]:
+    """Tries that are not judged yet, and models that are pinned."""
+    sentences = [_under_way(state, trial) for trial in state.trials if not trial.verdict]
+    pinned = [name for name in state.environment if name in state.pinned]
+    if pinned and not state.ended:
+        sentences.append(f"Pinned, and so in every candidate: {named(pinned)}.")
+    return tuple(sentences)
+
+
+def last_reduction(state: RunState) -> tuple[str, ...]:
+    """What the last test led to, while a run that pauses has made no other since: a step shows what came of it."""
+    here = state.here
+    if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
+        return ()
+    return (f"{here.what} showed f: {_sizes(state, here)}.",)
+
+
+def _can_be_adopted(state: RunState, trial: Trial) -> bool:
+    return trial.verdict == "similar" and not trial.adopted and trial.node == state.node
+
+
+def _under_way(state: RunState, trial: Trial) -> str:
+    most = 1 + settings(state).iterations
+    tests = [state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests)]
+    running = next((test for test in tests if test.outcome == "running"), None)
+    what = f"{trial.label} by hand ({count(trial.size, 'model')})"
+    if running is None:
+        return f"{what} is tested next, before the round goes on."
+    again = f"re-run {running.run} of {most - 1}" if running.run else "first run"
+    return f"{what} is tested: {again}."
+
+
+def arrival(state: RunState) -> str:
+    """How the run came to its environment, if by the user's hand and nothing was reduced since; "" otherwise."""
+    here = state.here
+    last = state.decisions[-1] if state.decisions else None
+    if here is None or last is None or last.tests != state.tests_done:
+        return ""
+    if last.kind in ("go_back", "undo"):
+        return f"{_capital(plain(last.words))}."
+    if last.kind == "change":
+        return f"{_capital(plain(last.words))}: it holds from this round on."
+    if here.how in HOW and last.kind in ("adopt", "accept_other"):
+        return f"{HOW[here.how].format(what=here.what)}: {_sizes(state, here)}."
+    return ""
+
+
+def _sizes(state: RunState, here: Node) -> str:
+    before = 0 if here.parent is None else len(state.nodes[here.parent].environment)
+    return f"{before} → {count(len(here.environment), 'model')}"
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def out_of_budget(state: RunState) -> tuple[str, ...]:
+    """What to do when all tests of the budget were made."""
+    budget = state.budget
+    if budget is None or state.tests_done < budget:
+        return ()
+    return (f"The budget of {count(budget, 'test')} is used up: c gives more, and the run goes on.",)
+
+
+def older_engine(snapshot: Snapshot) -> tuple[str, ...]:
+    """A warning where another version of ddenv works on the run."""
+    version = snapshot.older_engine
+    if not version or snapshot.engine != "alive":
+        return ()
+    return (
+        f"Another version of ddenv works on this run ({plain(version)}): it may not know all that you can ask for here.",
+    )

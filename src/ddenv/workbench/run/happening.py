@@ -1,0 +1,114 @@
+"""What is happening: where in its algorithm the run is, and what it does there and why."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from rich.containers import Lines
+from rich.text import Text
+from textual.widget import Widget
+
+from ddenv.workbench.run.explain import Explanation, explain
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.widgets.lines import changed_lines
+
+# How often what goes on within a round is told anew, s.
+PERIOD = 1.0
+
+
+class Happening(Widget):
+    """Lines of the algorithm around the current one, as many as there is room for, above the sentences."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._explanation = Explanation(None, ())
+        self._snapshot: Snapshot | None = None
+        self.trouble = ""
+        self._matter: tuple = ()
+        self._told = -math.inf
+        self._first = 0
+        self._lines = Text("")
+
+    def show(self, snapshot: Snapshot, trouble: str = "") -> None:
+        """`trouble` comes first: what went wrong with the engine itself."""
+        if snapshot is self._snapshot and trouble == self.trouble:
+            return
+        matter, moment = _matter(snapshot), time.monotonic()
+        if matter == self._matter and trouble == self.trouble and moment - self._told < PERIOD:
+            # Runs follow each other faster than anybody reads: the next look tells of the one that is then made.
+            return
+        self._snapshot, self._matter, self._told = snapshot, matter, moment
+        explanation = explain(snapshot)
+        if (explanation, trouble) != (self._explanation, self.trouble):
+            self._explanation, self.trouble = explanation, trouble
+            if not self.size.width:
+                return
+            before, self._lines = self._lines, self._drawn()
+            if regions := changed_lines(before, self._lines, self.size.width):
+                self.refresh(*regions)
+
+    def render(self) -> Text:
+        self._lines = self._drawn()
+        return self._window(self._wrapped()).append_text(self._sentences())
+
+    def _drawn(self) -> Text:
+        """All lines as they stand on the screen."""
+        wrapped = self._wrapped()
+        return self._window(wrapped).append_text(Text("\n").join(wrapped))
+
+    def _wrapped(self) -> Lines:
+        return self._sentences().wrap(self.app.console, max(1, self.size.width))
+
+    def _window(self, sentences: Lines) -> Text:
+        """As many lines of the algorithm as there is room for above the sentences."""
+        width, height = self.size
+        room = height - len(sentences)
+        self._first = _scrolled(self._explanation, room, self._first)
+        return _window(self._explanation, width, room, self._first, self.app.theme_variables["primary"])
+
+    def _sentences(self) -> Text:
+        sentences = [Text(sentence) for sentence in self._explanation.sentences]
+        if self.trouble:
+            sentences.insert(0, Text(self.trouble, self.app.theme_variables["text-error"]))
+        return Text("\n").join(sentences)
+
+
+def _matter(snapshot: Snapshot) -> tuple:
+    """What is told at once when it changes."""
+    state = snapshot.state
+    number = None if state.round is None else (state.round.number, state.round.done)
+    return snapshot.status, snapshot.error, state.paused, state.waiting_candidate, state.confirming, state.node, number
+
+
+def _shown(explanation: Explanation, room: int) -> int:
+    """How many lines of the algorithm there is room for: at least one, and a blank line below if it fits."""
+    return max(1, min(room - 1, len(explanation.lines)))
+
+
+def _index(explanation: Explanation) -> int:
+    """The current line's place among the lines."""
+    return next((place for place, (number, _) in enumerate(explanation.lines) if number == explanation.line), 0)
+
+
+def _scrolled(explanation: Explanation, room: int, first: int) -> int:
+    """The first line to show: the one of before, as long as the current line and its neighbours are in sight with it."""
+    shown, index = _shown(explanation, room), _index(explanation)
+    beside = min(1, (shown - 1) // 2)
+    first = min(max(first, index + beside + 1 - shown), index - beside)
+    return max(0, min(first, len(explanation.lines) - shown))
+
+
+def _window(explanation: Explanation, width: int, room: int, first: int, color: str) -> Text:
+    """Lines of the algorithm with the current one marked."""
+    text = Text()
+    if explanation.line is None:
+        return text
+    index, shown = _index(explanation), _shown(explanation, room)
+    for place in range(first, first + shown):
+        number, code = explanation.lines[place]
+        current = place == index
+        row = Text(f"{'▶' if current else ' '}{number:>2} {code}", f"bold {color}" if current else "dim", no_wrap=True)
+        row.truncate(width, overflow="ellipsis")
+        text.append_text(row).append("\n")
+    return text.append("\n") if room - shown >= 1 and shown > 1 else text

@@ -1,0 +1,184 @@
+"""How many models were left after each test, how many are known to be needed, and when the user decided something."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.style import Style
+from rich.text import Text
+from textual.widget import Widget
+
+from ddenv.runfile.state import Point
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.terminal.themes import ink
+from ddenv.workbench.widgets.lines import changed_lines
+from ddenv.workbench.wording import count
+
+LEVELS = " ▁▂▃▄▅▆▇█"
+NEEDED, DECIDED = "╌", "▲"
+PLAIN, DIM = Style.null(), Style(dim=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What the chart shows: the size of the environment over `tests`, and after how many tests the user `decided` something."""
+
+    points: Sequence[Point] = ()
+    tests: int = 0
+    needed: int = 0
+    decided: Sequence[int] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The styles of the tops of the steps, of what is below, and of the line of needed models."""
+
+    top: Style = PLAIN
+    below: Style = PLAIN
+    needed: Style = PLAIN
+
+
+class Chart(Widget):
+    """Steps of the environment's size over the finished tests, filled, eight levels to a line."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._course = Course()
+        self._shown: tuple = ()
+        self._text = Text("")
+
+    def show(self, snapshot: Snapshot) -> None:
+        """The run as it is now."""
+        state = snapshot.state
+        # Unless something was added these are the very same tuples, and are not compared item by item.
+        shown = (state.history, state.tests_done, state.lower_bound, state.decisions)
+        if shown != self._shown:
+            self._shown = shown
+            decided = tuple(decision.tests for decision in state.decisions)
+            self._course = Course(state.history, state.tests_done, state.lower_bound, decided)
+            before, self._text = self._text, self._drawn()
+            if regions := changed_lines(before, self._text, self.size.width):
+                self.refresh(*regions)
+
+    def render(self) -> Text:
+        self._text = self._drawn()
+        return self._text
+
+    def _drawn(self) -> Text:
+        colors = self.app.theme_variables
+        top = ink(colors, "primary")
+        # The terminal's own colours have no darker one of each.
+        below = top + DIM if self.app.native_ansi_color else ink(colors, "primary-muted")
+        look = Look(top, below, ink(colors, "text-warning", bold=True))
+        return steps(self._course, *self.size, look)
+
+
+def steps(course: Course, width: int, height: int, look: Look | None = None) -> Text:
+    """The chart as text of `height` lines; the last one is the axis of tests."""
+    if not course.points or width < 12 or height < 3:
+        return Text("")
+    look = look or Look()
+    most = max(1, max(point.models for point in course.points))
+    last = max(1, course.tests, course.points[-1].tests)
+    margin = len(str(most)) + 1
+    columns = width - margin - 1
+    ruled = height >= 6 or (height >= 4 and bool(course.decided))
+    rows = height - 1 - ruled
+    at = [_at(course, last * column / max(1, columns - 1)) for column in range(columns)]
+    marks = _marks(most, rows)
+    levels = [_row_of(needed, most, rows) for _, needed in at]
+    if course.needed and at[-1][1]:
+        marks.setdefault(levels[-1], str(course.needed))
+    legend = _legend(course, width) if height >= 7 else []
+    text = Text(no_wrap=True)
+    for row in range(rows):
+        text.append(f"{marks.get(row, ''):>{margin - 1}}┤" if row in marks else f"{'':>{margin - 1}}│", "dim")
+        line = _line(at, levels, most, rows, row)
+        words = legend[row] if row < len(legend) else ""
+        if words and all(char == " " for char, _ in line[-len(words) :]):
+            line = line[: -len(words)]
+        else:
+            words = ""
+        _append(text, line, look)
+        text.append(f"{words}\n", "dim")
+    if ruled:
+        text.append_text(_rule(course, margin, columns, last, look))
+    return text.append_text(_axis(course, margin, columns))
+
+
+def _marks(most: int, rows: int) -> dict[int, str]:
+    """What is written beside the rows: the number of models at their tops."""
+    marks = {0: str(most), rows - 1: "0"}
+    parts = 4 if rows >= 12 else 2 if rows >= 5 else 1
+    for part in range(1, parts):
+        row = rows * part // parts
+        words = str(round(most * (1 - row / rows)))
+        if words not in marks.values():
+            marks[row] = words
+    return marks
+
+
+def _at(course: Course, tests: float) -> tuple[int, int]:
+    """How many models were left after so many tests, and how many were known to be needed."""
+    place = bisect_right(course.points, tests, key=lambda point: point.tests) - 1
+    point = course.points[max(0, place)]
+    needed = max(point.needed, course.needed) if place == len(course.points) - 1 else point.needed
+    return point.models, needed
+
+
+def _row_of(models: int, most: int, rows: int) -> int:
+    """The row that the top of so many models is in; below the chart where there are none."""
+    return rows if not models else min(rows - 1, rows - 1 - int((models / most) * rows - 1e-9))
+
+
+def _line(
+    at: Sequence[tuple[int, int]], levels: Sequence[int], most: int, rows: int, row: int
+) -> list[tuple[str, str]]:
+    """The characters of a row, each with what it is: "top", "below" or "needed"."""
+    line = []
+    for (models, _), level in zip(at, levels, strict=True):
+        eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
+        # Where steps and line meet in one row, the steps are what is seen.
+        if level == row and eighths > 8:
+            line.append((NEEDED, "needed"))
+        else:
+            line.append((LEVELS[min(8, max(0, eighths))], "top" if eighths <= 8 else "below"))
+    return line
+
+
+def _append(text: Text, line: Sequence[tuple[str, str]], look: Look) -> None:
+    styles = {"top": look.top, "below": look.below, "needed": look.needed}
+    begin = 0
+    for place in range(1, len(line) + 1):
+        if place == len(line) or line[place][1] != line[begin][1]:
+            text.append("".join(char for char, _ in line[begin:place]), styles[line[begin][1]])
+            begin = place
+
+
+def _legend(course: Course, width: int) -> list[str]:
+    """What the signs mean, for the corner that falling steps leave free."""
+    words = ["█ models left"]
+    if course.needed:
+        words.append(f"{NEEDED} at least {course.needed} needed")
+    if course.decided:
+        words.append(f"{DECIDED} you decided")
+    longest = max(map(len, words)) + 1
+    return [f" {each:<{longest}}" for each in words] if width >= 2 * longest and len(words) > 1 else []
+
+
+def _rule(course: Course, margin: int, columns: int, last: int, look: Look) -> Text:
+    places = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
+    text = Text(f"{'':>{margin - 1}}└", "dim", no_wrap=True)
+    for column in range(columns):
+        text.append(DECIDED if column in places else "─", look.needed if column in places else DIM)
+    return text.append("\n")
+
+
+def _axis(course: Course, margin: int, columns: int) -> Text:
+    end, left = count(course.tests, "test"), f"{count(course.points[-1].models, 'model')} left"
+    space = columns - 1 - len(end)
+    least = (f"{left}, at least {course.needed} needed", f"{left}, ≥ {course.needed}") if course.needed else ()
+    words = next((each for each in (*least, left) if len(each) + 2 <= space), "")
+    return Text(f"{'':>{margin - 1}}0{words.center(space)}{end}", "dim", no_wrap=True)

@@ -1,0 +1,274 @@
+"""Looks at a run file again and again, and says when something changed; sends commands beside the screen."""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import math
+import time
+from array import array
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply
+from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.state import Candidate, RunState, Test
+from ddenv.runfile.store import COLUMNS, Live
+from ddenv.version import __version__
+from ddenv.workbench.run.observed import Busy, Gone, Observed
+
+# How often the lock is tried: a look holds it for an instant, so not at every tick, s.
+LOCK_PERIOD = 0.5
+# How often the poses of running tests are read: more would only be more to write to a terminal, s.
+LIVE_PERIOD = 0.25
+# So long a look may take, s, and so many events are read at a time: keys are answered while a long run is caught up with.
+PATIENCE = 0.015
+SOME_EVENTS = 50
+
+
+def now() -> float:
+    """Unix time, s."""
+    return time.time()
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All that the run screen shows at one moment.
+
+    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path
+    in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the
+    run file cannot be read. `gone` says that it was deleted or replaced: all else is what was read last.
+    `behind` says that there is more in it than was read yet.
+    """
+
+    state: RunState = field(default_factory=RunState)
+    live: tuple[Live, ...] = ()
+    engine: str = "absent"
+    evidence: array | None = None
+    spent: int = 0
+    error: str = ""
+    original: array | None = None
+    gone: bool = False
+    behind: bool = False
+
+    @property
+    def older_engine(self) -> str:
+        """The version of the ddenv whose engine works on the run, or did last, if it is not this one's; "" if it is, or unknown."""
+        version = self.state.engine_version
+        return "" if version == __version__ else version
+
+    @property
+    def status(self) -> str:
+        """The state's status, or "starting" or "lost" where the engine's own state tells more."""
+        if self.engine == "starting":
+            return "starting"
+        if self.state.ended or self.behind or self.engine == "alive" or self.state.status == "created":
+            return self.state.status
+        return "lost"
+
+    @property
+    def running(self) -> tuple[Test, ...]:
+        """The tests that run now, in the order they were started; none when no engine is there to run them."""
+        if self.engine != "alive":
+            return ()
+        return self.state.running_tests
+
+    @property
+    def focus(self) -> Candidate | None:
+        """The candidate that all is about now: the one that waits, or else the first one that is being tested."""
+        current = self.state.round
+        if current is None or current.done or self.status in ("finished", "lost"):
+            return None
+        if self.state.waiting_candidate is not None:
+            return current.candidates[self.state.waiting_candidate]
+        for test in self.running:
+            if test.phase == "round" and test.round == current.number:
+                return current.candidates[test.candidate]
+        return None
+
+    def seconds(self, test: int) -> float | None:
+        """How far a running test is, simulated s."""
+        return next((live.time for live in self.live if live.test == test), None)
+
+
+class Poll:
+    """One open run file, which is only ever read; commands are sent beside it.
+
+    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing can be sent. `told` is
+    called with each event's kind, and the states before and after it; again with the same ones where a look was cut short.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        starting: Callable[[], bool] = lambda: False,
+        watch: bool = False,
+        told: Callable[[str, RunState, RunState], None] = lambda kind, before, after: None,
+    ) -> None:
+        """Raises UserError for a file that is no run file."""
+        self.path = path
+        self.watch = watch
+        self._told = told
+        self.file = Observed(path, strictly=watch)
+        self._starting = starting
+        self._snapshot: Snapshot | None = None
+        self._behind = self._catching_up = True
+        self._looked = -math.inf
+        self._alive = False
+        self._posed = -math.inf
+        self._evidence: tuple[int | None, array | None] = (None, None)
+        self._original: tuple[int | None, array | None] = (None, None)
+        self._sender: ThreadPoolExecutor | None = None
+
+    @property
+    def catching_up(self) -> bool:
+        """Whether there are more events than the last look read."""
+        return self._catching_up
+
+    def close(self) -> None:
+        """What was sent is still written."""
+        if self._sender is not None:
+            self._sender.shutdown(wait=False)
+        if self.watch:
+            self.file.close()
+            return
+        with suppress(UserError):
+            self.file.tidy()
+
+    def look(self) -> Snapshot | None:
+        """The new snapshot, or None if nothing changed since the last look, or another program writes just now."""
+        try:
+            self._behind = self.file.refresh() or self._behind
+            snapshot = self._read()
+        except Busy:
+            return None
+        except Gone as error:
+            self._behind = True
+            snapshot = self._left(str(error))
+        except UserError as error:
+            self._behind = True
+            snapshot = replace(self._snapshot or Snapshot(), error=str(error))
+        if snapshot == self._snapshot:
+            return None
+        self._snapshot = snapshot
+        return snapshot
+
+    def send(self, kind: str, data: dict[str, Any], done: Callable[[int, str], None]) -> None:
+        """Asks the engine for something, without waiting for the file; commands arrive in the order they were sent.
+
+        `done` is then called on the screen's thread with the command's id and "", or with 0 and why it was not sent.
+        """
+        if self._sender is None:
+            self._sender = ThreadPoolExecutor(1, "send")
+        self._sender.submit(self._send, kind, data, done, asyncio.get_running_loop(), contextvars.copy_context())
+
+    def _send(self, kind: str, data: dict[str, Any], done: Callable, loop: Any, context: contextvars.Context) -> None:
+        id, error = 0, "this run is only watched: open it without --watch to guide it"
+        if not self.watch:
+            try:
+                id, error = self.file.send(kind, **data), ""
+            except UserError as trouble:
+                error = str(trouble)
+        # The screen may be gone by now.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(done, id, error, context=context)
+
+    def _read(self) -> Snapshot:
+        """Of a damaged file as much as makes sense is shown, with what is wrong. Raises Busy."""
+        engine, last = self._engine(), self._snapshot
+        if last is not None and not self._behind:
+            spent = self._spent(last.state, engine)
+            if engine == last.engine and spent == last.spent:
+                return last
+            return replace(last, engine=engine, spent=spent)
+        state, error, more = self._fold(last.state if last else RunState())
+        spent = self._spent(state, engine)
+        try:
+            live, due = self._poses(state) if engine == "alive" else ((), True)
+            snapshot = Snapshot(state, live, engine, self._motion(state), spent, error, self._first_motion(state))
+        except Busy:
+            raise
+        except UserError as trouble:
+            snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
+        self._behind = more or not due
+        self._catching_up = more
+        return replace(snapshot, behind=more)
+
+    def _left(self, why: str) -> Snapshot:
+        """What was read last of a file that is not there any more."""
+        error = f"{why}; what you see is what was read last"
+        return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
+
+    def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
+        """The state after the new events, up to the first one that makes no sense, and whether there are more of them."""
+        begun, more = time.monotonic(), True
+        try:
+            while more:
+                events = self.file.events(state.revision, SOME_EVENTS)
+                for event in events:
+                    before, state = state, apply(state, event)
+                    self._told(event.kind, before, state)
+                more = len(events) == SOME_EVENTS
+                if time.monotonic() - begun > PATIENCE:
+                    break
+        except Busy:
+            raise
+        except UserError as error:
+            return state, str(error), False
+        return state, "", more
+
+    def _engine(self) -> str:
+        moment = time.monotonic()
+        if moment - self._looked >= LOCK_PERIOD:
+            alive = engine_is_alive(self.path)
+            # Rows of running tests are read only while an engine is there.
+            self._behind = self._behind or alive != self._alive
+            self._looked, self._alive = moment, alive
+        if self._alive:
+            return "alive"
+        return "starting" if self._starting() else "absent"
+
+    def _poses(self, state: RunState) -> tuple[tuple[Live, ...], bool]:
+        """Where the robots are, and whether that was read just now."""
+        moment = time.monotonic()
+        if self._snapshot is not None and moment - self._posed < LIVE_PERIOD:
+            running = {test.id for test in state.running_tests}
+            return tuple(row for row in self._snapshot.live if row.test in running), False
+        self._posed = moment
+        return self._live(state), True
+
+    def _live(self, state: RunState) -> tuple[Live, ...]:
+        """Only what makes sense: a row names a running test and has a whole, finite pose."""
+        try:
+            rows = self.file.live()
+            return tuple(row for row in rows if 0 < row.test <= len(state.tests) and _finite(row))
+        except (TypeError, ValueError):
+            raise UserError(f"{self.path}: damaged run file: a running test's pose makes no sense") from None
+
+    def _motion(self, state: RunState) -> array | None:
+        test = state.evidence_test
+        if test != self._evidence[0]:
+            self._evidence = (test, None if test is None else self.file.motion(test))
+        return self._evidence[1]
+
+    def _first_motion(self, state: RunState) -> array | None:
+        test = None if state.baseline is None else state.baseline.failure_test
+        if test != self._original[0]:
+            self._original = (test, None if test is None else self.file.motion(test))
+        return self._original[1]
+
+    def _spent(self, state: RunState, engine: str) -> int:
+        if state.started_at is None:
+            return int(state.working_seconds)
+        until = now() if engine == "alive" else state.updated_at
+        return int(state.working_seconds + max(0.0, until - state.started_at))
+
+
+def _finite(row: Live) -> bool:
+    return len(row.pose) == COLUMNS - 1 and all(math.isfinite(value) for value in (row.time, *row.pose))

@@ -1,0 +1,132 @@
+"""The programs beside the workbench: the engine it started, and the scene."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from threading import Thread
+
+from ddenv.errors import UserError
+from ddenv.workbench.wording import plain
+
+# Exit codes of an engine that has finished or was stopped.
+GOOD_ENDS = (0, 1)
+# So long the screen may stand still for a program that is asked to end, s.
+A_MOMENT = 0.3
+# Of a log only its end is read, bytes.
+TAIL = 4000
+
+
+class Engine:
+    """The engine of one run, if this workbench started it. It is never ended from here: it outlives the screen."""
+
+    def __init__(self, run: Path, process: subprocess.Popen | None = None) -> None:
+        self.run = run
+        self._process = process
+        self._worked = False
+        self._last_words = ""
+
+    def start(self, jobs: int, accept_mode: str) -> None:
+        """Raises UserError if it cannot be started."""
+        from ddenv.runs.programs import start_engine
+
+        try:
+            self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode)
+        except OSError as error:
+            raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
+        self._worked, self._last_words = False, ""
+
+    def seen_at_work(self) -> None:
+        """It has the run's lock: from now on the lock tells whether it lives."""
+        self._worked = True
+
+    @property
+    def starting(self) -> bool:
+        return self._process is not None and not self._worked and self._process.poll() is None
+
+    @property
+    def trouble(self) -> str:
+        """Why it ended otherwise than by itself or because it was asked to, or nothing."""
+        code = None if self._process is None else self._process.poll()
+        if code in (None, *GOOD_ENDS):
+            return ""
+        from ddenv.runs.programs import last_words
+
+        # Asked for at each look, and the log can be long.
+        self._last_words = self._last_words or plain(last_words(self.run))
+        return f"The engine ended: {self._last_words}"
+
+
+class Scene:
+    """The scene program of one run. `url` is known as soon as it serves; `trouble` says why it does not."""
+
+    def __init__(self, run: Path) -> None:
+        self.run = run
+        self.url = ""
+        self.trouble = ""
+        self._process: subprocess.Popen | None = None
+
+    @property
+    def on(self) -> bool:
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Starts the program; `wait` for its URL then."""
+        from ddenv.runs.programs import start_scene
+
+        self.url = self.trouble = ""
+        try:
+            self._process = start_scene(self.run)
+        except OSError as error:
+            self.trouble = f"the scene cannot be started: {error.strerror}"
+
+    def wait(self) -> None:
+        """Blocks until the program has said its URL or has ended: not for the screen's thread."""
+        process = self._process
+        if process is None or process.stdout is None:
+            return
+        url = plain(process.stdout.readline())
+        if url.startswith("http://"):
+            self.url = url
+        else:
+            log = self.run.with_name(f"{self.run.name}.scene.log")
+            self.trouble = f"the scene did not start: {last_line(log) or f'see {log}'}"
+
+    def stop(self) -> None:
+        """Ends the program; nothing else depends on it."""
+        process, self._process, self.url = self._process, None, ""
+        if process is None:
+            return
+        process.terminate()
+        try:
+            process.wait(timeout=A_MOMENT)
+        except subprocess.TimeoutExpired:
+            # It takes its time, and the screen has none.
+            Thread(target=_end, args=(process,), name="scene").start()
+        else:
+            _close(process)
+
+
+def _end(process: subprocess.Popen) -> None:
+    try:
+        process.wait(timeout=2.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    _close(process)
+
+
+def _close(process: subprocess.Popen) -> None:
+    if process.stdout is not None:
+        process.stdout.close()
+
+
+def last_line(log: Path) -> str:
+    """The last line of a log that is not empty."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(0, log.stat().st_size - TAIL))
+            lines = file.read().decode(errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((plain(line) for line in reversed(lines) if line.strip()), "")

@@ -1,0 +1,250 @@
+"""The lines above and below the panels: what is reduced and how far it is; the engine, the tests and the time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rich.style import Style
+from rich.text import Text
+from textual.widget import Widget
+
+from ddenv.forecast.estimate import Remaining, remaining
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.settings import settings
+from ddenv.runfile.state import RunState, Test
+from ddenv.version import __version__
+from ddenv.workbench.history.branches import path
+from ddenv.workbench.run.methods import GROUPS, labels
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.terminal.themes import ink
+from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
+
+# How often it is told what is left, s.
+LEFT_PERIOD = 2.0
+OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
+# What is said in fewer words, or not at all, until the rest has room: from the least important on.
+SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """Scenario and method on the left, in the longest of `lefts` that fits; how far the reduction is on the right."""
+
+    lefts: tuple[str, ...] = ()
+    rights: tuple[str, ...] = ("",)
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """Something the status line says; the longest of its `forms` that there is room for."""
+
+    name: str
+    forms: tuple[str, ...]
+
+
+class Header(Widget):
+    """What is reduced, and how far it is."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._heading = Heading()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """The run as it is now."""
+        now = heading(snapshot.state)
+        if now != self._heading:
+            self._heading = now
+            self.refresh()
+
+    def render(self) -> Text:
+        name, width = "ddenv", self.size.width
+        shortest = len(min(self._heading.lefts, key=len, default=""))
+        rights = self._heading.rights
+        right = next((each for each in rights if len(name) + shortest + len(each) + 6 <= width), rights[-1])
+        room = max(0, width - 2 - len(name) - len(right) - 4)
+        left = next((each for each in self._heading.lefts if len(each) <= room), "")
+        left = left or shorten(next(reversed(self._heading.lefts), ""), room)
+        space = max(1, width - 4 - len(name) - len(left) - len(right))
+        text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
+        return text.append(f"  {left}", "bold").append(" " * space).append(right)
+
+
+class Status(Widget):
+    """State, tests by outcome, time, engine and scene."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._facts: tuple[Fact, ...] = ()
+        self._snapshot: Snapshot | None = None
+        self._besides = ("", "")
+        self._tests: PersistentTuple[Test] = PersistentTuple()
+        self._cut = 0
+        self._left: Remaining | None = None
+        self._left_of: tuple = ()
+        self._left_at = -math.inf
+        self._left_is_old = False
+
+    def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
+        """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
+        due = self._left_is_old and time.monotonic() - self._left_at >= LEFT_PERIOD
+        if (scene, asked) == self._besides and snapshot is self._snapshot and not due:
+            return
+        tests = snapshot.state.tests
+        self._cut = cut_tests(tests, self._tests, self._cut)
+        self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
+        self._left_is_old = False
+        now = facts(snapshot, scene, asked, self._cut, self._remaining)
+        if now != self._facts:
+            self._facts = now
+            self.refresh()
+
+    def _remaining(self, snapshot: Snapshot) -> Remaining | None:
+        """What is left takes its time to find: within a round it is told anew each `LEFT_PERIOD`, not after each test."""
+        state, moment = snapshot.state, time.monotonic()
+        number = None if state.round is None else state.round.number
+        of = (snapshot.status, snapshot.behind, state.paused, state.waiting_candidate, state.budget, state.node, number)
+        if of != self._left_of or moment - self._left_at >= LEFT_PERIOD:
+            self._left, self._left_of, self._left_at = remaining(state, snapshot.engine == "alive"), of, moment
+        else:
+            self._left_is_old = True
+        return self._left
+
+    def render(self) -> Text:
+        text = Text(" ", no_wrap=True, overflow="ellipsis")
+        for name, words in fitted(self._facts, self.size.width):
+            text.append(words, self._style(name)).append("   ")
+        return text
+
+    def _style(self, name: str) -> Style:
+        if name == "state":
+            colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
+            variable = colors.get(self._snapshot.status if self._snapshot else "", "text-success")
+            return ink(self.app.theme_variables, variable, bold=True)
+        if name == "scene":
+            # An OSC 8 link: terminals that know it open the page with a click.
+            return Style(link=self._besides[0], underline=True)
+        return Style(dim=name in ("time", "left", "mode", "cut"))
+
+
+def heading(state: RunState) -> Heading:
+    """The words of the header, from the longest ones on."""
+    options = settings(state)
+    lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
+    total, kept = len(state.elements), len(state.environment)
+    size = f"{kept} of {count(total, 'model')}"
+    more = [f"{round(100 * (1 - kept / total))} % smaller"] if kept < total else []
+    pinned = [f"{len(state.pinned)} pinned"] if state.pinned else []
+    branch = [f"branch {number}"] if (number := branch_of(state)) else []
+    step = []
+    if state.round is not None:
+        n = "" if options.algorithm in GROUPS else f" · n {state.round.n_partitions}"
+        step = [f"round {state.round.number}{n}"]
+    rights = ([*branch, *step, size, *pinned, *more], [*branch, *step, size, *pinned], [*branch, size], [size])
+    # Without branches and pins there is one way to say it.
+    return Heading(lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1])))
+
+
+def branch_of(state: RunState) -> int | None:
+    """Which branch of the tree of reductions the current node is on, from 1, in the order in which the branches began.
+
+    None on the newest one: that is where a run usually is.
+    """
+    nodes = state.nodes
+    if not 0 <= state.node < len(nodes) or state.node in path(nodes, len(nodes) - 1):
+        return None
+    above = {node.parent for node in nodes if not node.rejected}
+    leaves = [node.number for node in nodes if node.number not in above and not node.rejected]
+    return next((place for place, leaf in enumerate(leaves, start=1) if state.node in path(nodes, leaf)), None)
+
+
+def facts(
+    snapshot: Snapshot,
+    scene: str = "",
+    asked: str = "",
+    cut: int = 0,
+    left: Callable[[Snapshot], Remaining | None] = lambda now: remaining(now.state, now.engine == "alive"),
+) -> tuple[Fact, ...]:
+    """What there is to say, in the order of the screen."""
+    state = snapshot.state
+    status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
+    sign, word = STATUS.get(status, ("·", status))
+    if snapshot.gone:
+        sign, word = "✗", "the run file is gone"
+    elif status == "lost":
+        word = f"{word}: r resumes"
+    mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
+    said = (
+        Fact("state", (f"{sign} {word}",)),
+        Fact("asked", (f"… {asked}" if asked else "", "…" if asked else "")),
+        Fact("tests", tests_said(state)),
+        Fact("cut", (f"{cut} ended early" if cut else "", "")),
+        Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
+        Fact("left", left_said(left(snapshot))),
+        Fact("mode", (mode, "")),
+        Fact("engine", engine_said(snapshot)),
+        Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
+    )
+    return tuple(fact for fact in said if fact.forms[0])
+
+
+def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:
+    """(name, words) of what fits into so many cells."""
+    forms = {fact.name: list(fact.forms) for fact in said}
+    for name in SHRINK:
+        if sum(len(each[0]) + 3 for each in forms.values() if each[0]) <= width:
+            break
+        if len(forms.get(name, ())) > 1:
+            del forms[name][0]
+    return [(name, each[0]) for name, each in forms.items() if each[0]]
+
+
+def cut_tests(tests: PersistentTuple[Test], before: PersistentTuple[Test], cut: int) -> int:
+    """How many of `tests` were ended early, if `cut` of those of `before` were: only what changed is looked at."""
+    if len(tests) < len(before):
+        before, cut = PersistentTuple(), 0
+    for test in tests.changed_since(before):
+        cut += test.cut - (test.id <= len(before) and before[test.id - 1].cut)
+    return cut
+
+
+def tests_said(state: RunState) -> tuple[str, ...]:
+    """The tests by outcome."""
+    counts = state.outcomes()
+    total = state.tests_done
+    said = count(total, "test") if state.budget is None else f"{total} of {count(state.budget, 'test')}"
+    parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
+    return (f"{said}: {parts}" if parts else said, f"{said}: {counts['similar']} similar", said, "")
+
+
+def left_said(left: Remaining | None) -> tuple[str, ...]:
+    """What is left, with its interval, then without."""
+    if left is None:
+        return ("",)
+    low, middle, high = left.tests
+    if left.seconds is None:
+        return (f"about {middle} tests left ({low} to {high})", f"about {middle} tests left", "")
+    words = about(*left.seconds)
+    time, _, interval = words.partition(" (")
+    return (f"about {time} left{f' ({interval}' if interval else ''}", f"about {time} left", "")
+
+
+def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
+    """Whether the engine works, and whether it is of another version than this program."""
+    state = snapshot.state
+    if snapshot.engine == "starting":
+        return ("engine ◌", "")
+    if snapshot.engine != "alive":
+        silent = state.status == "finished" or snapshot.status == "lost" or snapshot.gone
+        return ("",) if silent else ("engine ○ off: r resumes", "")
+    version = plain(state.engine_version)
+    if version in ("", __version__):
+        return ("engine ●", "")
+    age = "older" if _numbers(version) < _numbers(__version__) else "newer"
+    return (f"engine ● {shorten(version, 12)}, {age}", f"engine {age}")
+
+
+def _numbers(version: str) -> list[int]:
+    return [int("".join(filter(str.isdigit, part)) or 0) for part in version.split(".")]

@@ -1,0 +1,209 @@
+"""The runs in the runs folder, last changed first, each with how it stands. Nothing is written to look at them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import apply
+from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.settings import settings
+from ddenv.runfile.state import RunState
+from ddenv.workbench.run.observed import Busy, Observed
+from ddenv.workbench.wording import STATUS
+
+# So many are listed on the setup screen.
+SHOWN = 40
+# What SQLite says of a file that another program keeps for itself.
+LOCKED = "database is locked"
+# So many events are read at a time, so that no thread has the machine for itself.
+BATCH = 500
+# What lies beside a run file, and goes when it does.
+BESIDE = ("-wal", "-shm", ".lock", ".log", ".scene.log")
+
+
+@dataclass(frozen=True, slots=True)
+class Recent:
+    """One run. `status` is the state's, or "lost" without an engine that should be there, or "" while it is not read yet.
+
+    `started` and `changed` are Unix times, s; `size` in bytes. `trouble` says why it cannot be opened.
+    """
+
+    path: Path
+    changed: float
+    size: int
+    status: str = ""
+    scenario: str = ""
+    algorithm: str = ""
+    pair: str = ""
+    total: int = 0
+    kept: tuple[str, ...] = ()
+    tests: int = 0
+    decisions: int = 0
+    started: float = 0.0
+    minimal: bool = False
+    reason: str = ""
+    trouble: str = ""
+
+    @property
+    def sign(self) -> str:
+        return "✗" if self.trouble else STATUS.get(self.status, ("·", ""))[0]
+
+    @property
+    def state_words(self) -> str:
+        """How it stands, in a word or two."""
+        if self.trouble:
+            return "cannot be read"
+        if self.status == "finished":
+            return "minimal" if self.minimal else "finished"
+        return STATUS.get(self.status, ("", self.status or "..."))[1]
+
+    @property
+    def words(self) -> str:
+        """How it stands, for a narrow list."""
+        word = "cannot be read" if self.trouble else STATUS.get(self.status, ("", self.status))[1]
+        return f"{len(self.kept)}/{self.total} {word}" if self.total else word
+
+    @property
+    def is_worked_on(self) -> bool:
+        return bool(self.status) and self.status not in ("created", "finished", "stopped", "failed", "lost")
+
+
+@dataclass(slots=True)
+class _Read:
+    """What is known of a file that looked like `stamp`; the state of one that an engine works on, to go on from."""
+
+    stamp: tuple[int, ...]
+    recent: Recent
+    state: RunState | None = None
+
+
+class RunsFolder:
+    """A folder of runs that is looked at again and again: only files that changed are read, and only what is new in them."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._read: dict[Path, _Read] = {}
+
+    def look(self, patience: float = float("inf"), most: int | None = None) -> list[Recent]:
+        """The runs that were changed last, at `most` so many. After `patience` s the rest is left for the next look: `status` "".
+
+        Not for the screen's thread.
+        """
+        stamps = _stamps(self._folder)
+        self._read = {path: read for path, read in self._read.items() if path in stamps}
+        latest = sorted(stamps, key=lambda path: (-stamps[path][0], path.name))[:most]
+        until = time.monotonic() + patience
+        found = [self._look(path, stamps[path], until) for path in latest]
+        return sorted(found, key=lambda recent: (-recent.changed, recent.path.name))
+
+    def _look(self, path: Path, stamp: tuple[int, ...], until: float) -> Recent:
+        read = self._read.get(path)
+        if (read is None or read.stamp != stamp) and time.monotonic() < until:
+            last, read = read, _read(path, stamp, read.state if read else None)
+            if read.stamp != stamp and last is not None:
+                read = last
+            self._read[path] = read
+        if read is None:
+            return Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3])
+        recent = read.recent
+        if not recent.trouble and recent.status not in ("created", "finished", "stopped", "failed"):
+            alive = engine_is_alive(path)
+            if not alive:
+                # Of runs that nobody works on only what is shown is kept.
+                read.state = None
+            return recent if alive else replace(recent, status="lost")
+        return recent
+
+
+def recent_runs(folder: Path) -> list[Recent]:
+    """The newest runs in `folder`; damaged ones are listed with what is wrong."""
+    return RunsFolder(folder).look(most=SHOWN)
+
+
+def delete_run(path: Path) -> None:
+    """Deletes a run file and all that lies beside it. Raises UserError while an engine works on it, or if it cannot be."""
+    with engine_lock(path):
+        for each in (path, *(path.with_name(f"{path.name}{ending}") for ending in BESIDE)):
+            try:
+                each.unlink(missing_ok=True)
+            except OSError as error:
+                raise UserError(f"{each}: cannot be deleted: {error.strerror}") from None
+
+
+def _stamps(folder: Path) -> dict[Path, tuple[int, ...]]:
+    """When each run file and its log were changed, in ns, and how large they are: all that tells whether to read it again."""
+    try:
+        paths = [path for path in folder.glob("*.ddenv") if not path.name.startswith(".")]
+    except OSError:
+        return {}
+    stamps = {path: _stamp(path) for path in paths}
+    return {path: stamp for path, stamp in stamps.items() if stamp}
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    try:
+        file = path.stat()
+    except OSError:
+        return ()
+    try:
+        log = path.with_name(f"{path.name}-wal").stat()
+    except OSError:
+        return (file.st_mtime_ns, file.st_size, 0, 0)
+    return (max(file.st_mtime_ns, log.st_mtime_ns), file.st_size, log.st_mtime_ns, log.st_size)
+
+
+def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
+    try:
+        file = Observed(path)
+    except UserError as error:
+        return _unread(path, stamp, error)
+    try:
+        first = file.events(0, 1)
+        state = _caught_up(file, state or RunState())
+    except UserError as error:
+        return _unread(path, stamp, error)
+    finally:
+        file.close()
+    options = settings(state)
+    recent = Recent(
+        path,
+        state.updated_at or stamp[0] / 1e9,
+        stamp[1] + stamp[3],
+        state.status,
+        options.name,
+        options.algorithm,
+        options.pair,
+        len(state.elements),
+        state.environment,
+        state.tests_done,
+        len(state.decisions),
+        first[0].time if first else 0.0,
+        state.minimal,
+        state.reason,
+    )
+    return _Read(stamp, recent, None if state.ended else state)
+
+
+def _unread(path: Path, stamp: tuple[int, ...], error: UserError) -> _Read:
+    """A run that cannot be read. What another program keeps locked is read again at the next look."""
+    locked = isinstance(error, Busy) or LOCKED in str(error)
+    return _Read(() if locked else stamp, Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3], trouble=str(error)))
+
+
+def _caught_up(file: Observed, state: RunState) -> RunState:
+    while True:
+        events = file.events(state.revision, BATCH)
+        for event in events:
+            state = apply(state, event)
+        if len(events) < BATCH:
+            return state
+
+
+def named(runs: Iterable[Recent], part: str) -> list[Recent]:
+    """Those whose names, or whose scenarios' names, hold `part`."""
+    wanted = part.strip().casefold()
+    return [run for run in runs if wanted in run.path.stem.casefold() or wanted in run.scenario.casefold()]

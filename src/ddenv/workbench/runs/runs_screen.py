@@ -1,0 +1,213 @@
+"""The runs screen: every run of the runs folder, how it stands, and what can be done with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import DataTable, Footer, Input, Static
+
+from ddenv.errors import UserError
+from ddenv.workbench.background import is_open, tell
+from ddenv.workbench.help.question import Question
+from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, delete_run, named
+from ddenv.workbench.runs.runs_table import RunTable, about
+from ddenv.workbench.wording import count, plain
+
+# How often the folder is looked at, and how long a look may read before it shows what it has, s.
+PERIOD, PATIENCE = 1.0, 0.3
+
+
+class RunsScreen(Screen[None]):
+    """Looked at beside the screen, again and again; nothing is written but what is asked for."""
+
+    CSS_PATH = "runs.tcss"
+    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
+    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (12, "-short"), (30, "-tall")]
+    BINDINGS: ClassVar = [
+        Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it: look only, and change nothing"),
+        Binding("c", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
+        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it, after a question"),
+        Binding("slash", "filter", "filter", id="runs.filter", tooltip="only runs with these letters in the name"),
+        Binding("question_mark,f1", "app.help", "help", id="runs.help", tooltip="show every key", key_display="?"),
+        Binding("escape,q,R", "back", "back", id="runs.back", tooltip="back to where you were", key_display="esc"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._folder: RunsFolder | None = None
+        self._runs: list[Recent] = []
+        self._reading = False
+
+    def compose(self) -> ComposeResult:
+        with Horizontal(id="body"):
+            with Vertical(id="list", classes="panel") as panel:
+                panel.border_title = "Runs"
+                yield RunTable(id="table")
+                yield Static("reading ...", id="empty", markup=False)
+                yield Input(placeholder="letters of a name; escape shows all", id="filter", compact=True)
+            with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
+                panel.border_title = "This run"
+                yield Static("", id="about", markup=False)
+        yield Footer(compact=True, show_command_palette=False)
+        yield Static("Please make the terminal larger: at least 64 x 12.", id="small", markup=False)
+
+    def on_mount(self) -> None:
+        self.query_one(RunTable).focus()
+        self._look()
+        self.set_interval(PERIOD, self._look)
+
+    # From the folder to the screen.
+
+    def _look(self) -> None:
+        if not self._reading:
+            self._reading = True
+            self._read()
+
+    @work(thread=True, group="runs")
+    def _read(self) -> None:
+        from ddenv.runs.folder import runs_folder
+
+        self._folder = self._folder or RunsFolder(runs_folder())
+        runs = self._folder.look(PATIENCE)
+        tell(self, self._show, runs)
+
+    def _show(self, runs: list[Recent]) -> None:
+        self._reading = False
+        self._runs = runs
+        self._list()
+        # What is not read yet is read at once, as long as there is something left.
+        if any(not run.status and not run.trouble for run in runs):
+            self.set_timer(0.05, self._look)
+
+    def _list(self) -> None:
+        """Shows the runs that pass the filter."""
+        part = self.query_one("#filter", Input).value
+        shown = named(self._runs, part)
+        table = self.query_one(RunTable)
+        table.show(shown)
+        table.display = bool(shown)
+        empty = self.query_one("#empty", Static)
+        empty.display = not shown
+        empty.update(Text(self._nothing(part)))
+        works = sum(run.is_worked_on for run in self._runs)
+        panel = self.query_one("#list")
+        panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
+        panel.border_subtitle = Text(f"{count(works, 'engine')} at work" if works else "")
+        self._tell()
+
+    def _nothing(self, part: str) -> str:
+        from ddenv.runs.folder import runs_folder
+
+        if self._runs:
+            return f"No run has '{plain(part)}' in its name; escape shows all."
+        return f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
+
+    @on(DataTable.RowHighlighted)
+    def _tell(self) -> None:
+        run = self._chosen
+        width = self.query_one("#about").size.width or 30
+        self.query_one("#about", Static).update(Text("") if run is None else about(run, width))
+
+    @property
+    def _chosen(self) -> Recent | None:
+        return self.query_one(RunTable).chosen
+
+    # What can be done with a run.
+
+    @on(DataTable.RowSelected)
+    def _open(self) -> None:
+        self._go_to(watch=False)
+
+    def action_watch(self) -> None:
+        self._go_to(watch=True)
+
+    def _go_to(self, watch: bool) -> None:
+        run = self._readable()
+        if run is None:
+            return
+        try:
+            self.app.show_run(run.path, watch)
+        except UserError as error:
+            self._complain(str(error))
+
+    def action_copy(self) -> None:
+        run = self._readable()
+        if run is not None:
+            self.app.show_setup(like=run.path)
+
+    def _readable(self) -> Recent | None:
+        """The run under the cursor, if it can be read; says why not."""
+        run = self._chosen
+        if run is None:
+            self._complain("there is no run here")
+        elif run.trouble:
+            self._complain(run.trouble)
+        else:
+            return run
+        return None
+
+    def action_delete(self) -> None:
+        run = self._chosen
+        if run is None:
+            self._complain("there is no run here")
+        elif run.is_worked_on:
+            self._complain("its engine is at work: open the run and stop it first")
+        else:
+            words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log goes, too."
+            self.app.push_screen(Question(words, final=True), lambda yes: self._delete(run.path) if yes else None)
+
+    @work(thread=True, group="delete")
+    def _delete(self, path: Path) -> None:
+        try:
+            delete_run(path)
+        except UserError as error:
+            self.app.call_from_thread(self._complain, str(error))
+            return
+        self.app.call_from_thread(self._deleted, path)
+
+    def _deleted(self, path: Path) -> None:
+        self.notify(f"{plain(path.stem)} is deleted", timeout=3, markup=False)
+        self._runs = [run for run in self._runs if run.path != path]
+        if is_open(self):
+            self._list()
+
+    def _complain(self, why: str) -> None:
+        self.notify(why, severity="warning", timeout=4, markup=False)
+
+    # The filter, and the way back.
+
+    def action_filter(self) -> None:
+        self.add_class("-filtering")
+        self.query_one("#filter").focus()
+
+    @on(Input.Changed, "#filter")
+    def _filtered(self) -> None:
+        self._list()
+
+    @on(Input.Submitted, "#filter")
+    def _taken(self) -> None:
+        self.query_one(RunTable).focus()
+
+    def action_back(self) -> None:
+        """First out of the filter, then out of the screen."""
+        if not self.has_class("-filtering"):
+            self.dismiss()
+            return
+        self.remove_class("-filtering")
+        self.query_one("#filter", Input).value = ""
+        self.query_one(RunTable).focus()
+
+
+def _about(run: Recent) -> str:
+    """How a run stands, in a line."""
+    if not run.total:
+        return f"{run.state_words}."
+    left = f"{len(run.kept)} of {count(run.total, 'model')} left"
+    return f"{run.state_words}: {left} after {count(run.tests, 'test')}."

@@ -1,0 +1,199 @@
+"""The table of all runs: as many columns as there is room for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from typing import ClassVar
+
+from rich.text import Text
+from textual import events, work
+from textual.binding import Binding
+from textual.widgets import DataTable, OptionList
+from textual.widgets.option_list import Option
+
+from ddenv.map.names import shortened
+from ddenv.workbench.background import tell
+from ddenv.workbench.run import poll
+from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
+from ddenv.workbench.wording import count, plain
+
+# Of the models that are left so many are named.
+MOST_NAMES = 40
+
+
+class RunList(OptionList):
+    """The runs of the runs folder, read beside the screen."""
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, compact=True, markup=False)
+        self._runs: dict[str, Recent] = {}
+        self._folder: RunsFolder | None = None
+
+    def run_of(self, option_id: str | None) -> Recent:
+        """The run that an option stands for."""
+        return self._runs[option_id or ""]
+
+    @work(thread=True, group="runs", exclusive=True)
+    def read(self) -> None:
+        """Lists what is in the folder now."""
+        from ddenv.runs.folder import runs_folder
+
+        self._folder = self._folder or RunsFolder(runs_folder())
+        runs = self._folder.look(most=SHOWN)
+        tell(self, self._show, runs)
+
+    def _show(self, runs: list[Recent]) -> None:
+        self._runs = {str(run.path): run for run in runs}
+        self.clear_options()
+        for run in runs:
+            text = Text(f"{run.sign} {plain(run.path.stem)}", no_wrap=True, overflow="ellipsis")
+            self.add_option(Option(text.append(f"  {run.words}", "dim"), id=str(run.path)))
+        if not runs:
+            self.add_option(Option(Text("none yet", "dim"), disabled=True))
+
+
+def about(run: Recent, width: int) -> Text:
+    """All that is known of a run, for a column so wide."""
+    text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
+    if run.trouble:
+        return text.append(f"\n{plain(run.trouble)}", "not bold")
+    text.append(f"{run.sign} {run.state_words}\n", "not bold")
+    if run.reason:
+        text.append(f"{plain(run.reason)}\n", "not bold dim")
+    facts = [
+        ("scenario", shortened(run.scenario, max(8, width - 10))),
+        ("algorithm", run.algorithm),
+        ("pair", run.pair if len(run.pair) + 10 <= width else run.pair.replace("/", f"/\n{'':10}")),
+        ("tests", str(run.tests)),
+        ("decisions", f"{run.decisions} by hand" if run.decisions else "none by hand"),
+    ]
+    for name, words in facts:
+        text.append(f"\n{name:<10}", "not bold dim").append(words, "not bold")
+    text.append(f"\n\n{len(run.kept)} of {count(run.total, 'model')} left\n", "bold")
+    for name in run.kept[:MOST_NAMES]:
+        text.append(f"  {shortened(plain(name), max(8, width - 2))}\n", "not bold")
+    more = len(run.kept) - MOST_NAMES
+    return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
+
+
+# Without the name, which takes what is left: title, columns, whether it is a number, and what it says.
+_Column = tuple[str, int, bool, Callable[[Recent], str]]
+FIRST: tuple[_Column, ...] = (
+    ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
+    ("models left", 11, True, lambda run: f"{len(run.kept)} of {run.total}" if run.total else ""),
+    ("tests", 5, True, lambda run: str(run.tests) if run.total else ""),
+    ("changed", 11, True, lambda run: moment(run.changed)),
+)
+# Each comes only when there is room for it, in this order.
+MORE: tuple[_Column, ...] = (
+    ("scenario", 16, False, lambda run: plain(run.scenario)),
+    ("started", 11, True, lambda run: moment(run.started)),
+    ("size", 8, True, lambda run: size(run.size)),
+)
+NARROWEST_NAME = 18
+# Beside its words each column has a space at the right and at the left.
+AROUND = 2
+
+
+def size(number: int) -> str:
+    """Bytes as 12 kB or 4.7 MB."""
+    return f"{number / 1000:.0f} kB" if number < 1e6 else f"{number / 1e6:.1f} MB"
+
+
+def moment(time: float) -> str:
+    """A Unix time, s: the clock if it was today, else the date."""
+    if not time:
+        return ""
+    try:
+        then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
+    except (ValueError, OverflowError, OSError):
+        # A file system knows years that no calendar does.
+        return "?"
+    return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
+
+
+class RunTable(DataTable):
+    """One row a run; only cells that changed are drawn again."""
+
+    BINDINGS: ClassVar = [
+        Binding("enter", "select_cursor", "open", id="runs.open", tooltip="open the run under the cursor"),
+        Binding("home", "scroll_top", "first", id="runs.first", tooltip="to the first run", show=False),
+        Binding("end", "scroll_bottom", "last", id="runs.last", tooltip="to the last run", show=False),
+    ]
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, cursor_type="row", zebra_stripes=False)
+        self._runs: list[Recent] = []
+        self._wide = 0
+        self._cells: dict[str, list[str]] = {}
+
+    @property
+    def chosen(self) -> Recent | None:
+        """The run under the cursor."""
+        return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
+
+    def show(self, runs: list[Recent]) -> None:
+        """Shows these in this order; the cursor stays on its run."""
+        chosen = self.chosen
+        same = self._wide == self.size.width and [run.path for run in runs] == [run.path for run in self._runs]
+        self._runs = list(runs)
+        if not same:
+            self._fill()
+            paths = [run.path for run in runs]
+            if chosen is not None and chosen.path in paths:
+                self.move_cursor(row=paths.index(chosen.path), animate=False)
+            return
+        for run in runs:
+            self._refill(run)
+
+    def on_resize(self, event: events.Resize) -> None:
+        self.show(self._runs)
+
+    def action_scroll_top(self) -> None:
+        self.move_cursor(row=0)
+
+    def action_scroll_bottom(self) -> None:
+        self.move_cursor(row=len(self._runs) - 1)
+
+    def _fill(self) -> None:
+        self._wide = self.size.width
+        self.clear(columns=True)
+        self._cells = {}
+        columns = self._columns()
+        name = self._wide - sum(column[1] + AROUND for column in columns) - AROUND - 1
+        self._name = max(NARROWEST_NAME, name)
+        self.add_column("name", width=self._name, key="name")
+        for title, width, number, _ in columns:
+            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=title)
+        for run in self._runs:
+            cells = self._row(run)
+            self._cells[str(run.path)] = cells
+            self.add_row(*self._drawn(cells), key=str(run.path))
+
+    def _refill(self, run: Recent) -> None:
+        key, cells = str(run.path), self._row(run)
+        if self._cells.get(key) == cells:
+            return
+        before, self._cells[key] = self._cells[key], cells
+        for column, was, cell, drawn in zip(self.ordered_columns, before, cells, self._drawn(cells), strict=True):
+            if was != cell:
+                self.update_cell(key, column.key, drawn)
+
+    def _columns(self) -> list[_Column]:
+        columns = list(FIRST)
+        for column in MORE:
+            if sum(each[1] + AROUND for each in (*columns, column)) + NARROWEST_NAME + AROUND < self._wide:
+                columns.append(column)
+        return columns
+
+    def _row(self, run: Recent) -> list[str]:
+        words = [shortened(say(run), width) for _, width, _, say in self._columns()]
+        return [shortened(plain(run.path.stem), self._name), *words]
+
+    def _drawn(self, cells: list[str]) -> list[Text]:
+        numbers = [False, *(number for _, _, number, _ in self._columns())]
+        return [
+            Text(cell, justify="right" if number else "left", no_wrap=True)
+            for cell, number in zip(cells, numbers, strict=True)
+        ]

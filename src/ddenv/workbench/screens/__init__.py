@@ -1,1 +1,0 @@
-"""The two screens, and the dialogs that open above them."""

@@ -1,0 +1,1 @@
+"""The setup screen: what to reduce, and how."""

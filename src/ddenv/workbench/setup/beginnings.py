@@ -1,0 +1,153 @@
+"""The list of what a reduction can begin with: bundled scenarios, and the files that were opened before."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from rich.text import Text
+from textual import on
+from textual.message import Message
+from textual.widgets import OptionList, Static
+from textual.widgets.option_list import Option
+
+from ddenv.errors import UserError
+from ddenv.workbench.wording import plain
+
+# More would hide what is looked for.
+KEPT = 12
+
+
+def recent_file() -> Path:
+    """Where the list is kept: in `$DDENV_HOME`, or in the user's state folder."""
+    import platformdirs
+
+    home = os.environ.get("DDENV_HOME")
+    folder = Path(home) if home else Path(platformdirs.user_state_dir("ddenv", appauthor=False))
+    return folder / "recent.json"
+
+
+def recent_files() -> list[Path]:
+    """The files that still are there; none where the list is missing or damaged."""
+    return [path for path in _listed() if is_file(path)]
+
+
+def remember(path: Path) -> None:
+    """Puts a file at the head of the list. Where nothing can be written, nothing is remembered."""
+    from ddenv.world.files.access import write_file
+
+    path = path.absolute()
+    names = [path, *(each for each in _listed() if each != path)][:KEPT]
+    place = recent_file()
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_file(place, json.dumps([str(each) for each in names]).encode())
+    except (OSError, UserError, ValueError):
+        return
+
+
+def _listed() -> list[Path]:
+    try:
+        names = json.loads(recent_file().read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return []
+    if not isinstance(names, list):
+        return []
+    return [Path(name) for name in names if isinstance(name, str) and name][:KEPT]
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file, and it can be looked at."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+MORE = " …"
+
+
+class About(Static):
+    """A text of at most `max-height` lines; where it is longer, an ellipsis says so."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__("", id=id, markup=False)
+        self._words = ""
+
+    def tell(self, words: str) -> None:
+        self._words = words
+        self._fit()
+
+    def on_resize(self) -> None:
+        self._fit()
+
+    def _fit(self) -> None:
+        width, most = self.content_size.width, self.styles.max_height
+        lines = Text(self._words).wrap(self.app.console, max(1, width))
+        if most is None or len(lines) <= most.cells:
+            self.update(Text(self._words))
+            return
+        *shown, last = (line.plain.rstrip() for line in lines[: most.cells])
+        if len(last) + len(MORE) > width:
+            last = last.rpartition(" ")[0]
+        self.update(Text("\n".join([*shown, f"{last}{MORE}"])))
+
+
+class FileList(OptionList):
+    """Scenarios by their names, worlds by their files'; a run stands for its own scenario and world."""
+
+    class Looked(Message):
+        """The cursor is on this file."""
+
+        def __init__(self, path: Path) -> None:
+            super().__init__()
+            self.path = path
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, compact=True, markup=False)
+        self._bundled: list[Path] = []
+        self._recent: list[Path] = []
+        self._like: Path | None = None
+        self._looked: str | None = None
+
+    def offer(self, bundled: list[Path], recent: list[Path], like: Path | None = None) -> None:
+        """All that there is to choose from; the cursor is on `like`, a run, or else on the first."""
+        self._bundled, self._like = bundled, like
+        self._recent = [path for path in recent if path not in bundled]
+        self._fill()
+        if self.option_count:
+            self.highlighted = 0
+
+    def add(self, path: Path) -> None:
+        """A file that was opened just now: first of the recent ones, and under the cursor."""
+        if path not in self._bundled:
+            self._recent = [path, *(each for each in self._recent if each != path)]
+        self._looked = None
+        self._fill()
+        self.highlighted = self.get_option_index(str(path))
+        self.focus()
+
+    def _fill(self) -> None:
+        self.clear_options()
+        if self._like is not None:
+            self.add_option(_option(self._like, f"as {self._like.stem}", "a run"))
+        self.add_options(_option(path, path.stem, "") for path in self._bundled)
+        if self._recent:
+            self.add_option(None)
+        for path in self._recent:
+            name = path.stem if path.suffix.lower() in (".yaml", ".yml") else path.name
+            self.add_option(_option(path, name, path.parent.name))
+
+    @on(OptionList.OptionHighlighted)
+    def _cursor_moved(self, event: OptionList.OptionHighlighted) -> None:
+        event.stop()
+        # A list that was filled again has its cursor where it was.
+        if event.option_id is not None and event.option_id != self._looked:
+            self._looked = event.option_id
+            self.post_message(self.Looked(Path(event.option_id)))
+
+
+def _option(path: Path, name: str, where: str) -> Option:
+    text = Text(plain(name), no_wrap=True, overflow="ellipsis")
+    return Option(text.append(f"  {plain(where)}" if where else "", "dim"), id=str(path))

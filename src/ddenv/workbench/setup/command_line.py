@@ -1,0 +1,100 @@
+"""The `ddenv run` command that does what the setup screen's Start would do. Pure."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ddenv.workbench.setup.form import read_key
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+# The scenario's keys that have an option of their own, which is named like the key.
+OPTIONS = (
+    "reduction.algorithm",
+    "reduction.pair",
+    "reduction.iterations",
+    "reduction.budget",
+    "reduction.baseline_runs",
+    "reduction.n_partitions",
+    "reduction.candidates",
+    "reduction.complement_order",
+    "reduction.growth",
+    "reduction.skip",
+    "reduction.delta",
+    "reduction.prior",
+    "reduction.seed",
+    "failure.timeout",
+    "failure.epsilon",
+    "failure.similarity",
+    "failure.early_stop",
+)
+PLACES = {
+    "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
+    "goal": ("goal.x", "goal.y"),
+}
+
+
+def command(
+    source: str,
+    own: Scenario | None,
+    asked: Scenario,
+    *,
+    standard: Scenario,
+    jobs: int,
+    reading: Mapping[str, Sequence[Any]],
+    name: str = "",
+) -> list[str]:
+    """The words of the command, to be joined by `shlex.join`.
+
+    `source` is a scenario's name or file, or a world; `own` is the scenario in it, None for a world, which starts with `standard`.
+    `reading` are the options on how to read worlds, `name` is the run's where it is not the next free one.
+    """
+    before, after = (own or standard).model_dump(mode="json"), asked.model_dump(mode="json")
+    words = ["ddenv", "run", source]
+    for place, keys in PLACES.items():
+        numbers = [read_key(after, key) for key in keys]
+        if own is None or numbers != [read_key(before, key) for key in keys]:
+            words.append(f"--{place}={','.join(map(_number, numbers))}")
+    for key in OPTIONS:
+        value = read_key(after, key)
+        if value != read_key(before, key):
+            words += _option(key.rpartition(".")[2], value)
+    for option, values in reading.items():
+        for value in values:
+            words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
+    if jobs != (os.cpu_count() or 1):
+        words += ["--jobs", str(jobs)]
+    return words + _name(name)
+
+
+def source_of(path: Path, bundled: Path) -> str:
+    """What `ddenv run` takes for a file: the name of a bundled scenario, or its whole path."""
+    if path.parent == bundled and path.suffix == ".yaml":
+        return path.stem
+    return _path(path)
+
+
+def _option(name: str, value: Any) -> list[str]:
+    flag = f"--{name.replace('_', '-')}"
+    if isinstance(value, bool):
+        return [flag if value else f"--no-{flag[2:]}"]
+    # No limit has no number of its own.
+    return [flag, _number(0 if value is None else value)]
+
+
+def _number(value: Any) -> str:
+    return str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e9 else str(value)
+
+
+def _path(path: Path) -> str:
+    return str(path.absolute())
+
+
+def _name(name: str) -> list[str]:
+    if not name:
+        return []
+    return ["--output", str(Path(name).absolute())] if len(Path(name).parts) > 1 else ["--name", name]

@@ -1,0 +1,342 @@
+"""The setup screen's form: every setting of a run, with its meaning, and what it comes to."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rich.text import Text
+from textual import events, on
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.message import Message
+from textual.widget import Widget
+from textual.widgets import Button, Input, Label, OptionList, Select, Static
+
+from ddenv.errors import UserError
+from ddenv.schemas import Kind, names, uses
+from ddenv.workbench.run.methods import chosen, note, paragraph
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.meanings import Circumstances, cost, meaning, not_used
+from ddenv.workbench.wording import plain
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+
+class SchemaSelect(Select[str]):
+    """All names of a kind; its id is the kind."""
+
+    # Here, not on the screen: the form around it would take these keys for itself.
+    BINDINGS: ClassVar = [
+        Binding("pagedown", "screen.scroll(1)", "more", id="schema.more", tooltip="scroll an explanation", show=False),
+        Binding("pageup", "screen.scroll(-1)", "back", id="schema.back", tooltip="scroll it back", show=False),
+    ]
+
+    class Looked(Message):
+        """The user looks at this name: the chosen one, or in the open list the highlighted one."""
+
+        def __init__(self, kind: Kind, name: str) -> None:
+            super().__init__()
+            self.kind, self.name = kind, name
+
+    def __init__(self, kind: Kind, tooltip: str) -> None:
+        super().__init__([(name, name) for name in names(kind)], id=kind, allow_blank=False, compact=True)
+        self.kind: Kind = kind
+        self.tooltip = tooltip
+
+    @property
+    def chosen(self) -> str:
+        return str(self.value)
+
+    def on_mount(self) -> None:
+        self.watch(self.query_one(OptionList), "highlighted", self._highlighted, init=False)
+
+    def on_focus(self) -> None:
+        self.post_message(self.Looked(self.kind, self.chosen))
+
+    def _highlighted(self, index: int | None) -> None:
+        if self.expanded and index is not None:
+            self.post_message(self.Looked(self.kind, names(self.kind)[index]))
+
+    @on(Select.Changed)
+    def _changed(self) -> None:
+        self.post_message(self.Looked(self.kind, self.chosen))
+
+
+class Explained(VerticalScroll):
+    """What the field means that has the focus, in a few lines that scroll."""
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, can_focus=False)
+        self.title = ""
+
+    def compose(self) -> ComposeResult:
+        yield Static("", markup=False)
+
+    def show(self, title: str, words: str, warning: str = "") -> None:
+        """`title` is the name of what is explained, `warning` a sentence that comes first and stands out."""
+        self.title = title
+        text = Text(title, "bold").append("  ")
+        if warning:
+            text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
+        self.query_one(Static).update(text.append(words, "not bold"))
+        self.scroll_home(animate=False)
+
+
+MARK = "✗ "
+METHOD: dict[Kind, str] = {
+    "algorithm": "how the environment is searched",
+    "partitioning": "how the environment is split",
+    "prioritization": "in which order the parts are tried",
+}
+MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
+FIELDS = {field.id: field for field in form.ALL}
+
+
+class OptionsForm(Vertical):
+    """Fields by the ids of `ddenv.workbench.setup.form`, the method, the cost, the equivalent command, and Start."""
+
+    class Edited(Message):
+        """A setting changed; `place` says that spawn or goal did."""
+
+        def __init__(self, place: bool = False) -> None:
+            super().__init__()
+            self.place = place
+
+        def can_replace(self, message: Message) -> bool:
+            return isinstance(message, OptionsForm.Edited) and self.place >= message.place
+
+    def __init__(self, *, id: str, classes: str) -> None:
+        super().__init__(id=id, classes=classes)
+        self._name_given = False
+        self._suggested = ""
+        # What stands in fields that were not opened yet: most never are, and the screen is up sooner without them.
+        self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
+        self.seconds: float | None = None
+        self.border_title = "Settings"
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll(id="fields", can_focus=False):
+            with Grid(id="method"):
+                for kind, tooltip in METHOD.items():
+                    yield Label(kind, markup=False)
+                    yield SchemaSelect(kind, tooltip)
+            yield _grid("basic", form.BASIC)
+            yield _grid("places", form.PLACES)
+            yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
+        yield Explained(id="explained")
+        with Horizontal(id="last"):
+            yield from _widgets((form.NAME, form.ACCEPT), {})
+            yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
+        yield Static("", id="cost", markup=False)
+        yield Static("", id="command", markup=False)
+        yield Static("", id="wrong", markup=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#jobs", Input).value = _default_jobs()
+        self.tell("")
+
+    # What stands in it.
+
+    @property
+    def method(self) -> tuple[str, str]:
+        """The chosen pair and algorithm."""
+        names = {select.kind: select.chosen for select in self.query(SchemaSelect)}
+        return f"{names['partitioning']}/{names['prioritization']}", names["algorithm"]
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What stands in the fields, by id."""
+        shown = {id: _text(self.query_one(f"#{id}")) for id in FIELDS if id not in self._unopened}
+        return self._unopened | shown
+
+    @property
+    def accept_mode(self) -> str:
+        return self.texts["accept"]
+
+    @property
+    def own_name(self) -> str:
+        """The run's name if the user gave one, else ""."""
+        name = self.texts["name"].strip()
+        return name if self._name_given and name != self._suggested else ""
+
+    def show_settings(self, scenario: Scenario, placed: bool, keep_places: bool = False) -> None:
+        """Fills in what the scenario says, in place of what another one said or was mistyped.
+
+        Where it is not `placed`, spawn and goal are left empty, or as they are.
+        """
+        texts = form.texts_of(scenario)
+        if not placed:
+            old = self.texts
+            texts |= {field.id: old[field.id] if keep_places else "" for field in form.PLACES}
+        if not form.are_jobs(self.texts["jobs"]):
+            texts["jobs"] = _default_jobs()
+        self.set_texts(texts)
+        names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
+        for kind, name in names.items():
+            select = self.query_one(f"#{kind}", SchemaSelect)
+            with select.prevent(Select.Changed):
+                select.value = name
+        self._dim()
+        self._explain(self.app.focused)
+        self.post_message(self.Edited(place=True))
+
+    def set_texts(self, texts: dict[str, str]) -> None:
+        """Fills in some of the fields."""
+        self._unopened |= {id: text for id, text in texts.items() if id in self._unopened}
+        for id, text in texts.items():
+            if id in self._unopened:
+                continue
+            field = self.query_one(f"#{id}")
+            field.remove_class("-wrong")
+            if _text(field) != text:
+                field.value = text
+
+    def show_fields(self, show: bool) -> None:
+        """All of it, or without the settings only their outcome, the name and Start."""
+        self.query_one("#fields").display = self.query_one("#explained").display = show
+
+    def suggest_name(self, name: str) -> None:
+        """Fills in a run name, unless the user gave one."""
+        self._suggested = name
+        if not self._name_given:
+            field = self.query_one("#name", Input)
+            with field.prevent(Input.Changed):
+                field.value = name
+
+    # What it says.
+
+    def circumstances(self) -> Circumstances:
+        pair, algorithm = self.method
+        return Circumstances(algorithm, pair, self.seconds, os.cpu_count() or 1)
+
+    @on(SchemaSelect.Looked)
+    def _looked(self, event: SchemaSelect.Looked) -> None:
+        event.stop()
+        algorithm = event.name if event.kind == "algorithm" else self.method[1]
+        self._dim(algorithm)
+        self._explain_name(event.kind, event.name, algorithm)
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        self._explain(event.widget)
+
+    def _explain(self, widget: Widget | None) -> None:
+        """The field that has the focus, or else the algorithm, which most depends on."""
+        id = next((each.id for each in (widget, widget and widget.parent) if each and each.id in FIELDS), None)
+        if id is not None:
+            self._explain_field(FIELDS[id])
+        elif isinstance(widget, SchemaSelect):
+            self._explain_name(widget.kind, widget.chosen, self.method[1])
+        else:
+            self._explain_name("algorithm", self.method[1], self.method[1])
+
+    def _explain_name(self, kind: Kind, name: str, algorithm: str) -> None:
+        unused = note(kind, name if kind == "algorithm" else algorithm)
+        self.query_one(Explained).show(f"{kind} {plain(name)}", paragraph(kind, name), unused)
+
+    def _explain_field(self, field: form.Field) -> None:
+        now = self.circumstances()
+        words = f"{meaning(field)} {cost(field, self.texts, now)}".strip()
+        self.query_one(Explained).show(field.label, words, not_used(field, now))
+
+    def _dim(self, algorithm: str = "") -> None:
+        """What the algorithm does not use stays a choice, for the next algorithm."""
+        algorithm = algorithm or self.method[1]
+        used, now = uses(algorithm), Circumstances(algorithm, self.method[0])
+        for select in self.query(SchemaSelect):
+            select.set_class(select.kind != "algorithm" and select.kind not in used, "-unused")
+        for field in form.ADVANCED:
+            if field.id not in self._unopened:
+                self.query_one(f"#{field.id}").set_class(bool(not_used(field, now)), "-unused")
+
+    def tell_cost(self, words: str) -> None:
+        """Tests and time that the settings come to."""
+        self.query_one("#cost", Static).update(Text(words, no_wrap=True, overflow="ellipsis"))
+
+    def tell_command(self, words: str, typed: bool = True) -> None:
+        """The command that does the same, or where it is not to be `typed`, why there is none."""
+        line = Text("$ " if typed and words else "", "bold", no_wrap=True, overflow="ellipsis")
+        self.query_one("#command", Static).update(line.append(plain(words), "not bold"))
+
+    def complain(self, error: UserError) -> None:
+        """One line below the fields; the wrong field is marked and gets the cursor."""
+        self.tell(f"{MARK}{error}")
+        id = form.field_of(error)
+        if id is None:
+            return
+        if FIELDS[id] in form.ADVANCED:
+            self._open_more(True)
+        self.call_after_refresh(self._point_at, id)
+
+    def _point_at(self, id: str) -> None:
+        for wrong in self.query(f"#{id}"):
+            wrong.add_class("-wrong")
+            wrong.focus()
+
+    def tell(self, words: str) -> None:
+        line = self.query_one("#wrong", Static)
+        line.display = bool(words)
+        line.update(Text(plain(words)))
+
+    # What is done in it.
+
+    @on(Button.Pressed, "#more")
+    def toggle_more(self) -> None:
+        """Shows or hides the rarely used settings."""
+        self._open_more(not any(grid.display for grid in self.query("#advanced")))
+
+    def _open_more(self, show: bool) -> None:
+        if self._unopened:
+            texts, self._unopened = self._unopened, {}
+            self.query_one("#fields").mount(Grid(*_widgets(form.ADVANCED, texts), id="advanced", classes="grid"))
+            self.call_after_refresh(self._dim)
+        else:
+            self.query_one("#advanced").display = show
+        self.query_one("#more", Button).label = Content("▾ fewer settings (f9)" if show else MORE)
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        event.stop()
+        event.input.remove_class("-wrong")
+        if event.input.id == "name":
+            self._name_given = bool(event.value.strip())
+        self._edited(event.input)
+
+    @on(Select.Changed)
+    def _picked(self, event: Select.Changed) -> None:
+        event.stop()
+        self._dim()
+        self._edited(event.select)
+
+    def _edited(self, widget: Widget) -> None:
+        if widget.has_focus and widget.id in FIELDS:
+            self._explain_field(FIELDS[widget.id])
+        self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
+
+
+def _default_jobs() -> str:
+    return str(os.cpu_count() or 1)
+
+
+def _text(widget: Any) -> str:
+    return str(widget.value)
+
+
+def _grid(id: str, fields: tuple[form.Field, ...]) -> Grid:
+    return Grid(*_widgets(fields, {}), id=id, classes="grid")
+
+
+def _widgets(fields: tuple[form.Field, ...], texts: dict[str, str]) -> list[Widget]:
+    """A label and a field for each, with its text."""
+    return [each for field in fields for each in (Label(field.label, markup=False), _entry(field, texts))]
+
+
+def _entry(field: form.Field, texts: dict[str, str]) -> Widget:
+    if not field.choices:
+        return Input(texts.get(field.id, ""), id=field.id, compact=True, placeholder=field.empty)
+    choices = [(choice, choice) for choice in field.choices]
+    value = texts.get(field.id, field.choices[0])
+    return Select(choices, value=value, id=field.id, allow_blank=False, compact=True)

@@ -1,0 +1,142 @@
+"""A scenario as a file of its own, which loads to the same scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, Static
+
+from ddenv.errors import UserError
+from ddenv.workbench.background import tell
+from ddenv.workbench.wording import plain
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def scenario_path(text: str) -> Path:
+    """The file that a user names, with .yaml where he left it out. Raises UserError for what cannot be one."""
+    text = text.strip()
+    if not text.strip("./") or text.endswith("/") or "\0" in text:
+        raise UserError("give the name of a file, such as my-world.yaml")
+    path = Path(text)
+    try:
+        path = path.expanduser()
+    except RuntimeError:
+        raise UserError(f"{path}: there is no such user here") from None
+    path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
+    try:
+        if path.is_dir():
+            raise UserError(f"{path}: is a folder; give the name of a file")
+        if not path.parent.is_dir():
+            raise UserError(f"{path}: there is no folder {path.parent}")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
+    return path
+
+
+def save_scenario(scenario: Scenario, path: Path) -> None:
+    """Writes `scenario` as YAML, in place of what is there. Raises UserError, with nothing written.
+
+    Files in the folder of `path` are named relative to it, so that the folder can be moved.
+    """
+    import yaml
+
+    from ddenv.world.files.access import write_file
+
+    for each in (scenario.world, scenario.robot.model):
+        if not each.is_file():
+            raise UserError(
+                f"{each}: is not there any more, so that no scenario could name it; "
+                "'ddenv export' writes the world of a run"
+            )
+    data = scenario.model_dump(mode="json")
+    folder = path.resolve().parent
+    data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
+    data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
+    # Only programs of the user's own are searched there.
+    if scenario.oracle is None and ":" not in scenario.controller.use:
+        del data["folder"]
+    else:
+        data["folder"] = _name(scenario.folder, folder)
+    write_file(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+
+
+def _name(path: Path, folder: Path) -> str:
+    """What `path` is called in a scenario of `folder`: relative if it goes along when that folder is moved."""
+    path = path.resolve()
+    return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
+
+
+class SaveScenario(ModalScreen[Path | None]):
+    """The file that was written, or None. What is there is only replaced after a second enter."""
+
+    CSS_PATH = "../help/dialogs.tcss"
+    CSS = """
+    SaveScenario { align: center middle; }
+    SaveScenario .dialog { width: 80; }
+    SaveScenario .dialog Static, SaveScenario .dialog Input { width: 100%; }
+    SaveScenario .dialog Input { background: $panel; }
+    SaveScenario .dialog #wrong { color: $text-warning; }
+    """
+    BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="save.cancel", tooltip="write nothing")]
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self._scenario = scenario
+        self._replace: Path | None = None
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Save as a scenario"
+            dialog.border_subtitle = "enter saves   escape cancels"
+            yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
+            yield Input(_suggested(self._scenario.name), placeholder="name of a file", id="path", compact=True)
+            yield Static("", id="wrong", markup=False)
+
+    @on(Input.Changed)
+    def _changed(self) -> None:
+        self._replace = None
+        self._tell("")
+
+    @on(Input.Submitted)
+    def _submitted(self, event: Input.Submitted) -> None:
+        try:
+            path = scenario_path(event.value)
+        except UserError as error:
+            self._tell(str(error))
+            return
+        if path.exists() and path != self._replace:
+            self._replace = path
+            self._tell(f"{path} exists already: enter again replaces it, or type another name")
+            return
+        self._write(path)
+
+    @work(thread=True, group="save", exclusive=True)
+    def _write(self, path: Path) -> None:
+        try:
+            save_scenario(self._scenario, path)
+        except UserError as error:
+            tell(self, self._tell, str(error))
+            return
+        tell(self, self.dismiss, path)
+
+    def _tell(self, words: str) -> None:
+        self.query_one("#wrong", Static).update(Text(plain(words)))
+
+    def action_cancel(self) -> None:
+        self.dismiss(None)
+
+
+def _suggested(name: str) -> str:
+    stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in name)
+    return f"{stem[:60]}.yaml"

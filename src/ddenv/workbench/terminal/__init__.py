@@ -1,0 +1,1 @@
+"""What the workbench sends to a terminal, over SSH too, and to a browser."""

@@ -1,0 +1,102 @@
+"""The colours: two themes of ours beside Textual's, and the terminal's own colours where it has but sixteen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rich.color import ANSI_COLOR_NAMES
+from rich.color import Color as RichColor
+from rich.style import Style
+from textual.color import Color, ColorParseError
+from textual.theme import BUILTIN_THEMES, Theme
+
+from ddenv.errors import UserError
+
+# Calm and dark.
+DARK = Theme(
+    name="ddenv",
+    primary="#6cb6ff",
+    secondary="#8b95a7",
+    accent="#f2cc60",
+    warning="#e3b341",
+    error="#ff7b72",
+    success="#57c98a",
+    foreground="#d5dbe5",
+    background="#0f141b",
+    surface="#171e28",
+    panel="#1c2531",
+    dark=True,
+    variables={"footer-key-foreground": "#6cb6ff", "primary-muted": "#24476b"},
+)
+# The same in daylight: colours are darker, so that they can be read on white.
+LIGHT = Theme(
+    name="ddenv-light",
+    primary="#0a58b0",
+    secondary="#55606f",
+    accent="#7d5300",
+    warning="#7a5000",
+    error="#b3261e",
+    success="#156b3e",
+    foreground="#1c232d",
+    background="#f6f8fb",
+    surface="#ffffff",
+    panel="#e9eef5",
+    dark=False,
+    variables={"footer-key-foreground": "#0a58b0", "primary-muted": "#b9d4f3", "panel-lighten-2": "#a9b6c8"},
+)
+# The terminal's own sixteen colours: for terminals that have no more, and for people who chose them well.
+ANSI = "ansi-dark"
+OURS = (DARK, LIGHT)
+# What people also call them.
+ALIASES = {"textual-ansi": ANSI, "ansi_dark": ANSI, "ansi": ANSI, "dark": DARK.name, "light": LIGHT.name}
+
+
+def theme_names() -> tuple[str, ...]:
+    """The names of all themes, ours first."""
+    return (*(theme.name for theme in OURS), *sorted(BUILTIN_THEMES))
+
+
+def theme_called(name: str, where: str) -> str:
+    """The theme that `name` stands for. Raises UserError, which begins with `where`."""
+    found = ALIASES.get(name, name)
+    if found in theme_names():
+        return found
+    raise UserError(f"{where}: there is no theme '{name}'{nearest(name, theme_names())}; 'ddenv config' lists them")
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """A question that offers what was probably meant, or nothing."""
+    from difflib import get_close_matches
+
+    found = get_close_matches(name, list(names), 1, 0.5)
+    return f"; did you mean '{found[0]}'?" if found else ""
+
+
+def fitting(color_system: str | None) -> str:
+    """The theme for a terminal with so many colours, as Rich names them."""
+    # Ours would become whichever of sixteen colours is nearest, some of them the same.
+    return ANSI if color_system == "standard" else DARK.name
+
+
+def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
+    """A theme's variables, with the terminal's own colours called as Rich calls them: not ansi_red 50% but red."""
+    return {key: _for_rich(value) for key, value in variables.items()}
+
+
+def _for_rich(value: str) -> str:
+    if value == "transparent":
+        return "default"
+    return value.split()[0].removeprefix("ansi_") if value.startswith("ansi_") else value
+
+
+def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style:
+    """The theme's colour `name` as the colour of text; without colour where the theme leaves it to the terminal."""
+    try:
+        return Style(color=_color(variables[name]), bold=bold or None)
+    except (KeyError, ColorParseError):
+        return Style(bold=bold or None)
+
+
+def _color(value: str) -> RichColor:
+    # To Textual `blue` is the web's, not the terminal's own.
+    return RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color

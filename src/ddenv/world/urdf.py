@@ -1,0 +1,264 @@
+"""The `<link>`s of URDF: mass, shapes, colours, and the friction that Gazebo's own elements give them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ddenv.schemas import nearest
+from ddenv.world.model import Model
+from ddenv.world.sdf.context import VERSIONS, Context
+from ddenv.world.sdf.xml import Element, complain, name_of, number, text_of
+
+
+def element(tag: str, source: Element, text: str = "", **attributes: str) -> Element:
+    """An SDF element with that text, which stands where `source` does and belongs to it."""
+    made = Element(tag, attributes)
+    made.text = text
+    made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
+    made.parent = source
+    return made
+
+
+def twin(source: Element, **attributes: str) -> Element:
+    """The SDF element for one of URDF that has the same tag, without what is in it."""
+    made = element(source.tag, source, **attributes)
+    made.parent = source.parent
+    return made
+
+
+def given(source: Element, attribute: str) -> str:
+    """An attribute that URDF asks for. Raises UserError where it is missing."""
+    value = source.get(attribute)
+    if value is None or not value.strip():
+        raise complain(source, f"has no attribute '{attribute}'")
+    return value.strip()
+
+
+def value(source: Element, attribute: str) -> float:
+    """An attribute that is one finite number. Raises UserError."""
+    holder = element(source.tag, source)
+    holder.append(element(attribute, source, given(source, attribute)))
+    return number(holder, attribute, 0.0)
+
+
+def three(source: Element, attribute: str, default: str) -> str:
+    """An attribute of three words, or `default`. Raises UserError."""
+    text = source.get(attribute, default)
+    if len(text.split()) != 3:
+        raise complain(source, f"{attribute} must be three numbers, found '{text[:60]}'")
+    return text
+
+
+def pose(source: Element, relative_to: str = "") -> Element:
+    """The `<pose>` that the `<origin>` in `source` stands for. Raises UserError."""
+    origin = source.find("origin")
+    holder = source if origin is None else origin
+    words = "0 0 0 0 0 0" if origin is None else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
+    return element("pose", holder, words, **({"relative_to": relative_to} if relative_to else {}))
+
+
+KINDS = ("fixed", "revolute", "continuous", "prismatic")
+LIMITED = ("revolute", "prismatic")
+# URDF's own defaults. Not to be limited at all is a joint of another kind.
+LIMITS = {"lower": "0", "upper": "0"}
+
+
+def ends(joint: Element, links: list[str]) -> tuple[str, str]:
+    """The names of the parent and the child link of `joint`. Raises UserError."""
+    found = []
+    for tag in ("parent", "child"):
+        end = joint.find(tag)
+        if end is None:
+            raise complain(joint, f"has no <{tag}>")
+        name = given(end, "link")
+        if name not in links:
+            raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
+        found.append(name)
+    return found[0], found[1]
+
+
+def joint_of(source: Element, parent: str, child: str) -> Element:
+    """The SDF joint. Raises UserError."""
+    kind = (source.get("type") or "").strip()
+    if kind not in KINDS:
+        raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+    made = twin(source, name=name_of(source), type=kind)
+    made.extend([element("parent", source, parent), element("child", source, child)])
+    if kind != "fixed":
+        made.append(_axis(source, kind))
+    return made
+
+
+def _axis(source: Element, kind: str) -> Element:
+    given_axis, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
+    if kind in LIMITED and limit is None:
+        raise complain(source, f"a {kind} joint needs a <limit>")
+    place = source if given_axis is None else given_axis
+    made = element("axis", source)
+    made.append(element("xyz", place, "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")))
+    if limit is not None:
+        made.append(_limit(limit, kind))
+    if dynamics is not None:
+        damped = twin(dynamics)
+        damped.append(element("damping", dynamics, dynamics.get("damping", "0")))
+        made.append(damped)
+    return made
+
+
+def _limit(source: Element, kind: str) -> Element:
+    made = twin(source)
+    for tag, default in LIMITS.items() if kind in LIMITED else ():
+        made.append(element(tag, source, source.get(tag, default)))
+    made.extend([element(tag, source, source.get(tag)) for tag in ("effort", "velocity") if source.get(tag)])
+    return made
+
+
+# What URDF says of each shape, by the attribute, with the SDF element that says it.
+SHAPES = {
+    "box": {"size": "size"},
+    "cylinder": {"radius": "radius", "length": "length"},
+    "sphere": {"radius": "radius"},
+    "capsule": {"radius": "radius", "length": "length"},
+    "mesh": {"filename": "uri"},
+}
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+FRICTION = {"mu1": "mu", "mu2": "mu2"}
+
+
+def has_mass(link: Element) -> bool:
+    """Whether `link` has a mass: many of a robot's links are frames only. Raises UserError."""
+    mass = link.find("inertial/mass")
+    return mass is not None and value(mass, "value") != 0.0
+
+
+def link_of(source: Element, robot: Element, context: Context) -> Element:
+    """The SDF link without its pose. Raises UserError."""
+    name = name_of(source)
+    made = twin(source, name=name)
+    if has_mass(source):
+        made.append(_inertial(source.find("inertial")))
+    for tag in ("collision", "visual"):
+        for count, part in enumerate(source.findall(tag)):
+            shape = twin(part, name=part.get("name") or f"{tag}_{count}")
+            shape.extend([pose(part), _geometry(part, context)])
+            made.append(shape)
+            shape.extend(_surface(name, part, robot) if tag == "collision" else _material(part, robot))
+    return made
+
+
+def _inertial(source: Element) -> Element:
+    made = twin(source)
+    made.append(pose(source))
+    mass, tensor = source.find("mass"), source.find("inertia")
+    made.append(element("mass", mass, given(mass, "value")))
+    if tensor is not None:
+        inertia = twin(tensor)
+        inertia.extend([element(tag, tensor, given(tensor, tag)) for tag in TENSOR])
+        made.append(inertia)
+    return made
+
+
+def _geometry(part: Element, context: Context) -> Element:
+    source = part.find("geometry")
+    if source is None or not len(source):
+        raise complain(part, "has no <geometry> with a shape in it")
+    shape = source[0]
+    if shape.tag not in SHAPES:
+        raise complain(shape, f"<{shape.tag}> is no shape of URDF; use one of {', '.join(SHAPES)}")
+    made = twin(shape)
+    for attribute, tag in SHAPES[shape.tag].items():
+        text = given(shape, attribute)
+        made.append(element(tag, shape, _found(text, shape, context) if tag == "uri" else text))
+    if shape.tag == "mesh" and shape.get("scale"):
+        made.append(element("scale", shape, three(shape, "scale", "")))
+    geometry = twin(source)
+    geometry.append(made)
+    return geometry
+
+
+def _found(uri: str, shape: Element, context: Context) -> str:
+    """The URI of a mesh; one in the package that the file itself lies in is its path."""
+    package, _, rest = uri.removeprefix("package://").partition("/")
+    if not uri.startswith("package://") or context.stand_in(uri) is not None:
+        return uri
+    folder = next((folder for folder in shape.source.absolute().parents if folder.name == package), None)
+    return uri if folder is None else str(folder / rest)
+
+
+def _surface(link: str, part: Element, robot: Element) -> list[Element]:
+    """The `<surface>` that `<gazebo reference="link">` gives a collision, if there is one."""
+    ode = element("ode", part)
+    for extension in robot.findall("gazebo"):
+        for tag, ours in FRICTION.items():
+            found = extension.find(tag)
+            if found is not None and extension.get("reference") == link:
+                ode.append(element(ours, found, text_of(found) or given(found, "value")))
+    friction, surface = element("friction", part), element("surface", part)
+    friction.append(ode)
+    surface.append(friction)
+    return [surface] if len(ode) else []
+
+
+def _material(part: Element, robot: Element) -> list[Element]:
+    """The `<material>` of a visual: its own colour, or that of the robot's material of that name."""
+    own = part.find("material")
+    if own is None:
+        return []
+    named = [other for other in robot.findall("material") if other.get("name") == own.get("name")]
+    color = next((found for each in (own, *named) if (found := each.find("color")) is not None), None)
+    if color is None:
+        return []
+    made = twin(own)
+    made.append(element("diffuse", color, given(color, "rgba")))
+    return [made]
+
+
+ROOT = "robot"
+
+
+def to_sdf(robot: Element, context: Context) -> Element:
+    """The `<sdf>` for the outermost element of a URDF file, its root link first. Raises UserError."""
+    _check_expanded(robot)
+    # Nothing like the version of SDF, for which it would be taken.
+    robot.attrib.pop("version", None)
+    links = {name_of(link): link for link in reversed(robot.findall("link"))}
+    if not links:
+        raise complain(robot, "has no <link>")
+    joints = [(joint, *ends(joint, list(links))) for joint in robot.findall("joint")]
+    origins = {child: pose(joint, parent) for joint, parent, child in joints}
+    root = _root(robot, list(links), set(origins))
+    model = element("model", robot, name=name_of(robot))
+    for link in sorted(robot.findall("link"), key=lambda link: name_of(link) != root):
+        made = link_of(link, robot, context)
+        if name_of(link) in origins:
+            made.append(origins[name_of(link)])
+        model.append(made)
+    model.extend([joint_of(joint, parent, child) for joint, parent, child in joints])
+    sdf = element("sdf", robot, version=VERSIONS[-1])
+    sdf.append(model)
+    return sdf
+
+
+def massless(robot: Element) -> frozenset[str]:
+    """The names of the links without a mass of their own."""
+    return frozenset(name_of(link) for link in robot.findall("link") if not has_mass(link))
+
+
+def without_mass(model: Model, names: frozenset[str]) -> Model:
+    """`model` with the links `names` as mere frames: to those the SDF reader gives a mass."""
+    links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
+    return replace(model, links=tuple(links))
+
+
+def _check_expanded(robot: Element) -> None:
+    for each in robot.iter():
+        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
+            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
+
+
+def _root(robot: Element, links: list[str], children: set[str]) -> str:
+    roots = [name for name in reversed(links) if name not in children]
+    if len(roots) != 1:
+        found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
+        raise complain(robot, f"expected one link that is no joint's child, {found}")
+    return roots[0]

@@ -1,1 +1,0 @@
-"""URDF files, read as the SDF that they amount to."""

@@ -1,0 +1,334 @@
+"""The command line on the real robot, end to end, and its one line for each mistake."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.store import SCHEMA_VERSION, RunFile
+from tests.conftest import DATA
+from tests.waiting import PATIENCE, wait_until
+
+WALL = str(DATA / "wall.yaml")
+
+
+def ddenv(*words, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE, **options
+    )
+
+
+@pytest.fixture(scope="module")
+def reduced(tmp_path_factory):
+    """A finished reduction of the small world: its folder and its summary."""
+    folder = tmp_path_factory.mktemp("reduced")
+    os.environ["DDENV_HOME"] = str(folder)
+    try:
+        done = ddenv("run", WALL, "--json", "--jobs", 2, "--output", folder / "minimal.sdf")
+    finally:
+        del os.environ["DDENV_HOME"]
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_a_reduction_finds_the_two_that_matter(reduced):
+    _, summary = reduced
+    assert summary["kept"] == ["deck", "wall"]
+    assert summary["minimal"] is True
+    assert (summary["models_before"], summary["models_after"]) == (6, 2)
+    assert sum(summary["outcomes"].values()) == summary["tests"]
+    assert summary["failure_rate"] == 1.0
+    assert summary["outcomes"]["pass"] > 0
+    assert set(summary) >= {"deflake_runs", "rounds", "wall_seconds", "run_file"}
+
+
+def test_the_minimal_world_fails_as_the_run_did_and_without_its_model_it_does_not(reduced):
+    folder, summary = reduced
+    run = summary["run_file"]
+    assert _outcomes(ddenv("test", run, "--minimal", "--repeat", 3, "--json")) == ["similar"] * 3
+    assert _outcomes(ddenv("test", run, "--minimal", "--leave-each-out", "--json")) == ["similar", "pass", "pass"]
+    assert _outcomes(ddenv("test", run, "--keep", "beam,post", "--seed", 7, "--json")) == ["pass"]
+    assert _outcomes(ddenv("test", WALL, "--world", folder / "minimal.sdf", "--json")) == ["failed"]
+
+
+def _outcomes(done):
+    assert done.returncode == 0, done.stderr
+    return [run["outcome"] for run in json.loads(done.stdout)["runs"]]
+
+
+def test_the_same_seed_gives_the_same_end_to_the_last_bit():
+    one, two = (json.loads(ddenv("test", WALL, "--seed", 5, "--json").stdout)["runs"][0] for _ in range(2))
+    assert one["end_pose"] == two["end_pose"]
+    assert one["seed"] == 5
+
+
+def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
+    _, summary = reduced
+    done = ddenv("export", summary["run_file"], "--sdf", tmp_path / "m.sdf", "--scenario", tmp_path / "m.yaml")
+    assert done.returncode == 0, done.stderr
+    assert b"far_box" not in (tmp_path / "m.sdf").read_bytes()
+    assert _outcomes(ddenv("test", tmp_path / "m.yaml", "--json")) == ["failed"]
+
+
+def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
+    # Long enough that a robot at the wall can be ended early.
+    done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["kept"], summary["minimal"], summary["failure"]) == (reduced[1]["kept"], True, "stuck")
+    assert summary["ended_early"] > 0
+    assert "confirming what is left with full runs" in done.stderr
+
+
+def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(reduced):
+    folder, _ = reduced
+    (folder / "runs" / "broken.ddenv").write_text("no run file")
+    done = ddenv("runs", env=os.environ | {"DDENV_HOME": str(folder)})
+    assert done.returncode == 0
+    assert "wall-1" in done.stdout
+    assert "2 of 6 models" in done.stdout
+    assert "is no ddenv run file" in done.stdout
+
+
+def test_a_finished_run_resumes_to_its_summary(reduced):
+    _, summary = reduced
+    done = ddenv("resume", summary["run_file"], "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout) == summary
+
+
+def test_an_sdf_world_runs_with_a_spawn_and_a_goal(home):
+    done = ddenv("test", DATA / "wall.sdf", "--spawn", "0,0,0.45,0", "--goal", "4,0", "--timeout", 5)
+    assert done.returncode == 0, done.stderr
+    assert "failed" in done.stdout
+    assert "stuck" in done.stdout
+
+
+def test_a_world_in_which_the_robot_does_not_fail_ends_with_1(home):
+    done = ddenv("run", DATA / "wall.sdf", "--spawn", "-3,0,0.15", "--goal", "-5,0", "--json")
+    assert done.returncode == 1, done.stderr
+    summary = json.loads(done.stdout)
+    assert "there is no failure to reduce" in summary["reason"]
+    assert summary["minimal"] is False
+    assert summary["models_after"] == 6
+
+
+def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ddenv", "run", WALL, "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    path = home / "runs" / "wall-1.ddenv"
+    wait_until(lambda: path.exists() and engine_is_alive(path))
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert json.loads(out)["status"] == "stopped"
+    assert "ddenv resume" in err
+    assert not engine_is_alive(path)
+    done = ddenv("resume", "wall-1", "--json")
+    assert json.loads(done.stdout)["kept"] == ["deck", "wall"]
+
+
+def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced):
+    """kill -9 of the engine at different moments: the same end, and no finished test is made twice."""
+    _, undisturbed = reduced
+    run = home / "killed.ddenv"
+    # Re-runs enough that there is still something to do when the last engine is killed, also on a busy machine.
+    start = [sys.executable, "-m", "ddenv", "run", WALL, "--output", str(run), "--jobs", "2", "--iterations", "9"]
+    for engines, moment in enumerate((3, 9, 15), start=1):
+        process = subprocess.Popen(start, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        # The one before may have made more tests than this one waits for.
+        wait_until(
+            lambda n=engines, least=moment: run.exists() and len(_engines(run)) == n and len(_finished(run)) >= least
+        )
+        os.kill(_engines(run)[-1], signal.SIGKILL)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 2
+        assert err.count("\n") == 1
+        assert "ddenv resume" in err
+        start = [sys.executable, "-m", "ddenv", "resume", str(run), "--jobs", "2"]
+    done = ddenv("resume", run, "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["kept"] == undisturbed["kept"]
+    assert len(_finished(run)) == len(set(_finished(run)))
+
+
+def _engines(run):
+    """The processes of all engines so far."""
+    with RunFile(run) as file:
+        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"]
+
+
+def _finished(run):
+    """Each finished test as (models, run)."""
+    from ddenv.engine.journal import Journal
+
+    with RunFile(run) as file:
+        journal = Journal(file)
+        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
+
+
+def test_a_second_engine_is_refused(reduced):
+    _, summary = reduced
+    from pathlib import Path
+
+    with engine_lock(Path(summary["run_file"])):
+        done = ddenv("resume", summary["run_file"])
+    _is_one_line(done, "another engine works on this run")
+
+
+def _is_one_line(done, words):
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert words in done.stderr
+    assert done.stdout == ""
+
+
+MISTAKES = {
+    "no scenario": (["run", "dich"], "did you mean ditch?"),
+    "no file": (["run", "nothing.yaml"], "no such file"),
+    "pair": (["run", WALL, "--pair", "model2model/nearest"], "reduction.pair: 'model2model/nearest' is not allowed"),
+    "no pair": (["run", WALL, "--pair", "model2model"], "reduction.pair: 'model2model' is not allowed (did you mean"),
+    "algorithm": (
+        ["run", WALL, "--algorithm", "ddmn"],
+        "reduction.algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
+    ),
+    "delta": (["run", WALL, "--delta", "0"], "reduction.delta: should be greater than 0"),
+    "candidates": (
+        ["run", WALL, "--candidates", "complement"],
+        "reduction.candidates: 'complement' is not allowed (did you mean complements?); use one of both",
+    ),
+    "complement order": (
+        ["run", WALL, "--complement-order", "far"],
+        "reduction.complement_order: 'far' is not allowed",
+    ),
+    "prior": (["run", WALL, "--prior", "flat"], "reduction.prior: 'flat' is not allowed"),
+    "iterations": (["run", WALL, "--iterations", "-1"], "reduction.iterations: should be greater than or equal to 0"),
+    "timeout": (["run", WALL, "--timeout", "0"], "failure.timeout: should be greater than 0"),
+    "not a number": (["run", WALL, "--seed", "x"], "'x' is not a valid integer"),
+    "jobs": (["run", WALL, "--jobs", "0"], "--jobs"),
+    "unknown option": (["run", WALL, "--fast"], "No such option"),
+    "unknown command": (["reduce"], "No such command 'reduce'"),
+    "spawn inside": (["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"], "inside model 'wall'"),
+    "no spawn": (["run", DATA / "wall.sdf"], "needs --spawn x,y,z,yaw and --goal x,y"),
+    "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
+    "name": (["run", WALL, "--name", "../x"], "cannot be a file's name"),
+    "no run": (["open", "nothing"], "no such run file"),
+    "not a run": (["resume", __file__], "is no ddenv run file"),
+    "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
+    "minimal": (["test", WALL, "--minimal"], "needs a run"),
+    "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
+    "world twice": (
+        ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],
+        "--world: goes with a scenario",
+    ),
+    "output": (["run", WALL, "--output", "x.txt"], "neither a folder nor"),
+}
+
+
+@pytest.mark.parametrize(("words", "told"), MISTAKES.values(), ids=MISTAKES.keys())
+def test_a_mistake_gets_one_line_and_leaves_nothing(home, words, told):
+    _is_one_line(ddenv(*words, cwd=home), told)
+    assert list(home.rglob("*")) == []
+
+
+def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
+    from ddenv.cli.app import app
+    from ddenv.runs.creation import read_parts
+
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
+    monkeypatch.setattr("ddenv.cli.app._follow", lambda *_: 0)
+    options = {
+        "pair": "trajectoryseg/timestep",
+        "algorithm": "probdd",
+        "delta": 0.25,
+        "candidates": "complements",
+        "complement_order": "far-first",
+        "growth": "steady",
+        "skip": "implied",
+        "prior": "uniform",
+    }
+    words = [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", str(value))]
+    words += ["--early-stop", "--epsilon", "0.2"]
+    assert app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False) == 0
+    assert app(["run", WALL, "--output", str(home / "plain.ddenv")], standalone_mode=False) == 0
+    with RunFile(home / "asked.ddenv") as asked, RunFile(home / "plain.ddenv") as plain:
+        own, found = read_parts(plain)[0], read_parts(asked)[0]
+    assert found.reduction == own.reduction.model_copy(update=options)
+    assert found.failure == own.failure.model_copy(update={"early_stop": True, "epsilon": 0.2})
+
+
+def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):
+    import sqlite3
+
+    run = home / "broken.ddenv"
+    assert ddenv("run", WALL, "--output", run, "--jobs", 1).returncode == 0
+    with sqlite3.connect(run) as database:
+        database.execute("UPDATE document SET content = x'7b7d' WHERE name = 'scenario'")
+    _is_one_line(ddenv("resume", run), "its scenario is not valid")
+    _is_one_line(ddenv("test", run), "its scenario is not valid")
+
+
+def test_without_a_screen_nobody_is_asked(home):
+    run = home / "asked.ddenv"
+    from ddenv.runs.creation import create_run
+    from ddenv.world.load import load_scenario
+
+    create_run(load_scenario(DATA / "wall.yaml"), run)
+    with RunFile(run) as viewer:
+        viewer.send("accept_mode", mode="ask")
+    done = ddenv("resume", run, "--json")
+    assert json.loads(done.stdout)["minimal"]
+
+
+def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
+    data = yaml.safe_load((DATA / "wall.yaml").read_text())
+    data["name"], data["world"] = "../esc", str(DATA / "wall.sdf")
+    data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
+    (home / "s.yaml").write_text(yaml.safe_dump(data))
+    (home / "in").mkdir()
+    summary = json.loads(ddenv("run", home / "s.yaml", "--output", home / "in", "--json").stdout)
+    assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
+
+
+def test_a_malformed_world_is_told_with_its_line(home):
+    data = yaml.safe_load((DATA / "wall.yaml").read_text())
+    (home / "w.sdf").write_text("<sdf version='1.9'>\n<world name='w'>\n<model name='m'>\n</world></sdf>")
+    data["world"] = "w.sdf"
+    data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
+    (home / "s.yaml").write_text(yaml.safe_dump(data))
+    _is_one_line(ddenv("run", home / "s.yaml"), "w.sdf:4: not well-formed XML")
+
+
+def test_a_newer_run_file_is_refused(reduced, tmp_path):
+    import sqlite3
+    from pathlib import Path
+
+    copy = tmp_path / "newer.ddenv"
+    copy.write_bytes(Path(reduced[1]["run_file"]).read_bytes())
+    with sqlite3.connect(copy) as database:
+        database.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+    for command in ("open", "resume", "test"):
+        _is_one_line(ddenv(command, copy), "written by a newer ddenv")
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(1, "1 part of w.sdf was replaced"), (2, "2 parts of w.sdf were replaced")]
+)
+def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
+    from types import SimpleNamespace
+
+    from ddenv.cli.app import _tell_notes
+
+    _tell_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
+    assert capsys.readouterr().out.startswith(words)

@@ -1,0 +1,167 @@
+"""`ddenv world`: what is told of a world, and the files it writes."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from ddenv.cli.world_check import lines, report
+from ddenv.map.names import width
+from ddenv.world.read import parse_world
+from tests.conftest import DATA
+from tests.waiting import PATIENCE
+
+WORLD = b"""<sdf version='1.6'><world name='hall'>
+<model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>
+<model name='crate'><pose>1 2 3 0 0 0.5</pose><link name='l'><collision name='c'><geometry><box><size>1 2 4</size></box></geometry>
+<surface><friction><ode><mu>1</mu><mu2>0.5</mu2></ode></friction></surface></collision></link></model>
+<model name='crate'><static>1</static><link name='l'/></model>
+<plugin name='p' filename='f'/>
+<state><model name='crate'><pose>4 2 3 0 0 0</pose></model></state>
+</world></sdf>"""
+
+
+@pytest.fixture
+def world(tmp_path):
+    return parse_world(WORLD, tmp_path / "hall.world")
+
+
+def ddenv(*words):
+    return subprocess.run(
+        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE
+    )
+
+
+def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):
+    told = lines(world)
+    (row,) = (line for line in told if line.startswith("crate  "))
+    assert "dynamic" in row and "1 box" in row and "1.00 x 2.00 x 4.00" in row and "4.00, 2.00, 3.00" in row
+    notes = [line.split("  ", 1)[1].strip() for line in told[told.index("notes") + 1 : -2]]
+    moved = next(number for number, note in enumerate(notes, 1) if "<state>" in note)
+    assert f"{moved} (3.00 m)" in row
+    assert any(line.startswith("crate #2") and "none" in line for line in told)
+    assert told[-1] == "3 models, 2 can be removed; 4 replaced, 1 ignored"
+
+
+def box(name, pose="0 0 0 0 0 0", relative=""):
+    return (
+        f"<model name='{name}'><static>1</static><pose{relative}>{pose}</pose><link name='l'><collision name='c'><geometry>"
+        "<box><size>1 1 1</size></box></geometry></collision></link></model>"
+    )
+
+
+def world_of(tmp_path, *models, more=""):
+    text = f"<sdf version='1.9'><world name='w'>{''.join(models)}{more}</world></sdf>"
+    return parse_world(text.encode(), tmp_path / "w.sdf")
+
+
+def test_one_is_one(tmp_path):
+    assert lines(world_of(tmp_path, box("a")))[-1].startswith("1 model, 1 can be removed; ")
+
+
+def test_models_that_must_stay_are_named(tmp_path):
+    def following(name):
+        return box(f"on {name}", relative=f" relative_to='{name}'")
+
+    one = lines(world_of(tmp_path, box("a"), following("a")))[-1]
+    assert one.startswith("2 models, 1 can be removed; 1 stays since others are placed relative to it: a; ")
+    many = [part for name in "abcdefg" for part in (box(name), following(name))]
+    told = lines(world_of(tmp_path, *many))[-1]
+    assert "; 7 stay since others are placed relative to them: a, b, c, d, e and 2 more; " in told
+
+
+STATE = "".join(
+    f"<model name='crate {name}'><pose>{number} 9 3 0 0 0</pose></model>" for number, name in enumerate("ab")
+)
+CROWD = (box("crate a"), box("crate b"), box("a model whose name is far longer than all of the others"), box("箱" * 12))
+
+
+def rows_of(told):
+    return told[told.index("") + 1 : len(told) - told[::-1].index("notes") - 2]
+
+
+def test_a_narrow_terminal_gets_the_columns_that_matter_most(tmp_path):
+    world = world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>")
+    heads = {columns: " ".join(rows_of(lines(world, columns))[0].split()) for columns in (None, 200, 110, 100, 90, 80)}
+    full = "model kind links shapes size, m centre x, y, z, m yaw notes"
+    assert heads[None] == heads[200] == full
+    detailed = {columns: any(" m)" in row for row in rows_of(lines(world, columns))) for columns in heads}
+    assert detailed[None] and detailed[200] and not detailed[110]
+    order = [" ".join(rows_of(lines(world, columns))[0].split()) for columns in range(140, 40, -1)]
+    assert list(dict.fromkeys(order))[:4] == [
+        full,
+        full.replace("links ", ""),
+        full.replace("links shapes ", ""),
+        full.replace("links shapes ", "").replace("yaw ", ""),
+    ]
+
+
+@pytest.mark.parametrize("columns", [1, 20, 40, 62, 80, 120])
+def test_no_line_is_wider_than_the_terminal(tmp_path, columns):
+    told = lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>"), columns)
+    assert max(map(width, rows_of(told))) <= columns
+    assert columns < 20 or max(map(width, told)) <= columns
+
+
+def test_notes_hang_below_their_number(tmp_path):
+    told = lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>"), 40)
+    notes = told[told.index("notes") + 1 : told.index("", told.index("notes"))]
+    assert notes[0].startswith("   1  replaced: ")
+    assert any(line.startswith("      ") and line.strip() for line in notes)
+
+
+def test_wide_names_stay_in_their_column(tmp_path):
+    rows = rows_of(lines(world_of(tmp_path, *CROWD, more=f"<state>{STATE}</state>")))
+    starts = {width(row[: row.index("static")]) for row in rows[1:]}
+    assert starts == {width(rows[0][: rows[0].index("kind")])}
+
+
+def test_the_object_has_everything(world):
+    told = json.loads(json.dumps(report(world)))
+    crate = next(model for model in told["models"] if model["name"] == "crate")
+    assert (crate["kind"], crate["removable"], crate["line"]) == ("dynamic", True, 3)
+    assert crate["pose"][:3] == [4, 2, 3]
+    assert (crate["low"], crate["high"]) == ([3.5, 1, 1], [4.5, 3, 5])
+    assert crate["friction"] == [0.5]
+    assert crate["mass"] == 1.0
+    assert {note["kind"] for note in crate["notes"]} == {"replaced"}
+    assert told["notes"][0]["what"] == "<plugin>"
+    assert ":6: /sdf/world/plugin" in told["notes"][0]["place"]
+
+
+def test_names_never_steer_the_terminal(tmp_path):
+
+    world = parse_world(WORLD.replace(b"'crate'", "'cr\u202eate'".encode()), tmp_path / "x.sdf")
+    assert not any("\u202e" in line for line in lines(world))
+
+
+def test_the_commands(tmp_path):
+    wall = DATA / "wall.sdf"
+    table = ddenv("world", "check", wall)
+    assert table.returncode == 0
+    assert table.stdout.rstrip().endswith("7 models, 6 can be removed; everything was taken as it is written")
+    assert len(json.loads(ddenv("world", "check", wall, "--json").stdout)["models"]) == 7
+    drawn = ddenv("world", "show", wall)
+    assert drawn.returncode == 0 and "wall" in drawn.stdout and "\x1b" not in drawn.stdout
+    assert ddenv("world", "show", wall, "--svg", tmp_path / "map.svg").stdout == f"wrote {tmp_path / 'map.svg'}\n"
+    assert (tmp_path / "map.svg").read_text().startswith("<svg") or "<svg" in (tmp_path / "map.svg").read_text()[:200]
+    assert ddenv("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout == f"wrote {tmp_path / 'out.sdf'}\n"
+
+
+WRONG = {
+    "missing": (("check", "nowhere.sdf"), "nowhere.sdf: no such file"),
+    "folder": (("show", str(DATA)), "is a folder"),
+    "scenario": (("check", str(DATA / "wall.yaml")), "is a scenario; give the SDF file of its world"),
+    "option": (("check", str(DATA / "wall.sdf"), "--stand-in", "x"), "--stand-in: expected URI=SHAPE"),
+    "unknown": (("check", str(DATA / "wall.sdf"), "--ignore", "walls"), "'walls' is not one of"),
+    "no folder": (("convert", str(DATA / "wall.sdf"), "-o", "/no/where/x.sdf"), "cannot be written"),
+}
+
+
+@pytest.mark.parametrize(("words", "said"), WRONG.values(), ids=WRONG.keys())
+def test_mistakes_get_one_line(words, said):
+    done = ddenv("world", *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1 and done.stdout == ""
