@@ -1,9 +1,9 @@
-"""Puts what studies came to into the pages: tables between marks in docs/study.md and README.md, and the figures of the first one.
+"""Writes the results of studies into the pages: tables between marks in docs/study.md and README.md, and the first study's figures.
 
     python -m docs.study_page STUDY AS_PRINTED ALL SEEDS
 
-These are folders of `ddenv study`: of the nine cells; of the same with --growth paper --skip known; with --pairs all --algorithms
-all; and with --seeds. A mark is <!-- NAME --> ... <!-- end -->.
+These are folders of `ddenv study`: the nine cells; the same as printed in the paper; --pairs all --algorithms all; and --seeds.
+A mark is <!-- NAME --> ... <!-- end -->. The README's `headline` has the ranges of the table `nine`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
-PAGES = (DOCS / "study.md", DOCS.parent / "README.md")
+STUDY, README = DOCS / "study.md", DOCS.parent / "README.md"
 FIGURES = DOCS / "study"
 # The tables of a scenario: tests, reduction and time; what is behind them.
 NUMBERS, BEHIND = 0, 1
@@ -33,22 +33,46 @@ def main() -> None:
         "seeds behind": _scenarios(seeds, BEHIND),
         "best": _table(every, "Which is best where", 0),
     }
-    for page in PAGES:
-        text = page.read_text()
-        for name, table in tables.items():
-            text = re.sub(rf"(<!-- {name} -->\n).*?(<!-- end -->)", _between(table), text, flags=re.DOTALL)
-        page.write_text(text)
+    tables["headline"] = headline(tables["nine"])
+    for page in (STUDY, README):
+        page.write_text(filled(page.read_text(), tables))
     FIGURES.mkdir(exist_ok=True)
     for picture in sorted(nine.glob("study.figure-*.svg")):
         (FIGURES / picture.name.removeprefix("study.")).write_text(picture.read_text())
 
 
-def _between(table: str):
-    return lambda match: f"{match[1]}\n{table}\n{match[2]}"
+def filled(page: str, tables: dict[str, str]) -> str:
+    """The page with these tables between the marks of their names."""
+    for name, table in tables.items():
+        between = f"<!-- {name} -->\n\n{table}\n<!-- end -->"
+        page = re.sub(rf"<!-- {name} -->\n.*?<!-- end -->", lambda _, text=between: text, page, flags=re.DOTALL)
+    return page
+
+
+def marked(page: str, name: str) -> str:
+    """The lines of the table between the marks of this name."""
+    return TABLE.findall(page.partition(f"<!-- {name} -->")[2].partition("<!-- end -->")[0])[0]
+
+
+def headline(nine: str) -> str:
+    """One row for each scenario of the table `nine`: each column's range, without the columns of scenario and method."""
+    head, sides, *rows = ([cell.strip() for cell in line.strip("| \n").split("|")] for line in nine.splitlines())
+    found = {
+        scenario: [row[2:] for row in rows if row[0] == scenario] for scenario in dict.fromkeys(row[0] for row in rows)
+    }
+    lines = [[head[0], *head[2:]], [sides[0], *sides[2:]]]
+    lines += [[scenario, *map(_range, zip(*cells, strict=True))] for scenario, cells in found.items()]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _range(cells: tuple[str, ...]) -> str:
+    """Such as "40 to 64", or "95 %" where all are the same."""
+    low, *_, high = sorted(cells, key=lambda cell: float(cell.split()[0]))
+    return low if low == high else f"{low.split()[0]} to {high}"
 
 
 def _sections(study: Path) -> dict[str, str]:
-    """The parts of a study's Markdown by their titles; of a scenario's title its name alone."""
+    """The parts of a study's Markdown by their titles; of a scenario's title only its name."""
     _, *parts = re.split(r"^## ", (study / "study.md").read_text(), flags=re.MULTILINE)
     return {re.split(r",|\n", part)[0]: part for part in parts}
 

@@ -8,7 +8,7 @@ from ddenv.runfile.fold import fold
 from tests.workbench import fake_run
 
 NEAR = "model2model/failure-proximal"
-# Of the table in the README: models, and mean tests with a failure that always shows and with one that shows in 80 % of the runs.
+# The table in docs/benchmarks.md: models, mean tests with a failure that always shows and with one that shows in 80 % of the runs.
 TABLE = (
     ("ddenv", {"growth": "steady", "skip": "implied"}, ((43, 15.9, 44), (25, 35.0, 120), (200, 54.9, 170))),
     ("ddenv", {}, ((43, 36.9, 120), (36, 67.9, 242), (200, 238.5, 858))),
