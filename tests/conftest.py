@@ -5,11 +5,11 @@ import signal
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import settings
 
-# A slow machine is no bug.
-settings.register_profile("ddenv", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("ddenv")
+from tests.tiers import SLOW
+
+settings.load_profile("quick")
 
 # Programs that tests start can be interrupted, also where the tests run in the background.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -24,6 +24,14 @@ def home(tmp_path, monkeypatch) -> Path:
     """A folder of its own for runs."""
     monkeypatch.setenv("DDENV_HOME", str(tmp_path))
     return tmp_path
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is slow for one of the named reasons is `slow`."""
+    for item in items:
+        if any(item.get_closest_marker(name) for name in SLOW):
+            item.add_marker("slow")
 
 
 def pytest_xdist_auto_num_workers() -> int:

@@ -47,6 +47,7 @@ def test_a_reduction_finds_the_two_that_matter(reduced):
     assert set(summary) >= {"deflake_runs", "rounds", "wall_seconds", "run_file"}
 
 
+@pytest.mark.programs
 def test_the_minimal_world_fails_as_the_run_did_and_without_its_model_it_does_not(reduced):
     folder, summary = reduced
     run = summary["run_file"]
@@ -61,6 +62,7 @@ def _outcomes(done):
     return [run["outcome"] for run in json.loads(done.stdout)["runs"]]
 
 
+@pytest.mark.programs
 def test_the_same_seed_gives_the_same_end_to_the_last_bit():
     one, two = (json.loads(ddenv("test", WALL, "--seed", 5, "--json").stdout)["runs"][0] for _ in range(2))
     assert one["end_pose"] == two["end_pose"]
@@ -75,6 +77,7 @@ def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
     assert _outcomes(ddenv("test", tmp_path / "m.yaml", "--json")) == ["failed"]
 
 
+@pytest.mark.programs
 def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     # Long enough that a robot at the wall can be ended early.
     done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop")
@@ -109,6 +112,7 @@ def test_an_sdf_world_runs_with_a_spawn_and_a_goal(home):
     assert "stuck" in done.stdout
 
 
+@pytest.mark.programs
 def test_a_world_in_which_the_robot_does_not_fail_ends_with_1(home):
     done = ddenv("run", DATA / "wall.sdf", "--spawn", "-3,0,0.15", "--goal", "-5,0", "--json")
     assert done.returncode == 1, done.stderr
@@ -137,6 +141,7 @@ def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     assert json.loads(done.stdout)["kept"] == ["deck", "wall"]
 
 
+@pytest.mark.programs
 def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced):
     """kill -9 of the engine at different moments: the same end, and no finished test is made twice."""
     _, undisturbed = reduced
@@ -268,6 +273,7 @@ def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
     assert found.failure == own.failure.model_copy(update={"early_stop": True, "epsilon": 0.2})
 
 
+@pytest.mark.programs
 def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):
     import sqlite3
 
@@ -279,6 +285,7 @@ def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):
     _is_one_line(ddenv("test", run), "its scenario is not valid")
 
 
+@pytest.mark.programs
 def test_without_a_screen_nobody_is_asked(home):
     run = home / "asked.ddenv"
     from ddenv.runs.creation import create_run
@@ -291,6 +298,7 @@ def test_without_a_screen_nobody_is_asked(home):
     assert json.loads(done.stdout)["minimal"]
 
 
+@pytest.mark.programs
 def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
     data = yaml.safe_load((DATA / "wall.yaml").read_text())
     data["name"], data["world"] = "../esc", str(DATA / "wall.sdf")

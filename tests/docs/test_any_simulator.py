@@ -42,11 +42,13 @@ def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
     assert promise in reduced[1].splitlines()
 
 
+@pytest.mark.examples
 def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(reduced, tmp_path):
     done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", folder=tmp_path)
     assert [run["outcome"] for run in json.loads(done.stdout)["runs"]] == ["similar", "pass", "pass"]
 
 
+@pytest.mark.examples
 def test_the_same_seed_gives_the_same_run(tmp_path):
     done = ddenv("test", SCENARIO, "--seed", 3, "--repeat", 2, "--json", folder=tmp_path)
     again = ddenv("test", SCENARIO, "--seed", 3, "--json", folder=tmp_path)

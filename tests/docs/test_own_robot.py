@@ -29,6 +29,7 @@ def test_the_guide_tells_every_field(part):
     assert [name for name in part.__annotations__ if f"`{name}`" not in GUIDE] == []
 
 
+@pytest.mark.examples
 def test_the_example_is_reduced_to_what_the_guide_says(tmp_path):
     """On Drake, by the command that the guide shows."""
     command = [sys.executable, "-m", "ddenv", "run", str(EXAMPLE / "scenario.yaml"), "--jobs", "2", "--json"]

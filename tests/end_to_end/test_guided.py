@@ -21,6 +21,7 @@ def baseline(terminal, tmp_path):
     return run
 
 
+@pytest.mark.terminal
 def test_a_reduction_is_guided_by_keys_alone(terminal, baseline, tmp_path):
     run = baseline
     bench = terminal(80, 24, "open", "one")
@@ -101,6 +102,7 @@ def _export(bench, folder):
     bench.see("A B parts")
 
 
+@pytest.mark.terminal
 def test_suspended_and_back_in_front(terminal, baseline):
     shell = terminal(80, 24, program=("bash", "--norc", "-i"))
     shell.press(f"PS1='$ '; {DDENV} open one", "Enter")

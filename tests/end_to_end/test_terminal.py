@@ -11,7 +11,7 @@ from tests.end_to_end.terminal import state_of
 from tests.waiting import wait_until
 
 
-@pytest.mark.parametrize(("width", "height"), [(120, 36), (80, 24)])
+@pytest.mark.parametrize(("width", "height"), [pytest.param(120, 36, marks=pytest.mark.terminal), (80, 24)])
 def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, height):
     first = terminal(width, height, "run", DATA / "wall.yaml", "--name", "one", "--jobs", "1")
     first.see("baseline")
@@ -45,6 +45,7 @@ def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, heig
     again.press("q")
 
 
+@pytest.mark.terminal
 def test_the_first_screen_offers_the_ditch(terminal):
     setup = terminal(80, 24)
     screen = setup.see("ditch")

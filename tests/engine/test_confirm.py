@@ -5,7 +5,7 @@ from pathlib import Path
 from zlib import crc32
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine.journal import Journal
@@ -13,6 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.test_driver import Killed, _kill, flaky, needs, story
+from tests.tiers import examples
 
 METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
 
@@ -48,7 +49,7 @@ def contradicted(state, oracle) -> bool:
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()) or "own")
 @given(salt=st.integers(0, 200), often=st.integers(0, 10), jobs=st.integers(1, 3), iterations=st.integers(0, 2))
-@settings(max_examples=15)
+@examples(0.15)
 def test_what_full_runs_contradict_is_never_minimal(method, salt, often, jobs, iterations):
     oracle = flaky(salt, "wall", "beam")
     with tempfile.TemporaryDirectory() as folder:
@@ -143,7 +144,7 @@ def test_what_is_left_and_breaks_in_full_is_told(tmp_path):
 
 
 @given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
-@settings(max_examples=12)
+@examples(0.1)
 def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
     oracle, cut = flaky(salt, "wall", "beam"), wrong(salt, 6)
     with tempfile.TemporaryDirectory() as folder:

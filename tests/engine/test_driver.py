@@ -8,7 +8,7 @@ from pathlib import Path
 from zlib import crc32
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
@@ -19,6 +19,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.schemas import names, pairs
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.tiers import examples
 
 
 def needs(*names):
@@ -187,7 +188,7 @@ class Killed(Exception):
 
 @every_method
 @given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
-@settings(max_examples=10)
+@examples(0.1)
 def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
         oracle = flaky(salt, "wall", "beam")

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
@@ -13,6 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.test_driver import Killed, _finished, _kill, flaky, needs
+from tests.tiers import examples
 
 
 @pytest.fixture(autouse=True)
@@ -350,7 +351,7 @@ class Disturbed(FakePool):
     moments=st.lists(st.integers(5, 80), max_size=2),
     jobs=st.integers(1, 3),
 )
-@settings(max_examples=25)
+@examples(0.25)
 def test_whatever_is_decided_and_whenever_it_is_killed_the_run_ends_sound(salt, plan, moments, jobs):
     with tempfile.TemporaryDirectory() as folder:
         path, oracle, plan = new_run(Path(folder)), flaky(salt, "wall", "beam"), sorted(plan, key=lambda one: one[0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.map.footprints import ROUND, footprint
@@ -27,7 +27,6 @@ def print_of(shape: Shape, pose: Pose = Pose(), corners: int = ROUND):  # noqa: 
     return footprint(Model("m", Pose((4, 5, 6)), True, (Link("l", Pose(), None, collisions, ()),), (), (), 1), corners)
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SHAPES), st.builds(Pose.from_rpy, angle, angle, angle, angle, angle, angle))
 def test_an_outline_is_as_large_as_its_shape(shape, pose):
     low, high = shape_bounds(shape, pose)

@@ -3,12 +3,13 @@
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.map.footprints import Footprint
 from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners
 from ddenv.world.extent import convex_hull
+from tests.tiers import examples
 
 VIEW = View(0.3, -0.2, 0.5, 12, 6)
 coordinates = st.floats(-6, 6).map(lambda value: round(value, 3))
@@ -44,7 +45,7 @@ def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
     return inside, unsure
 
 
-@settings(max_examples=30, deadline=None)
+@examples(0.3)
 @given(models)
 def test_all_models_fill_the_pixels_that_each_one_fills(shapes):
     prints = prints_of(shapes)
@@ -60,7 +61,6 @@ def test_all_models_fill_the_pixels_that_each_one_fills(shapes):
     assert (grid == expected)[~unsure].all()
 
 
-@settings(max_examples=60, deadline=None)
 @given(models, st.lists(st.integers(0, 5), max_size=4, unique=True))
 def test_of_the_drawn_models_the_last_one_is_on_top(shapes, wanted):
     prints = prints_of(shapes)
@@ -72,7 +72,6 @@ def test_of_the_drawn_models_the_last_one_is_on_top(shapes, wanted):
     assert (owners(masks(prints, VIEW), VIEW, drawn) == expected).all()
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.integers(-1, 3), min_size=24, max_size=24), st.integers(0, 100))
 def test_a_letter_stands_on_the_cell_nearest_to_the_centre(values, seed):
     grid = np.array(values).reshape(6, 4)
@@ -91,7 +90,6 @@ def test_a_letter_stands_on_the_cell_nearest_to_the_centre(values, seed):
         assert away[row, column] == min(away.values())
 
 
-@settings(max_examples=60, deadline=None)
 @given(models, st.lists(st.tuples(coordinates, coordinates), max_size=3))
 def test_huge_models_do_not_widen_the_map(shapes, points):
     prints = prints_of(shapes)

@@ -3,10 +3,11 @@
 from zlib import crc32
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.reduction.worlds import ALGORITHMS, PAIRS, evidence, run, worlds
+from tests.tiers import examples
 
 OPTIONS = st.fixed_dictionaries(
     {
@@ -33,7 +34,7 @@ def any_oracle(salt):
 
 @every_search
 @given(world=worlds, options=OPTIONS)
-@settings(max_examples=20)
+@examples(0.2)
 def test_a_monotone_oracle_leaves_exactly_the_needed_models(algorithm, pair, world, options):
     count, numbers, seed = world
     needed = {f"m{index}" for index in numbers}
@@ -43,7 +44,7 @@ def test_a_monotone_oracle_leaves_exactly_the_needed_models(algorithm, pair, wor
 
 @every_search
 @given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
-@settings(max_examples=20)
+@examples(0.2)
 def test_any_deterministic_oracle_leaves_a_one_minimal_environment(algorithm, pair, world, salt, options):
     count, _, seed = world
     is_similar = any_oracle(salt)
@@ -53,7 +54,7 @@ def test_any_deterministic_oracle_leaves_a_one_minimal_environment(algorithm, pa
 
 @every_search
 @given(world=worlds, salt=st.integers(0, 10**6), options=OPTIONS)
-@settings(max_examples=10)
+@examples(0.1)
 def test_partitions_are_disjoint_not_empty_and_cover_the_environment(algorithm, pair, world, salt, options):
     count, _, seed = world
     for round, _ in run(evidence(count, seed), any_oracle(salt), pair, algorithm, **options)[1]:
@@ -71,7 +72,7 @@ def test_partitions_are_disjoint_not_empty_and_cover_the_environment(algorithm, 
 
 @every_search
 @given(world=worlds, salt=st.integers(0, 10**6))
-@settings(max_examples=10)
+@examples(0.1)
 def test_the_environment_only_ever_becomes_a_winner(algorithm, pair, world, salt):
     count, _, seed = world
     known = evidence(count, seed)
@@ -94,7 +95,7 @@ def test_an_empty_world_needs_no_round(algorithm):
 
 
 @given(world=worlds)
-@settings(max_examples=40)
+@examples(0.4)
 def test_what_is_implied_is_tried_only_to_prove_the_end_minimal(world):
     """With `skip: implied`, no subset of an environment without f is tried, but for one without a single model."""
     count, numbers, seed = world

@@ -5,7 +5,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.reduction.chance import beliefs, spatial_prior, undominated
@@ -31,7 +31,6 @@ def exact(prior, groups):
     prior=st.lists(st.floats(0.02, 0.6), min_size=2, max_size=8).map(np.array),
     bits=st.lists(st.integers(1, 2**16), min_size=1, max_size=3),
 )
-@settings(max_examples=60, deadline=None)
 def test_beliefs_are_near_bayes_rule(prior, bits):
     count = len(prior)
     groups = np.array([[bool(number >> index & 1) for index in range(count)] for number in bits])

@@ -6,12 +6,13 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import ddenv
 from ddenv.schemas import names
 from tests.conftest import ROOT
+from tests.tiers import examples
 
 ELEMENTS = tuple("abcdefgh")
 POSITIONS = {name: (float(index), 0.5, 0.0) for index, name in enumerate(ELEMENTS)}
@@ -64,7 +65,7 @@ def test_its_history_goes_from_all_to_what_is_kept():
 
 
 @given(salt=st.integers(0, 2**31))
-@settings(max_examples=30)
+@examples(0.3)
 def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs(salt):
     rng = np.random.default_rng(salt)
 

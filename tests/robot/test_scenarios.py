@@ -21,6 +21,7 @@ from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario
+from tests.tiers import slow
 
 # What is left of each, with other models for a part of the world that is more than that.
 MINIMAL = {
@@ -35,10 +36,12 @@ MORE = {
 }
 # Where the robot is when its time is up, m.
 ENDS = {"ditch": (-0.29, 0.04, 2.08), "rubble": (-0.18, 0.03, 0.18), "friction": (2.15, -0.59, 0.12)}
-# Loose boards cost time; `benchmarks/failure_rates.py` has thirty seeds of each.
-SEEDS = {"ditch": 30, "rubble": 8, "friction": 30}
-REPAIRED_SEEDS = 10
-each = pytest.mark.parametrize("name", list(MINIMAL))
+# `benchmarks/failure_rates.py` has thirty seeds of each.
+SEEDS = {"ditch": 10, "rubble": 6, "friction": 10}
+REPAIRED_SEEDS = 5
+each = pytest.mark.parametrize("name", MINIMAL)
+each_often = pytest.mark.parametrize("name", slow(pytest.mark.rates, MINIMAL))
+each_witnessed = pytest.mark.parametrize("name", slow(pytest.mark.rates, MINIMAL, but=["friction"]))
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def test_the_friction_of_patches_differs_a_thousandfold():
     assert max(green) < mus["ground_plane"] < min(red)
 
 
-@each
+@each_often
 def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     results = [whole(name, seed) for seed in range(SEEDS[name])]
     failed = [result for result in results if result.outcome == "failed"]
@@ -106,7 +109,7 @@ def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     assert {failed[number].failure for number in np.flatnonzero(similar)} == {"stuck"}
 
 
-@each
+@each_often
 def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
     scenario = part(name).scenario
     world = parse_world(script(name)[name](repaired=True).encode(), Path("repaired"))
@@ -128,42 +131,44 @@ def shows_f(name: str, keep: set[str], seeds: range) -> list[bool]:
     return [judge(part(name).template.run(frozenset(keep), seed), failure(name)).outcome == "similar" for seed in seeds]
 
 
-@each
+@each_witnessed
 def test_few_models_show_the_same_failure_and_none_of_them_can_be_removed(name):
     assert sum(shows_f(name, MINIMAL[name], range(4))) >= 2
     for left_out in MINIMAL[name]:
         assert not any(shows_f(name, MINIMAL[name] - {left_out}, range(4))), left_out
 
 
-@each
+def few(name: str) -> frozenset[str]:
+    return frozenset(MINIMAL[name] | MORE[name])
+
+
+@cache
+def bits_of_few(name: str) -> bytes:
+    return bits(part(name).template.run(few(name), seed=5))
+
+
+@each_often
 def test_a_used_context_gives_the_same_bits_as_a_fresh_one(name):
-    subset, template = frozenset(MINIMAL[name] | MORE[name]), part(name).template
-    first = template.run(subset, seed=5)
+    first, template = bits_of_few(name), part(name).template
     template.run(frozenset(MINIMAL[name]), seed=6)
-    assert bits(template.run(subset, seed=5)) == bits(first)
+    assert bits(template.run(few(name), seed=5)) == first
     fresh = Template(part(name).world, part(name).robot, part(name).scenario)
-    assert bits(fresh.run(subset, seed=5)) == bits(first)
+    assert bits(fresh.run(few(name), seed=5)) == first
 
 
-@each
+@each_witnessed
 def test_switching_models_off_gives_the_same_bits_as_building_without_them(name):
-    subset = frozenset(MINIMAL[name] | MORE[name])
     world = part(name).world
-    smaller = replace(world, models=tuple(one for one in world.models if one.name in subset | {"ground_plane"}))
+    smaller = replace(world, models=tuple(one for one in world.models if one.name in few(name) | {"ground_plane"}))
     template = Template(smaller, part(name).robot, part(name).scenario)
-    assert bits(template.run(subset, seed=5)) == bits(part(name).template.run(subset, seed=5))
+    assert bits(template.run(few(name), seed=5)) == bits_of_few(name)
 
 
-@each
+@each_often
 def test_another_process_gives_the_same_bits(name):
-    subset = frozenset(MINIMAL[name] | MORE[name])
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        elsewhere = pool.submit(run_elsewhere, name, subset, 5).result()
-    assert elsewhere == bits(part(name).template.run(subset, seed=5))
-
-
-def run_elsewhere(name: str, keep: frozenset[str], seed: int) -> bytes:
-    return bits(part(name).template.run(keep, seed))
+        elsewhere = pool.submit(bits_of_few, name).result()
+    assert elsewhere == bits_of_few(name)
 
 
 def bits(result: RunResult) -> bytes:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.extent import bounds, center, model_bounds, shape_bounds
@@ -30,7 +30,6 @@ SHAPES = [
 angle = st.floats(-3, 3)
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SHAPES), st.builds(Pose.from_rpy, angle, angle, angle, angle, angle, angle))
 def test_every_point_is_in_the_box_and_some_are_on_each_side(case, pose):
     shape, surface = case

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from ddenv.cli import main
+from tests.tiers import slow
 from tests.waiting import PATIENCE
 
 # Bytes, and seconds of CPU: generous for a slow machine, and other work on it does not count.
@@ -477,7 +478,7 @@ def test_encodings_of_one_byte_are_read(check, encoding):
     assert name in said.out
 
 
-@pytest.mark.parametrize("place", ["here", "include", "mesh"])
+@pytest.mark.parametrize("place", slow(pytest.mark.fuzz, ["here", "include", "mesh"], but=["mesh"]))
 def test_defaults_of_a_document_type_never_fill_the_memory(tmp_path, place):
     """A few bytes of such a file can stand for many GB, with no entity in it."""
     bomb = f'<!DOCTYPE x [<!ATTLIST a x CDATA "{"y" * 1_000_000}">]>'
@@ -558,7 +559,7 @@ def test_a_file_that_is_missing_is_refused(tmp_path, monkeypatch, capsys):
         refusal(said, tmp_path)
 
 
-@pytest.mark.parametrize("name", ["/dev/zero", "/dev/null", "/dev/tty"])
+@pytest.mark.parametrize("name", slow(pytest.mark.fuzz, ["/dev/zero", "/dev/null", "/dev/tty"], but=["/dev/zero"]))
 def test_a_device_is_refused(name):
     refusal(in_own_process(name, seconds=AT_ONCE), name)
 
@@ -617,7 +618,7 @@ def test_files_that_include_each_other_through_a_linked_folder_are_refused(tmp_p
     refusal(in_own_process(path), tmp_path)
 
 
-@pytest.mark.parametrize("last", [LINK, ""], ids=["with a link", "with nothing"])
+@pytest.mark.parametrize("last", slow(pytest.mark.fuzz, [LINK, ""]), ids=["with a link", "with nothing"])
 def test_includes_that_multiply_are_bounded(tmp_path, last):
     """Nine files, ten includes in each: a thousand million links."""
     for number in range(9):
@@ -679,8 +680,8 @@ MANY = {
 }
 
 
-@pytest.mark.parametrize("name", MANY)
-@pytest.mark.parametrize("json", [(), ("--json",)], ids=["table", "json"])
+@pytest.mark.parametrize("name", slow(pytest.mark.fuzz, MANY, but=["frames in a row"]))
+@pytest.mark.parametrize("json", slow(pytest.mark.fuzz, [(), ("--json",)], but=[()]), ids=["table", "json"])
 def test_any_number_of_things_is_read_or_refused_soon(tmp_path, name, json):
     path = tmp_path / "hostile.world"
     text = MANY[name]
@@ -688,7 +689,7 @@ def test_any_number_of_things_is_read_or_refused_soon(tmp_path, name, json):
     read_or_refused(in_own_process(path, *json), path)
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+@pytest.mark.parametrize("encoding", slow(pytest.mark.fuzz, ["ascii", "latin-1"], but=["ascii"]))
 @pytest.mark.parametrize("wrong", [False, True])
 def test_a_terminal_without_unicode_gets_what_it_can_show(tmp_path, encoding, wrong):
     path = tmp_path / "hostile.world"

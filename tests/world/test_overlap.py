@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
@@ -48,7 +48,6 @@ def true_depth(a: Hull, b: Hull) -> float:
     return max(0.0, float((-ConvexHull(differences).equations[:, 3]).min()))
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SHAPES), st.sampled_from(SHAPES), turned, turned, st.tuples(*[st.floats(-0.5, 0.5)] * 3))
 def test_the_depth_of_bodies_with_faces_is_exact(first, second, rpy, other, at):
     a, b = body(first, (0, 0, 0), rpy), body(second, at, other)
@@ -56,7 +55,6 @@ def test_the_depth_of_bodies_with_faces_is_exact(first, second, rpy, other, at):
     assert overlap(b, a) == pytest.approx(overlap(a, b), abs=1e-4)
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SHAPES + ROUND), st.sampled_from(SHAPES + ROUND), turned, turned, turned, st.floats(0.01, 5))
 def test_bodies_apart_do_not_overlap(first, second, rpy, other, direction, gap):
     length = math.sqrt(sum(part * part for part in direction))
@@ -67,7 +65,6 @@ def test_bodies_apart_do_not_overlap(first, second, rpy, other, direction, gap):
     assert overlap(body(first, (0, 0, 0), rpy), body(second, away, other)) == 0.0
 
 
-@settings(max_examples=60)
 @given(st.sampled_from(SHAPES[:4] + ROUND), turned, turned, st.tuples(*[st.floats(-0.15, 0.15)] * 3))
 def test_bodies_that_share_a_point_overlap(shape, rpy, other, at):
     # Each holds a ball of radius 0.19 around its place, and these are closer than 0.38.

@@ -3,7 +3,7 @@
 from xml.etree import ElementTree
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.convert import write_converted
@@ -12,6 +12,7 @@ from ddenv.world.read import parse_world, read_world
 from ddenv.world.scenario import Reading
 from ddenv.world.subworld import without
 from tests.conftest import ROOT
+from tests.tiers import examples
 from tests.world.test_convert import assert_same_in_drake
 
 WORLDS = ROOT.parent / "shared" / "worlds"
@@ -55,7 +56,7 @@ def test_sizes_are_as_gazebo_scaled_them(real):
         assert real.model(name).collisions[0].shape == Box(pytest.approx((20, 20, height)))
 
 
-@settings(max_examples=25)
+@examples(0.25)
 @given(data=st.data())
 def test_a_smaller_world_is_the_same_text_without_the_removed_models_and_their_states(real, data):
     removed = data.draw(st.sets(st.sampled_from(real.elements())))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.robot.navigation.route import STEPS, Grid, way_to
@@ -34,7 +34,6 @@ def best_lengths(factors: np.ndarray, start: int) -> np.ndarray:
     factors=st.lists(st.sampled_from([1.0, 1.3, 4.0, np.inf]), min_size=4 * COUNT**2, max_size=4 * COUNT**2),
     start=st.integers(0, COUNT**2 - 1),
 )
-@settings(max_examples=60, deadline=None)
 def test_no_way_is_shorter(factors, start):
     factors = np.array(factors).reshape(4, -1)
     lengths, sources = GRID.search(factors, start)

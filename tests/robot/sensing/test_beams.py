@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world import scenario
@@ -16,6 +16,7 @@ from ddenv.world.pose import Pose
 from tests.robot.conftest import wedge
 from tests.robot.sensing.conftest import lidar_of, loose, plain, scan, still
 from tests.robot.sensing.slow import first_met
+from tests.tiers import examples
 
 # How deep a beam has to get into a shape, or how far to pass it, for both ways to agree on whether it meets it.
 CLEAR = 1e-6
@@ -79,7 +80,7 @@ def agree(ranges: np.ndarray, expected: np.ndarray, clear: np.ndarray) -> None:
     np.testing.assert_allclose(ranges[clear], expected[clear], rtol=1e-7, atol=1e-6)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(2)
 @given(lidars, turned | st.just(Pose()), st.lists(st.tuples(shapes, poses), min_size=1, max_size=4))
 def test_beams_go_as_far_as_the_slow_way_says(lidar, robot, around):
     placed = [(shape, robot @ pose) for shape, pose in around]
@@ -87,7 +88,6 @@ def test_beams_go_as_far_as_the_slow_way_says(lidar, robot, around):
     agree(scan(lidar_of(*models, settings=lidar), robot).ranges, *slowly(lidar, robot, placed))
 
 
-@settings(max_examples=100, deadline=None)
 @given(lidars, turned, st.lists(st.tuples(shapes, turned, poses), min_size=1, max_size=3))
 def test_what_moves_is_met_where_it_is_now(lidar, robot, around):
     models = [loose(f"m{number}", shape, first) for number, (shape, first, _) in enumerate(around)]
@@ -96,7 +96,6 @@ def test_what_moves_is_met_where_it_is_now(lidar, robot, around):
     agree(ranges, *slowly(lidar, robot, [(shape, pose) for (shape, _, _), pose in zip(around, now, strict=True)]))
 
 
-@settings(max_examples=60, deadline=None)
 @given(lidars, turned, st.lists(st.tuples(shapes, poses), min_size=2, max_size=5), st.integers(1, 4))
 def test_what_is_absent_or_never_met_changes_no_bit(lidar, robot, around, count):
     models = [still(f"m{number}", shape, robot @ pose) for number, (shape, pose) in enumerate(around)]

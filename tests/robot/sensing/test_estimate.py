@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.robot.sensing import estimate as filter_module
@@ -48,7 +48,6 @@ def drive(moves, noise: Sensors, seed: int = 0, slip: float = 1.0):
 
 
 @given(moves)
-@settings(max_examples=100, deadline=None)
 def test_without_noise_the_estimate_is_the_truth(moves):
     (x, y, heading), estimate = drive(moves, NOISELESS)
     assert math.hypot(x - estimate.x, y - estimate.y) < 1e-6
@@ -91,7 +90,6 @@ class Matrices:
     st.floats(0, 0.2),
     st.floats(0.001, 0.2),
 )
-@settings(max_examples=100, deadline=None)
 def test_its_scalars_are_the_textbooks_matrices(steps, bias, spread):
     sensors = Sensors(compass=spread, gyro=spread / 2, gyro_bias=bias)
     ours, theirs = Filter(0.0, 0.0, 0.0, sensors), Matrices(sensors)

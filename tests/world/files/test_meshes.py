@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.files import meshes
@@ -136,7 +136,6 @@ def test_bad_obj(tmp_path, text, reason, convex):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_any_bytes_give_a_mesh_or_a_reason(tmp_path_factory, suffix, data):
     """Random bytes, and sound files cut, with bytes changed, or with a piece doubled."""

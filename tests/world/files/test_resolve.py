@@ -2,11 +2,12 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.files.access import Missing, Unusable, read
 from ddenv.world.files.resolve import ENVIRONMENT, find, model_file, search_folders
+from tests.tiers import examples
 
 
 @pytest.fixture(autouse=True)
@@ -235,7 +236,7 @@ WORDS = st.sampled_from(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@examples(2)
 @given(words=st.lists(WORDS | st.text(max_size=4), max_size=6))
 def test_any_uri_stays_inside_or_is_refused(tmp_path_factory, words):
     folder = tmp_path_factory.getbasetemp() / "inside"
