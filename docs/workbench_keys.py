@@ -1,4 +1,4 @@
-"""Writes the tables of keys in docs/workbench.md again, from what the screens themselves know.
+"""Writes the tables of docs/keys.md from the actions of the screens.
 
 python docs/workbench_keys.py
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ddenv.workbench.help.keys import Action, actions, shown_key
 
-PAGE = Path(__file__).resolve().with_name("workbench.md")
+PAGE = Path(__file__).resolve().with_name("keys.md")
 # A table is between these; the sections are the first parts of the actions' names.
 TABLE = re.compile(r"(<!-- keys: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 

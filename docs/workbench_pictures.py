@@ -78,7 +78,7 @@ PICTURES = {
     "scene": Picture("SceneDialog", "Where the 3-D scene is"),
     "quit": Picture("Quit", "What becomes of the engine"),
     "choose": Picture("ChooseModels", "Choosing models by their names"),
-    "other": Picture("Question", "Taking another failure for as good as f"),
+    "other": Picture("Question", "Accepting another failure as f"),
     "change": Picture("Change", "Changing the settings on the way"),
     "history": Picture("History", "The history, with a branch"),
     "compare": Picture("Compare", "Two environments side by side"),
