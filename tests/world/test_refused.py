@@ -1,5 +1,7 @@
 """The user guide's table of what is refused: each of its rows is refused, with file, line and XPath."""
 
+from itertools import takewhile
+
 import pytest
 
 from ddenv.errors import UserError
@@ -128,7 +130,7 @@ ROWS: dict[str, list[str]] = {
 
 def table():
     lines = GUIDE.split("| refused | remedy |\n|---|---|\n")[1].splitlines()
-    return [line.strip("| ").split(" | ")[0] for line in lines[: lines.index("")]]
+    return [line.strip("| ").split(" | ")[0] for line in takewhile(str.strip, lines)]
 
 
 def test_every_row_of_the_table_is_tried():
