@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--scenarios", default="ditch,rubble,friction")
     arguments = parser.parse_args()
-    print("| scenario | world | failed | f | how | longest way to the goal, s |")
+    print("| scenario | world | failed | f | how | longest time to the goal, s |")
     print("|---|---|---|---|---|---|")
     with ProcessPoolExecutor(arguments.jobs, mp_context=get_context("spawn")) as pool:
         for name in arguments.scenarios.split(","):
