@@ -7,9 +7,9 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from ddenv.errors import UserError
-from ddenv.world.convert import convert, write_converted
 from ddenv.world.load import SDF
 from ddenv.world.read import parse_world, read_world
+from ddenv.world.write import convert, write_converted
 from tests.conftest import DATA
 from tests.world.sdf.test_joints import LINKS, joint
 

@@ -21,7 +21,7 @@ from ddenv.robot.drake.articulation import spatial_inertia
 from ddenv.world.model import Joint, Link, Mesh, Model, Plane, Shape, World
 from ddenv.world.read import parse_world
 from ddenv.world.scenario import Reading
-from ddenv.world.subworld import without
+from ddenv.world.write import without
 from tests.conftest import DATA, ROOT
 from tests.tiers import examples, slow
 

@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.world.convert import write_converted
 from ddenv.world.model import Box
 from ddenv.world.read import parse_world, read_world
 from ddenv.world.scenario import Reading
-from ddenv.world.subworld import without
+from ddenv.world.write import without, write_converted
 from tests.conftest import ROOT
 from tests.tiers import examples
 from tests.world.test_convert import assert_same_in_drake

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ddenv.world.load import SDF
 from ddenv.world.read import parse_world, read_world
-from ddenv.world.subworld import without
+from ddenv.world.write import without
 from tests.conftest import DATA
 
 WALL = read_world(DATA / "wall.sdf")

@@ -65,7 +65,7 @@ def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
 )
 def convert(file: Path, output: Path, **reading) -> int:
     """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
-    from ddenv.world.convert import write_converted
+    from ddenv.world.write import write_converted
 
     for path in write_converted(_read(file, reading), output):
         print(f"wrote {path}")

@@ -15,6 +15,14 @@ Cell = tuple[int, int]
 # unless even those are too many.
 ROOM, LEAST_ROOM = 20, 4
 BLOCK = 3, 8
+# One for each model, the largest first: no S and G, which mark start and goal, and none that looks like another one.
+SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
+NO_SIGN, FLOORS = "+", ".:"
+HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
+GREY: RGB = (120, 120, 124)
+FAINT = packed(GREY)
+# Anything darker or brighter could not be seen on some terminal; mean of red, green and blue.
+DARKEST, BRIGHTEST = 60.0, 225.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,16 +91,6 @@ def _elsewhere(index: int, text: str, grid: np.ndarray, occupied: set[Cell], pla
     beside = [(row, column + step) for row, column in cells for step in (1, -1, -len(text))]
     inside = [cell for cell in beside if 0 <= cell[1] < grid.shape[1]]
     return any(_put(index, text, *cell, grid.shape[1], occupied, placed) for cell in [*cells, *inside])
-
-
-# One for each model, the largest first: no S and G, which mark start and goal, and none that looks like another one.
-SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
-NO_SIGN, FLOORS = "+", ".:"
-HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
-GREY: RGB = (120, 120, 124)
-FAINT = packed(GREY)
-# Anything darker or brighter could not be seen on some terminal; mean of red, green and blue.
-DARKEST, BRIGHTEST = 60.0, 225.0
 
 
 def signs(models: Sequence[Drawn]) -> list[str]:

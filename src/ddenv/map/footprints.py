@@ -29,6 +29,11 @@ from ddenv.world.pose import Pose, Vector
 # Corners that stand for a circle on a map of characters.
 ROUND = 12
 _CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+STATIC: RGB = (150, 156, 166)
+DYNAMIC: RGB = (205, 140, 70)
+# A model so many times larger than the median, and than this, is a floor that others stand on (or a roof over them).
+FLOOR_FACTOR = 12.0
+FLOOR_AREA = 4.0  # m^2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,15 +59,6 @@ class Footprint:
         if not self.polygons:
             return math.dist(self.center, point)
         return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
-
-
-def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
-    sides, away = np.roll(polygon, -1, axis=0) - polygon, point - polygon
-    if len(polygon) > 2 and (sides[:, 0] * away[:, 1] >= sides[:, 1] * away[:, 0]).all():
-        return 0.0
-    lengths = np.einsum("ij,ij->i", sides, sides)
-    along = np.einsum("ij,ij->i", sides, away) / np.where(lengths > 0, lengths, 1.0)
-    return float(np.linalg.norm(away - np.clip(along, 0.0, 1.0)[:, None] * sides, axis=1).min())
 
 
 def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
@@ -117,11 +113,13 @@ def _ellipse(half_axes: np.ndarray, circle: np.ndarray) -> np.ndarray:
     return lengths * circle @ directions.T
 
 
-STATIC: RGB = (150, 156, 166)
-DYNAMIC: RGB = (205, 140, 70)
-# A model so many times larger than the median, and than this, is a floor that others stand on (or a roof over them).
-FLOOR_FACTOR = 12.0
-FLOOR_AREA = 4.0  # m^2
+def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
+    sides, away = np.roll(polygon, -1, axis=0) - polygon, point - polygon
+    if len(polygon) > 2 and (sides[:, 0] * away[:, 1] >= sides[:, 1] * away[:, 0]).all():
+        return 0.0
+    lengths = np.einsum("ij,ij->i", sides, sides)
+    along = np.einsum("ij,ij->i", sides, away) / np.where(lengths > 0, lengths, 1.0)
+    return float(np.linalg.norm(away - np.clip(along, 0.0, 1.0)[:, None] * sides, axis=1).min())
 
 
 @dataclass(frozen=True, slots=True)

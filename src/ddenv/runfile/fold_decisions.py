@@ -8,75 +8,6 @@ from dataclasses import replace
 from ddenv.runfile.events import Changes, Data, names, number, one_of
 from ddenv.runfile.state import Decision, Node, Point, RunState, Test, Trial, many
 
-
-def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
-    """One more decision of the user."""
-    one = Decision(at, state.tests_done, state.node, kind, words)
-    return {"decisions": (*state.decisions, one)}
-
-
-def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Changes:
-    """The run comes to another environment, a new node below the current one."""
-    environment = names(state.elements, data["environment"])
-    reduction = state.scenario.get("reduction", {})
-    node = Node(
-        number=len(state.nodes),
-        parent=state.node,
-        how=how,
-        what=what,
-        environment=environment,
-        round=None if state.round is None else state.round.number,
-        tests=state.tests_done,
-        time=at,
-        evidence_test=int(data["evidence_test"]),
-        method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
-    )
-    inside = set(environment) <= set(state.environment)
-    # What the other failure needs is not known yet.
-    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
-    changes = {} if how == "reduced" else left_round(state)
-    return changes | {
-        "nodes": (*state.nodes, node),
-        "node": node.number,
-        "environment": environment,
-        "evidence_test": node.evidence_test,
-        "lower_bound": needed,
-        "minimal": False,
-        "history": (*state.history, Point(state.tests_done, len(environment), needed)),
-    }
-
-
-def failures_at(state: RunState, number: int) -> tuple[int, ...]:
-    """The tests whose ends count as f in a node: f's own, and those of other failures that were accepted on the way there."""
-    accepted, node = [], state.nodes[number]
-    while node.parent is not None:
-        if node.how == "accepted":
-            accepted.append(node.evidence_test)
-        node = state.nodes[node.parent]
-    return (*state.failures[:1], *reversed(accepted))
-
-
-def left_round(state: RunState) -> Changes:
-    """The search that was on is over, and so is its round."""
-    changes: Changes = {"confirming": False, **waits_no_more(state)}
-    if state.round is not None and not state.round.done:
-        changes["round"] = replace(state.round, done=True)
-    return changes
-
-
-def waits_no_more(state: RunState) -> Changes:
-    """No candidate waits for accept or reject."""
-    working = "paused" if state.paused else "running"
-    return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
-
-
-def searched_anew(state: RunState) -> Changes:
-    """The search that was on is over; whether a model can be removed is open again."""
-    here = state.nodes[state.node]
-    nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
-    return {**left_round(state), "minimal": False, "nodes": nodes}
-
-
 # A decision names so many models, each with so many letters.
 NAMED, LONGEST = 3, 40
 
@@ -194,45 +125,72 @@ def command_refused(state: RunState, data: Data, _: float) -> Changes:
     return {"refusal": (int(data["command"]), str(data["why"]))}
 
 
-def tried(state: RunState, number: int) -> Trial:
-    """The trial of this number. Raises IndexError if there is none."""
-    return state.trials[_index(number)]
+def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Changes:
+    """The run comes to another environment, a new node below the current one."""
+    environment = names(state.elements, data["environment"])
+    reduction = state.scenario.get("reduction", {})
+    node = Node(
+        number=len(state.nodes),
+        parent=state.node,
+        how=how,
+        what=what,
+        environment=environment,
+        round=None if state.round is None else state.round.number,
+        tests=state.tests_done,
+        time=at,
+        evidence_test=int(data["evidence_test"]),
+        method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
+    )
+    inside = set(environment) <= set(state.environment)
+    # What the other failure needs is not known yet.
+    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
+    changes = {} if how == "reduced" else left_round(state)
+    return changes | {
+        "nodes": (*state.nodes, node),
+        "node": node.number,
+        "environment": environment,
+        "evidence_test": node.evidence_test,
+        "lower_bound": needed,
+        "minimal": False,
+        "history": (*state.history, Point(state.tests_done, len(environment), needed)),
+    }
 
 
-def told(models: Sequence[str]) -> str:
-    """The first names of some models."""
-    shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
-    more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
-    return ", ".join(shown) + more
+def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
+    """One more decision of the user."""
+    one = Decision(at, state.tests_done, state.node, kind, words)
+    return {"decisions": (*state.decisions, one)}
 
 
-def place(node: Node) -> str:
-    """A node in words."""
-    models = many(len(node.environment))
-    return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+def failures_at(state: RunState, number: int) -> tuple[int, ...]:
+    """The tests whose ends count as f in a node: f's own, and those of other failures that were accepted on the way there."""
+    accepted, node = [], state.nodes[number]
+    while node.parent is not None:
+        if node.how == "accepted":
+            accepted.append(node.evidence_test)
+        node = state.nodes[node.parent]
+    return (*state.failures[:1], *reversed(accepted))
 
 
-def _limit(value: object) -> object:
-    """A setting in words: a budget may be none."""
-    return "no limit" if value is None else value
+def left_round(state: RunState) -> Changes:
+    """The search that was on is over, and so is its round."""
+    changes: Changes = {"confirming": False, **waits_no_more(state)}
+    if state.round is not None and not state.round.done:
+        changes["round"] = replace(state.round, done=True)
+    return changes
 
 
-def _with_trial(state: RunState, trial: Trial) -> Changes:
-    trials = list(state.trials)
-    trials[trial.number - 1] = trial
-    return {"trials": tuple(trials)}
+def waits_no_more(state: RunState) -> Changes:
+    """No candidate waits for accept or reject."""
+    working = "paused" if state.paused else "running"
+    return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
 
 
-def _index(number: int) -> int:
-    if type(number) is not int or number < 1:
-        raise IndexError(number)
-    return number - 1
-
-
-def _node(state: RunState, number: int) -> int:
-    if type(number) is not int or not 0 <= number < len(state.nodes):
-        raise IndexError(number)
-    return number
+def searched_anew(state: RunState) -> Changes:
+    """The search that was on is over; whether a model can be removed is open again."""
+    here = state.nodes[state.node]
+    nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
+    return {**left_round(state), "minimal": False, "nodes": nodes}
 
 
 def with_outcomes(state: RunState, data: Data) -> RunState:
@@ -260,3 +218,44 @@ def counts(state: RunState, before: Test | None, after: Test) -> Changes:
         tally[before.outcome] -= 1
         reruns -= before.is_deflake_run
     return {"tally": tally, "deflake_runs": reruns}
+
+
+def place(node: Node) -> str:
+    """A node in words."""
+    models = many(len(node.environment))
+    return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
+
+
+def told(models: Sequence[str]) -> str:
+    """The first names of some models."""
+    shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
+    more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
+    return ", ".join(shown) + more
+
+
+def tried(state: RunState, number: int) -> Trial:
+    """The trial of this number. Raises IndexError if there is none."""
+    return state.trials[_index(number)]
+
+
+def _limit(value: object) -> object:
+    """A setting in words: a budget may be none."""
+    return "no limit" if value is None else value
+
+
+def _with_trial(state: RunState, trial: Trial) -> Changes:
+    trials = list(state.trials)
+    trials[trial.number - 1] = trial
+    return {"trials": tuple(trials)}
+
+
+def _index(number: int) -> int:
+    if type(number) is not int or number < 1:
+        raise IndexError(number)
+    return number - 1
+
+
+def _node(state: RunState, number: int) -> int:
+    if type(number) is not int or not 0 <= number < len(state.nodes):
+        raise IndexError(number)
+    return number

@@ -8,222 +8,10 @@ from typing import Any
 
 from ddenv.runfile.persistent import PersistentTuple
 
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """A sub-environment of the user's own making. `models` are those kept in it, of the whole world; `node` is where it was tried.
-
-    `verdict`, `tests` and `known` are as a candidate's. `adopted` says that it became the environment.
-    """
-
-    number: int
-    models: tuple[str, ...]
-    node: int
-    verdict: str = ""
-    tests: tuple[int, ...] = ()
-    known: int = 0
-    adopted: bool = False
-
-    @property
-    def size(self) -> int:
-        """How many models it has."""
-        return len(self.models)
-
-    @property
-    def label(self) -> str:
-        return f"try {self.number}"
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """An environment that a run came to, in the tree of its reductions; number 0 is the whole world, without a parent.
-
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did) or "accepted" (another failure was taken for as
-    good); `what` names the candidate or the trial. `tests` is how many tests were finished then, `time` is Unix time, s, and
-    `round` the round that ended in it. `evidence_test` is the run in it that the next rounds look at, None before f is known.
-    `method` is what it was found by. `minimal` says that the reduction ended in it, `rejected` that it was taken back.
-    """
-
-    number: int
-    parent: int | None
-    how: str
-    what: str
-    environment: tuple[str, ...]
-    round: int | None = None
-    tests: int = 0
-    time: float = 0.0
-    evidence_test: int | None = None
-    method: str = ""
-    minimal: bool = False
-    rejected: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """Something the user decided: `kind` is the event's, `words` say it; at Unix `time`, s, after so many `tests`, in `node`."""
-
-    time: float
-    tests: int
-    node: int
-    kind: str
-    words: str
-
-
-def many(models: int) -> str:
-    """1 model, 2 models."""
-    return f"{models} model{'s' * (models != 1)}"
-
-
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Besides these a test may run still or be lost, and a baseline run may have failed when f was not fixed yet.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
-
-
-@dataclass(frozen=True, slots=True)
-class Test:
-    """One run of the robot.
-
-    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
-    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the model
-    `without`. `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's end
-    the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see
-    `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the
-    simulated time it was first so, s; empty in files of version 1. `cut` says that it was ended before its time because the
-    robot was stuck for good, `taken` that it was taken over from another run that had made it.
-    """
-
-    id: int
-    phase: str
-    round: int | None
-    candidate: int | None
-    run: int
-    seed: int
-    outcome: str = "running"
-    failure: str = ""
-    distance: float | None = None
-    end_pose: tuple[float, ...] | None = None
-    simulated_seconds: float = 0.0
-    wall_seconds: float = 0.0
-    first_sensed: tuple[tuple[str, float], ...] = ()
-    first_touched: tuple[tuple[str, float], ...] = ()
-    cut: bool = False
-    without: str | None = None
-    trial: int | None = None
-    taken: bool = False
-
-    @property
-    def is_finished(self) -> bool:
-        return self.outcome not in UNFINISHED
-
-    @property
-    def is_deflake_run(self) -> bool:
-        """Whether it is a finished re-run of a candidate."""
-        return self.phase == "round" and self.run > 0 and self.is_finished
-
-
-@dataclass(frozen=True, slots=True)
-class Split:
-    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own.
-
-    `pinned` models of the environment are in no part: they are in every candidate.
-    """
-
-    environment: tuple[str, ...]
-    partitions: tuple[tuple[str, ...], ...]
-    pinned: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
-
-    `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user said no).
-    `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
-    ids of its tests so far, re-runs included, known ones of earlier rounds too (then `known` counts them).
-    """
-
-    index: int
-    kind: str
-    partition: int
-    split: Split = field(repr=False, hash=False)
-    distance: float | None = None
-    verdict: str = ""
-    tests: tuple[int, ...] = ()
-    known: int = 0
-
-    @property
-    def models(self) -> tuple[str, ...]:
-        """The models' names. They are gathered at each call: ask for `size` where their number is enough."""
-        part = self.split.partitions[self.partition]
-        if self.kind == "partition":
-            return (*part, *self.split.pinned)
-        left_out = frozenset(part)
-        return tuple(name for name in self.split.environment if name not in left_out)
-
-    @property
-    def size(self) -> int:
-        """How many models it has."""
-        part = len(self.split.partitions[self.partition])
-        whole = len(self.split.environment)
-        return part + len(self.split.pinned) if self.kind == "partition" else whole - part
-
-    @property
-    def label(self) -> str:
-        letter = partition_letter(self.partition)
-        return f"part {letter}" if self.kind == "partition" else f"without {letter}"
-
-
-@dataclass(frozen=True, slots=True)
-class Round:
-    """One turn of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
-
-    `missed` counts the parts without which f did not show.
-    """
-
-    number: int
-    n_partitions: int
-    split: Split
-    candidates: PersistentTuple[Candidate]
-    winner: int | None = None
-    done: bool = False
-    missed: int = 0
-
-    @property
-    def environment(self) -> tuple[str, ...]:
-        return self.split.environment
-
-    @property
-    def partitions(self) -> tuple[tuple[str, ...], ...]:
-        return self.split.partitions
-
-
-@dataclass(frozen=True, slots=True)
-class Baseline:
-    """The whole world, run several times. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
-
-    `miss_chance` is (1-p)^(1+iterations), the chance that a candidate's tests all miss f; `iterations_95` is how many
-    iterations a 95 % chance of seeing f needs. `position` is f's end, x, y, z m.
-    """
-
-    runs: int
-    failures: int
-    rate: float
-    low: float
-    high: float
-    failure_test: int
-    position: tuple[float, float, float]
-    miss_chance: float
-    iterations_95: int
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """The size of the environment after so many finished tests; at least `needed` of its models were known to be needed."""
-
-    tests: int
-    models: int
-    needed: int = 0
 
 
 @dataclass(frozen=True)
@@ -361,6 +149,212 @@ class RunState:
         return self.status in ("finished", "stopped", "failed")
 
 
+@dataclass(frozen=True, slots=True)
+class Node:
+    """An environment that a run came to, in the tree of its reductions; number 0 is the whole world, without a parent.
+
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did) or "accepted" (another failure was taken for as
+    good); `what` names the candidate or the trial. `tests` is how many tests were finished then, `time` is Unix time, s, and
+    `round` the round that ended in it. `evidence_test` is the run in it that the next rounds look at, None before f is known.
+    `method` is what it was found by. `minimal` says that the reduction ended in it, `rejected` that it was taken back.
+    """
+
+    number: int
+    parent: int | None
+    how: str
+    what: str
+    environment: tuple[str, ...]
+    round: int | None = None
+    tests: int = 0
+    time: float = 0.0
+    evidence_test: int | None = None
+    method: str = ""
+    minimal: bool = False
+    rejected: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """One turn of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
+
+    `missed` counts the parts without which f did not show.
+    """
+
+    number: int
+    n_partitions: int
+    split: Split
+    candidates: PersistentTuple[Candidate]
+    winner: int | None = None
+    done: bool = False
+    missed: int = 0
+
+    @property
+    def environment(self) -> tuple[str, ...]:
+        return self.split.environment
+
+    @property
+    def partitions(self) -> tuple[tuple[str, ...], ...]:
+        return self.split.partitions
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own.
+
+    `pinned` models of the environment are in no part: they are in every candidate.
+    """
+
+    environment: tuple[str, ...]
+    partitions: tuple[tuple[str, ...], ...]
+    pinned: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
+
+    `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user said no).
+    `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
+    ids of its tests so far, re-runs included, known ones of earlier rounds too (then `known` counts them).
+    """
+
+    index: int
+    kind: str
+    partition: int
+    split: Split = field(repr=False, hash=False)
+    distance: float | None = None
+    verdict: str = ""
+    tests: tuple[int, ...] = ()
+    known: int = 0
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The models' names. They are gathered at each call: ask for `size` where their number is enough."""
+        part = self.split.partitions[self.partition]
+        if self.kind == "partition":
+            return (*part, *self.split.pinned)
+        left_out = frozenset(part)
+        return tuple(name for name in self.split.environment if name not in left_out)
+
+    @property
+    def size(self) -> int:
+        """How many models it has."""
+        part = len(self.split.partitions[self.partition])
+        whole = len(self.split.environment)
+        return part + len(self.split.pinned) if self.kind == "partition" else whole - part
+
+    @property
+    def label(self) -> str:
+        letter = partition_letter(self.partition)
+        return f"part {letter}" if self.kind == "partition" else f"without {letter}"
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A sub-environment of the user's own making. `models` are those kept in it, of the whole world; `node` is where it was tried.
+
+    `verdict`, `tests` and `known` are as a candidate's. `adopted` says that it became the environment.
+    """
+
+    number: int
+    models: tuple[str, ...]
+    node: int
+    verdict: str = ""
+    tests: tuple[int, ...] = ()
+    known: int = 0
+    adopted: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many models it has."""
+        return len(self.models)
+
+    @property
+    def label(self) -> str:
+        return f"try {self.number}"
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """One run of the robot.
+
+    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
+    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the model
+    `without`. `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's end
+    the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see
+    `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the
+    simulated time it was first so, s; empty in files of version 1. `cut` says that it was ended before its time because the
+    robot was stuck for good, `taken` that it was taken over from another run that had made it.
+    """
+
+    id: int
+    phase: str
+    round: int | None
+    candidate: int | None
+    run: int
+    seed: int
+    outcome: str = "running"
+    failure: str = ""
+    distance: float | None = None
+    end_pose: tuple[float, ...] | None = None
+    simulated_seconds: float = 0.0
+    wall_seconds: float = 0.0
+    first_sensed: tuple[tuple[str, float], ...] = ()
+    first_touched: tuple[tuple[str, float], ...] = ()
+    cut: bool = False
+    without: str | None = None
+    trial: int | None = None
+    taken: bool = False
+
+    @property
+    def is_finished(self) -> bool:
+        return self.outcome not in UNFINISHED
+
+    @property
+    def is_deflake_run(self) -> bool:
+        """Whether it is a finished re-run of a candidate."""
+        return self.phase == "round" and self.run > 0 and self.is_finished
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """The whole world, run several times. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
+
+    `miss_chance` is (1-p)^(1+iterations), the chance that a candidate's tests all miss f; `iterations_95` is how many
+    iterations a 95 % chance of seeing f needs. `position` is f's end, x, y, z m.
+    """
+
+    runs: int
+    failures: int
+    rate: float
+    low: float
+    high: float
+    failure_test: int
+    position: tuple[float, float, float]
+    miss_chance: float
+    iterations_95: int
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """The size of the environment after so many finished tests; at least `needed` of its models were known to be needed."""
+
+    tests: int
+    models: int
+    needed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Something the user decided: `kind` is the event's, `words` say it; at Unix `time`, s, after so many `tests`, in `node`."""
+
+    time: float
+    tests: int
+    node: int
+    kind: str
+    words: str
+
+
 def partition_letter(index: int) -> str:
     """A, B, ... Z, AA, AB, ... for partition 0, 1, ..."""
     letters = ""
@@ -369,3 +363,8 @@ def partition_letter(index: int) -> str:
         index, rest = divmod(index - 1, 26)
         letters = chr(ord("A") + rest) + letters
     return letters
+
+
+def many(models: int) -> str:
+    """1 model, 2 models."""
+    return f"{models} model{'s' * (models != 1)}"

@@ -18,7 +18,7 @@ from ddenv.world.files.resources import Stored
 from ddenv.world.model import Mesh, World
 from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
-from ddenv.world.subworld import without
+from ddenv.world.write import without
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,7 +211,7 @@ ENDLESS = 200.0
 def is_ground(model: Model) -> bool:
     """A model with an infinite plane carries everything else: it is never an element.
 
-    So is a box that stands for one: that which `ddenv.world.convert` writes.
+    So is a box that stands for one: that which `ddenv.world.write` writes.
     """
     if any(isinstance(collision.shape, Plane) for collision in model.collisions):
         return True

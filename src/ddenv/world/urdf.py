@@ -9,110 +9,10 @@ from ddenv.world.model import Model
 from ddenv.world.sdf.context import VERSIONS, Context
 from ddenv.world.sdf.xml import Element, complain, name_of, number, text_of
 
-
-def element(tag: str, source: Element, text: str = "", **attributes: str) -> Element:
-    """An SDF element with that text, which stands where `source` does and belongs to it."""
-    made = Element(tag, attributes)
-    made.text = text
-    made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
-    made.parent = source
-    return made
-
-
-def twin(source: Element, **attributes: str) -> Element:
-    """The SDF element for one of URDF that has the same tag, without what is in it."""
-    made = element(source.tag, source, **attributes)
-    made.parent = source.parent
-    return made
-
-
-def given(source: Element, attribute: str) -> str:
-    """An attribute that URDF asks for. Raises UserError where it is missing."""
-    value = source.get(attribute)
-    if value is None or not value.strip():
-        raise complain(source, f"has no attribute '{attribute}'")
-    return value.strip()
-
-
-def value(source: Element, attribute: str) -> float:
-    """An attribute that is one finite number. Raises UserError."""
-    holder = element(source.tag, source)
-    holder.append(element(attribute, source, given(source, attribute)))
-    return number(holder, attribute, 0.0)
-
-
-def three(source: Element, attribute: str, default: str) -> str:
-    """An attribute of three words, or `default`. Raises UserError."""
-    text = source.get(attribute, default)
-    if len(text.split()) != 3:
-        raise complain(source, f"{attribute} must be three numbers, found '{text[:60]}'")
-    return text
-
-
-def pose(source: Element, relative_to: str = "") -> Element:
-    """The `<pose>` that the `<origin>` in `source` stands for. Raises UserError."""
-    origin = source.find("origin")
-    holder = source if origin is None else origin
-    words = "0 0 0 0 0 0" if origin is None else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
-    return element("pose", holder, words, **({"relative_to": relative_to} if relative_to else {}))
-
-
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
 LIMITED = ("revolute", "prismatic")
 # URDF's own defaults. Not to be limited at all is a joint of another kind.
 LIMITS = {"lower": "0", "upper": "0"}
-
-
-def ends(joint: Element, links: list[str]) -> tuple[str, str]:
-    """The names of the parent and the child link of `joint`. Raises UserError."""
-    found = []
-    for tag in ("parent", "child"):
-        end = joint.find(tag)
-        if end is None:
-            raise complain(joint, f"has no <{tag}>")
-        name = given(end, "link")
-        if name not in links:
-            raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
-        found.append(name)
-    return found[0], found[1]
-
-
-def joint_of(source: Element, parent: str, child: str) -> Element:
-    """The SDF joint. Raises UserError."""
-    kind = (source.get("type") or "").strip()
-    if kind not in KINDS:
-        raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
-    made = twin(source, name=name_of(source), type=kind)
-    made.extend([element("parent", source, parent), element("child", source, child)])
-    if kind != "fixed":
-        made.append(_axis(source, kind))
-    return made
-
-
-def _axis(source: Element, kind: str) -> Element:
-    given_axis, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
-    if kind in LIMITED and limit is None:
-        raise complain(source, f"a {kind} joint needs a <limit>")
-    place = source if given_axis is None else given_axis
-    made = element("axis", source)
-    made.append(element("xyz", place, "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")))
-    if limit is not None:
-        made.append(_limit(limit, kind))
-    if dynamics is not None:
-        damped = twin(dynamics)
-        damped.append(element("damping", dynamics, dynamics.get("damping", "0")))
-        made.append(damped)
-    return made
-
-
-def _limit(source: Element, kind: str) -> Element:
-    made = twin(source)
-    for tag, default in LIMITS.items() if kind in LIMITED else ():
-        made.append(element(tag, source, source.get(tag, default)))
-    made.extend([element(tag, source, source.get(tag)) for tag in ("effort", "velocity") if source.get(tag)])
-    return made
-
-
 # What URDF says of each shape, by the attribute, with the SDF element that says it.
 SHAPES = {
     "box": {"size": "size"},
@@ -123,12 +23,61 @@ SHAPES = {
 }
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 FRICTION = {"mu1": "mu", "mu2": "mu2"}
+ROOT = "robot"
+
+
+def to_sdf(robot: Element, context: Context) -> Element:
+    """The `<sdf>` for the outermost element of a URDF file, its root link first. Raises UserError."""
+    _check_expanded(robot)
+    # Nothing like the version of SDF, for which it would be taken.
+    robot.attrib.pop("version", None)
+    links = {name_of(link): link for link in reversed(robot.findall("link"))}
+    if not links:
+        raise complain(robot, "has no <link>")
+    joints = [(joint, *ends(joint, list(links))) for joint in robot.findall("joint")]
+    origins = {child: pose(joint, parent) for joint, parent, child in joints}
+    root = _root(robot, list(links), set(origins))
+    model = element("model", robot, name=name_of(robot))
+    for link in sorted(robot.findall("link"), key=lambda link: name_of(link) != root):
+        made = link_of(link, robot, context)
+        if name_of(link) in origins:
+            made.append(origins[name_of(link)])
+        model.append(made)
+    model.extend([joint_of(joint, parent, child) for joint, parent, child in joints])
+    sdf = element("sdf", robot, version=VERSIONS[-1])
+    sdf.append(model)
+    return sdf
+
+
+def massless(robot: Element) -> frozenset[str]:
+    """The names of the links without a mass of their own."""
+    return frozenset(name_of(link) for link in robot.findall("link") if not has_mass(link))
+
+
+def without_mass(model: Model, names: frozenset[str]) -> Model:
+    """`model` with the links `names` as mere frames: to those the SDF reader gives a mass."""
+    links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
+    return replace(model, links=tuple(links))
 
 
 def has_mass(link: Element) -> bool:
     """Whether `link` has a mass: many of a robot's links are frames only. Raises UserError."""
     mass = link.find("inertial/mass")
     return mass is not None and value(mass, "value") != 0.0
+
+
+def _check_expanded(robot: Element) -> None:
+    for each in robot.iter():
+        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
+            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
+
+
+def _root(robot: Element, links: list[str], children: set[str]) -> str:
+    roots = [name for name in reversed(links) if name not in children]
+    if len(roots) != 1:
+        found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
+        raise complain(robot, f"expected one link that is no joint's child, {found}")
+    return roots[0]
 
 
 def link_of(source: Element, robot: Element, context: Context) -> Element:
@@ -213,52 +162,98 @@ def _material(part: Element, robot: Element) -> list[Element]:
     return [made]
 
 
-ROOT = "robot"
+def ends(joint: Element, links: list[str]) -> tuple[str, str]:
+    """The names of the parent and the child link of `joint`. Raises UserError."""
+    found = []
+    for tag in ("parent", "child"):
+        end = joint.find(tag)
+        if end is None:
+            raise complain(joint, f"has no <{tag}>")
+        name = given(end, "link")
+        if name not in links:
+            raise complain(end, f"there is no link '{name[:80]}'{nearest(name[:80], links[:500])}")
+        found.append(name)
+    return found[0], found[1]
 
 
-def to_sdf(robot: Element, context: Context) -> Element:
-    """The `<sdf>` for the outermost element of a URDF file, its root link first. Raises UserError."""
-    _check_expanded(robot)
-    # Nothing like the version of SDF, for which it would be taken.
-    robot.attrib.pop("version", None)
-    links = {name_of(link): link for link in reversed(robot.findall("link"))}
-    if not links:
-        raise complain(robot, "has no <link>")
-    joints = [(joint, *ends(joint, list(links))) for joint in robot.findall("joint")]
-    origins = {child: pose(joint, parent) for joint, parent, child in joints}
-    root = _root(robot, list(links), set(origins))
-    model = element("model", robot, name=name_of(robot))
-    for link in sorted(robot.findall("link"), key=lambda link: name_of(link) != root):
-        made = link_of(link, robot, context)
-        if name_of(link) in origins:
-            made.append(origins[name_of(link)])
-        model.append(made)
-    model.extend([joint_of(joint, parent, child) for joint, parent, child in joints])
-    sdf = element("sdf", robot, version=VERSIONS[-1])
-    sdf.append(model)
-    return sdf
+def joint_of(source: Element, parent: str, child: str) -> Element:
+    """The SDF joint. Raises UserError."""
+    kind = (source.get("type") or "").strip()
+    if kind not in KINDS:
+        raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
+    made = twin(source, name=name_of(source), type=kind)
+    made.extend([element("parent", source, parent), element("child", source, child)])
+    if kind != "fixed":
+        made.append(_axis(source, kind))
+    return made
 
 
-def massless(robot: Element) -> frozenset[str]:
-    """The names of the links without a mass of their own."""
-    return frozenset(name_of(link) for link in robot.findall("link") if not has_mass(link))
+def _axis(source: Element, kind: str) -> Element:
+    given_axis, limit, dynamics = source.find("axis"), source.find("limit"), source.find("dynamics")
+    if kind in LIMITED and limit is None:
+        raise complain(source, f"a {kind} joint needs a <limit>")
+    place = source if given_axis is None else given_axis
+    made = element("axis", source)
+    made.append(element("xyz", place, "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")))
+    if limit is not None:
+        made.append(_limit(limit, kind))
+    if dynamics is not None:
+        damped = twin(dynamics)
+        damped.append(element("damping", dynamics, dynamics.get("damping", "0")))
+        made.append(damped)
+    return made
 
 
-def without_mass(model: Model, names: frozenset[str]) -> Model:
-    """`model` with the links `names` as mere frames: to those the SDF reader gives a mass."""
-    links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
-    return replace(model, links=tuple(links))
+def _limit(source: Element, kind: str) -> Element:
+    made = twin(source)
+    for tag, default in LIMITS.items() if kind in LIMITED else ():
+        made.append(element(tag, source, source.get(tag, default)))
+    made.extend([element(tag, source, source.get(tag)) for tag in ("effort", "velocity") if source.get(tag)])
+    return made
 
 
-def _check_expanded(robot: Element) -> None:
-    for each in robot.iter():
-        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
-            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
+def element(tag: str, source: Element, text: str = "", **attributes: str) -> Element:
+    """An SDF element with that text, which stands where `source` does and belongs to it."""
+    made = Element(tag, attributes)
+    made.text = text
+    made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
+    made.parent = source
+    return made
 
 
-def _root(robot: Element, links: list[str], children: set[str]) -> str:
-    roots = [name for name in reversed(links) if name not in children]
-    if len(roots) != 1:
-        found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
-        raise complain(robot, f"expected one link that is no joint's child, {found}")
-    return roots[0]
+def twin(source: Element, **attributes: str) -> Element:
+    """The SDF element for one of URDF that has the same tag, without what is in it."""
+    made = element(source.tag, source, **attributes)
+    made.parent = source.parent
+    return made
+
+
+def given(source: Element, attribute: str) -> str:
+    """An attribute that URDF asks for. Raises UserError where it is missing."""
+    value = source.get(attribute)
+    if value is None or not value.strip():
+        raise complain(source, f"has no attribute '{attribute}'")
+    return value.strip()
+
+
+def value(source: Element, attribute: str) -> float:
+    """An attribute that is one finite number. Raises UserError."""
+    holder = element(source.tag, source)
+    holder.append(element(attribute, source, given(source, attribute)))
+    return number(holder, attribute, 0.0)
+
+
+def three(source: Element, attribute: str, default: str) -> str:
+    """An attribute of three words, or `default`. Raises UserError."""
+    text = source.get(attribute, default)
+    if len(text.split()) != 3:
+        raise complain(source, f"{attribute} must be three numbers, found '{text[:60]}'")
+    return text
+
+
+def pose(source: Element, relative_to: str = "") -> Element:
+    """The `<pose>` that the `<origin>` in `source` stands for. Raises UserError."""
+    origin = source.find("origin")
+    holder = source if origin is None else origin
+    words = "0 0 0 0 0 0" if origin is None else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"
+    return element("pose", holder, words, **({"relative_to": relative_to} if relative_to else {}))

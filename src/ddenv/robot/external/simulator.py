@@ -22,7 +22,7 @@ from ddenv.world.files.resolve import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
-from ddenv.world.subworld import without
+from ddenv.world.write import without
 
 # What the command's exit codes mean; all others are errors.
 OUTCOMES = {0: "pass", 1: "failed"}

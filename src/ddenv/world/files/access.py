@@ -9,6 +9,8 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 
+MAX_BYTES = 100_000_000
+
 
 class Missing(Exception):
     """No file for a URI anywhere; the text says where was looked."""
@@ -64,9 +66,6 @@ def without_tilde(name: str) -> Path:
 
 def reason(error: OSError) -> str:
     return f"cannot be read: {error.strerror or error}"
-
-
-MAX_BYTES = 100_000_000
 
 
 def read_bytes(path: Path) -> bytes:

@@ -14,44 +14,6 @@ from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason,
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
-
-
-def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
-    """Folders where the Fuel cache may have the model; of `version`, or the newest if that is empty or "tip".
-
-    The cache is $GZ_FUEL_CACHE_PATH, or else `CACHES`; both hosts are looked at, since Fuel moved from one to the other.
-    """
-    chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
-    for cache in (chosen,) if chosen else CACHES:
-        for host in HOSTS:
-            folder = without_tilde(cache) / host / owner.lower() / "models" / name.lower()
-            if version.isdecimal():
-                yield folder / version
-            elif versions := [entry for entry in folders_of(folder) if entry.isdecimal()]:
-                yield folder / max(versions, key=int)
-
-
-def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
-    """Folders called `name` in any of `folders`; then those that differ by case only, or by `_` for a space."""
-    for folder in folders:
-        yield folder / name
-    for folder in folders:
-        yield from (folder / entry for entry in folders_of(folder) if _plain(entry) == _plain(name))
-
-
-def folders_of(folder: Path) -> list[str]:
-    """Names of the folders in `folder`, sorted; none if it cannot be looked at."""
-    try:
-        with os.scandir(folder) as entries:
-            return sorted(entry.name for entry in entries if entry.is_dir())
-    except (OSError, ValueError):
-        return []
-
-
-def _plain(name: str) -> str:
-    return name.casefold().replace("_", " ")
-
-
 ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 # The newest SDF that is understood: a model's folder may hold one file for each version.
 NEWEST_SDF = (1, 12)
@@ -72,11 +34,6 @@ def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path
         named += os.environ.get(variable, "").split(os.pathsep)
     absolute = [_absolute(without_tilde(name)) for name in [*named, str(world_folder)] if name]
     return tuple(dict.fromkeys(folder for folder in absolute if is_folder(folder)))
-
-
-def _absolute(path: Path) -> Path:
-    """`path` without `..`, as text: a link on the way is not looked at."""
-    return Path(os.path.normpath(path.absolute()))
 
 
 def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
@@ -152,6 +109,42 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
     return _first((model / path for model in models), where)
 
 
+def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
+    """Folders where the Fuel cache may have the model; of `version`, or the newest if that is empty or "tip".
+
+    The cache is $GZ_FUEL_CACHE_PATH, or else `CACHES`; both hosts are looked at, since Fuel moved from one to the other.
+    """
+    chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
+    for cache in (chosen,) if chosen else CACHES:
+        for host in HOSTS:
+            folder = without_tilde(cache) / host / owner.lower() / "models" / name.lower()
+            if version.isdecimal():
+                yield folder / version
+            elif versions := [entry for entry in folders_of(folder) if entry.isdecimal()]:
+                yield folder / max(versions, key=int)
+
+
+def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
+    """Folders called `name` in any of `folders`; then those that differ by case only, or by `_` for a space."""
+    for folder in folders:
+        yield folder / name
+    for folder in folders:
+        yield from (folder / entry for entry in folders_of(folder) if _plain(entry) == _plain(name))
+
+
+def folders_of(folder: Path) -> list[str]:
+    """Names of the folders in `folder`, sorted; none if it cannot be looked at."""
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry in entries if entry.is_dir())
+    except (OSError, ValueError):
+        return []
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("_", " ")
+
+
 def _first(candidates: Iterable[Path], where: str) -> Path:
     """The first candidate that exists. One that cannot be looked at matters only if none of the others is there."""
     problem = ""
@@ -167,6 +160,11 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
     if problem:
         raise Unusable(problem)
     raise Missing(where)
+
+
+def _absolute(path: Path) -> Path:
+    """`path` without `..`, as text: a link on the way is not looked at."""
+    return Path(os.path.normpath(path.absolute()))
 
 
 def _listed(folders: Sequence[Path]) -> str:

@@ -16,66 +16,6 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, tex
 
 # A model that moved faster than this when the world was saved did not stand still, m/s and rad/s.
 STILL = 0.01
-
-
-@dataclass(frozen=True)
-class Saved:
-    """What `<state>` says of one model; poses are in the world frame, and of the links that it names."""
-
-    element: Element
-    pose: Pose | None = None
-    scale: Vector = ONE
-    links: dict[str, Pose] = field(default_factory=dict)
-    models: dict[str, Saved] = field(default_factory=dict)
-
-
-def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
-    """What the world's `<state>` says of its models, by name, in the file's order. Raises UserError."""
-    states = world.findall("state")
-    if len(states) > 1:
-        raise complain(states[1], "a second <state>; a world has one")
-    saved: dict[str, list[Saved]] = {}
-    if not states:
-        return saved
-    for tag in ("insertions", "deletions"):
-        child = states[0].find(tag)
-        if child is not None and len(child):
-            raise complain(child, f"<{tag}> in a <state> are not supported; save the world again without them")
-    for model in states[0].findall("model"):
-        saved.setdefault(name_of(model), []).append(_saved(model, context))
-    return saved
-
-
-def _saved(model: Element, context: Context) -> Saved:
-    scale = model.find("scale")
-    return Saved(
-        element=model,
-        pose=_pose(model),
-        scale=ONE if scale is None else _scale(scale),
-        links={name_of(link): pose for link in model.findall("link") if (pose := _still(link, context)) is not None},
-        models={name_of(inner): _saved(inner, context) for inner in model.findall("model")},
-    )
-
-
-def _still(link: Element, context: Context) -> Pose | None:
-    velocity = link.find("velocity")
-    if velocity is not None and any(abs(part) > STILL for part in floats(velocity)):
-        context.note("ignored", velocity, "every run begins at rest")
-    return _pose(link)
-
-
-def _pose(holder: Element) -> Pose | None:
-    element = holder.find("pose")
-    return None if element is None or not text_of(element) else pose_of(element)
-
-
-def _scale(element: Element) -> Vector:
-    values = numbers(element, 3)
-    if min(values) < 1e-6 or max(values) > 1e6:
-        raise complain(element, f"a scale must be from 1e-06 to 1e+06, found '{text_of(element)[:60]}'")
-    return values  # type: ignore[return-value]
-
-
 # What `<state>` has less than this from its own pose has not been moved, m and as a part of half a turn.
 MOVED = 0.001
 # A few files that include each other many times can ask for more models than any machine holds.
@@ -94,6 +34,17 @@ class Spot:
     prefix: str = ""
     saved: Saved | None = None
     scale: Vector = ONE
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What `<state>` says of one model; poses are in the world frame, and of the links that it names."""
+
+    element: Element
+    pose: Pose | None = None
+    scale: Vector = ONE
+    links: dict[str, Pose] = field(default_factory=dict)
+    models: dict[str, Saved] = field(default_factory=dict)
 
 
 def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
@@ -125,18 +76,6 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     check_tree(builder.joints, part.element)
     _note_differences(builder, part.element, context)
     return _held(model, part.element, context) if is_ground(model) else model
-
-
-def _is_static(part: Part) -> bool:
-    return truth(part.element, "static", False) if part.static is None else part.static
-
-
-def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Link:
-    """A static model may have no link, such as one that only holds a plugin."""
-    if not static:
-        raise complain(element, "has no <link>")
-    context.note("ignored", element, "it has no <link>: nothing can touch it")
-    return Link("link", pose, None, (), ())
 
 
 class _Builder:
@@ -213,6 +152,18 @@ class _Builder:
                 self.context.note("ignored", saved.element, f"the model has no '{name[:80]}' for it")
 
 
+def _is_static(part: Part) -> bool:
+    return truth(part.element, "static", False) if part.static is None else part.static
+
+
+def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Link:
+    """A static model may have no link, such as one that only holds a plugin."""
+    if not static:
+        raise complain(element, "has no <link>")
+    context.note("ignored", element, "it has no <link>: nothing can touch it")
+    return Link("link", pose, None, (), ())
+
+
 def _weld(link: Link) -> Joint:
     return Joint(
         name=f"{link.name} (static)",
@@ -262,3 +213,50 @@ def _note_differences(builder: _Builder, element: Element, context: Context) -> 
         context.note("ignored", light.find("gravity"), "gravity acts on all links of a model, or on none")
     if any(builder.self_collide) and not all(builder.self_collide):
         context.note("replaced", element, "the links that collide with others of the model by all of them")
+
+
+def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
+    """What the world's `<state>` says of its models, by name, in the file's order. Raises UserError."""
+    states = world.findall("state")
+    if len(states) > 1:
+        raise complain(states[1], "a second <state>; a world has one")
+    saved: dict[str, list[Saved]] = {}
+    if not states:
+        return saved
+    for tag in ("insertions", "deletions"):
+        child = states[0].find(tag)
+        if child is not None and len(child):
+            raise complain(child, f"<{tag}> in a <state> are not supported; save the world again without them")
+    for model in states[0].findall("model"):
+        saved.setdefault(name_of(model), []).append(_saved(model, context))
+    return saved
+
+
+def _saved(model: Element, context: Context) -> Saved:
+    scale = model.find("scale")
+    return Saved(
+        element=model,
+        pose=_pose(model),
+        scale=ONE if scale is None else _scale(scale),
+        links={name_of(link): pose for link in model.findall("link") if (pose := _still(link, context)) is not None},
+        models={name_of(inner): _saved(inner, context) for inner in model.findall("model")},
+    )
+
+
+def _still(link: Element, context: Context) -> Pose | None:
+    velocity = link.find("velocity")
+    if velocity is not None and any(abs(part) > STILL for part in floats(velocity)):
+        context.note("ignored", velocity, "every run begins at rest")
+    return _pose(link)
+
+
+def _pose(holder: Element) -> Pose | None:
+    element = holder.find("pose")
+    return None if element is None or not text_of(element) else pose_of(element)
+
+
+def _scale(element: Element) -> Vector:
+    values = numbers(element, 3)
+    if min(values) < 1e-6 or max(values) > 1e6:
+        raise complain(element, f"a scale must be from 1e-06 to 1e+06, found '{text_of(element)[:60]}'")
+    return values  # type: ignore[return-value]

@@ -14,6 +14,60 @@ from ddenv.world.sdf.standin import StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
+# What is read, and what has no part in how a robot drives, by the element that it is in.
+QUIET: dict[str, frozenset[str]] = {
+    tag: frozenset(children.split())
+    for tag, children in {
+        "world": "model include state frame gravity light gui scene physics spherical_coordinates magnetic_field "
+        "atmosphere audio",
+        "model": "link joint model include frame pose static self_collide allow_auto_disable",
+        "include": "uri name pose placement_frame static",
+        "link": "pose inertial collision visual gravity self_collide kinematic light must_be_base_link velocity_decay",
+        "inertial": "mass inertia pose density auto_inertia_params",
+        "inertia": "ixx ixy ixz iyy iyz izz",
+        "collision": "pose geometry surface max_contacts laser_retro density auto_inertia_params",
+        "surface": "friction bounce contact soft_contact",
+        "friction": "ode bullet torsional",
+        "bounce": "restitution_coefficient threshold",
+        "visual": "pose geometry material cast_shadows transparency laser_retro meta visibility_flags",
+        "joint": "pose parent child axis axis2 physics thread_pitch screw_thread_pitch gearbox_ratio "
+        "gearbox_reference_body",
+        "axis": "xyz limit dynamics use_parent_model_frame initial_position",
+        "limit": "lower upper effort velocity stiffness dissipation",
+        "dynamics": "damping friction spring_reference spring_stiffness",
+        "velocity_decay": "linear angular",
+    }.items()
+}
+QUIET["axis2"] = QUIET["axis"]
+ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
+ONCE |= {"axis", "axis2", "parent", "child", "limit"}
+REASONS = {
+    "plugin": "plugins do not run here",
+    "sensor": "only the robot's own sensors are simulated",
+    "actor": "nothing can touch it",
+    "road": "it is not drawn",
+    "wind": "no wind blows here",
+    "enable_wind": "no wind blows here",
+    "gripper": "nothing grips here",
+    "projector": "it is not drawn",
+    "particle_emitter": "it is not drawn",
+    "audio_source": "nothing is heard here",
+    "audio_sink": "nothing is heard here",
+    "battery": "it never runs out",
+    "mimic": "no joint follows another",
+}
+# What would change how things move if it were simulated, by its parent and itself, and how it is without.
+WITHOUT = {
+    ("dynamics", "friction"): "joints turn without dry friction",
+    ("dynamics", "spring_stiffness"): "joints have no springs",
+    ("bounce", "restitution_coefficient"): "nothing bounces",
+    ("velocity_decay", "linear"): "nothing but contacts and joints slows a link down",
+    ("velocity_decay", "angular"): "nothing but contacts and joints slows a link down",
+}
+# Those of them that are not read by a function of their own, which would note them again.
+INSIDE = frozenset(
+    ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
+)
 
 
 @dataclass
@@ -100,58 +154,6 @@ def refuse(element: Element, message: str) -> UserError:
     return complain(element, f"{message}; leave it out with --ignore {element.tag}")
 
 
-# What is read, and what has no part in how a robot drives, by the element that it is in.
-QUIET: dict[str, frozenset[str]] = {
-    tag: frozenset(children.split())
-    for tag, children in {
-        "world": "model include state frame gravity light gui scene physics spherical_coordinates magnetic_field "
-        "atmosphere audio",
-        "model": "link joint model include frame pose static self_collide allow_auto_disable",
-        "include": "uri name pose placement_frame static",
-        "link": "pose inertial collision visual gravity self_collide kinematic light must_be_base_link velocity_decay",
-        "inertial": "mass inertia pose density auto_inertia_params",
-        "inertia": "ixx ixy ixz iyy iyz izz",
-        "collision": "pose geometry surface max_contacts laser_retro density auto_inertia_params",
-        "surface": "friction bounce contact soft_contact",
-        "friction": "ode bullet torsional",
-        "bounce": "restitution_coefficient threshold",
-        "visual": "pose geometry material cast_shadows transparency laser_retro meta visibility_flags",
-        "joint": "pose parent child axis axis2 physics thread_pitch screw_thread_pitch gearbox_ratio "
-        "gearbox_reference_body",
-        "axis": "xyz limit dynamics use_parent_model_frame initial_position",
-        "limit": "lower upper effort velocity stiffness dissipation",
-        "dynamics": "damping friction spring_reference spring_stiffness",
-        "velocity_decay": "linear angular",
-    }.items()
-}
-QUIET["axis2"] = QUIET["axis"]
-ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
-ONCE |= {"axis", "axis2", "parent", "child", "limit"}
-REASONS = {
-    "plugin": "plugins do not run here",
-    "sensor": "only the robot's own sensors are simulated",
-    "actor": "nothing can touch it",
-    "road": "it is not drawn",
-    "wind": "no wind blows here",
-    "enable_wind": "no wind blows here",
-    "gripper": "nothing grips here",
-    "projector": "it is not drawn",
-    "particle_emitter": "it is not drawn",
-    "audio_source": "nothing is heard here",
-    "audio_sink": "nothing is heard here",
-    "battery": "it never runs out",
-    "mimic": "no joint follows another",
-}
-# What would change how things move if it were simulated, by its parent and itself, and how it is without.
-WITHOUT = {
-    ("dynamics", "friction"): "joints turn without dry friction",
-    ("dynamics", "spring_stiffness"): "joints have no springs",
-    ("bounce", "restitution_coefficient"): "nothing bounces",
-    ("velocity_decay", "linear"): "nothing but contacts and joints slows a link down",
-    ("velocity_decay", "angular"): "nothing but contacts and joints slows a link down",
-}
-
-
 def note_unread(element: Element, context: Context) -> None:
     """Notes what is in `element`, and in what belongs to it alone, that is neither read nor without meaning here."""
     quiet = QUIET[element.tag]
@@ -168,12 +170,6 @@ def note_unread(element: Element, context: Context) -> None:
             _note_inside(child, context)
         elif (element.tag, child.tag) in WITHOUT and any(floats(child)):
             context.note("ignored", child, WITHOUT[element.tag, child.tag])
-
-
-# Those of them that are not read by a function of their own, which would note them again.
-INSIDE = frozenset(
-    ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
-)
 
 
 def _note_inside(child: Element, context: Context) -> None:

@@ -132,14 +132,6 @@ def shown(names: list[str]) -> str:
     return " -> ".join(cut if len(cut) <= 6 else [*cut[:4], f"... ({len(cut) - 5} more)", cut[-1]])
 
 
-def _named_in(pose: Element | None) -> str:
-    """The frame that a `<pose>` says it is relative to; empty where it names none."""
-    if pose is None:
-        return ""
-    old = pose.get("frame") if pose.get("frame") and version(pose) < (1, 7) else ""
-    return (pose.get("relative_to") or old or "").strip()
-
-
 def pose_of(element: Element) -> Pose:
     """The numbers of a `<pose>`: roll, pitch and yaw, or a quaternion, in rad or degrees. Raises UserError."""
     if not text_of(element):
@@ -165,3 +157,11 @@ def _unit(element: Element, quaternion: tuple[float, float, float, float]) -> tu
         raise complain(element, "a quaternion needs a length above zero")
     w, x, y, z = (part / length for part in quaternion)
     return w, x, y, z
+
+
+def _named_in(pose: Element | None) -> str:
+    """The frame that a `<pose>` says it is relative to; empty where it names none."""
+    if pose is None:
+        return ""
+    old = pose.get("frame") if pose.get("frame") and version(pose) < (1, 7) else ""
+    return (pose.get("relative_to") or old or "").strip()

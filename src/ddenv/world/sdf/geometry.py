@@ -17,58 +17,6 @@ from ddenv.world.sdf.standin import SIZES
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 
 SIDES = 32
-
-
-def read_polyline(geometry: Element, context: Context) -> Mesh:
-    """The hull of all `<polyline>`s of a `<geometry>`, standing on its frame's origin. Raises UserError."""
-    elements = geometry.findall("polyline")
-    height = _height(elements[0])
-    outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
-    corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
-    if len(corners) < 3:
-        raise complain(elements[0], "needs three <point>s that are not in one line")
-    if np.abs(corners).max() > 1e6:
-        raise complain(elements[0], "is larger than 1e+06 m")
-    filled = abs(polygon_area(outlines[0]))
-    if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
-        context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
-    return prism(corners, height)
-
-
-def _height(element: Element) -> float:
-    child = element.find("height")
-    height = 1.0 if child is None else numbers(child, 1)[0]
-    if not 1e-6 <= height <= 1e6:
-        raise complain(
-            element if child is None else child, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
-        )
-    return height
-
-
-def prism(corners: np.ndarray, height: float) -> Mesh:
-    """The convex outline `corners` (N, 2), anticlockwise, extruded from z = 0 to `height`, m."""
-    count = len(corners)
-    low = np.column_stack([corners, np.zeros(count)])
-    here, after = np.arange(count), np.roll(np.arange(count), -1)
-    walls = [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
-    fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
-    faces = np.vstack([*walls, fan[:, ::-1], fan + count])
-    # Equal outlines make equal meshes, wherever they stand.
-    origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
-    return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))
-
-
-def cone(radius: float, length: float) -> Mesh:
-    """A cone about its frame's origin, its tip up, m; with 32 sides."""
-    angles = np.arange(SIDES) * 2 * math.pi / SIDES
-    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, -length / 2)])
-    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
-    walls = np.column_stack([here, after, np.full(SIDES, SIDES)])
-    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
-    vertices = np.vstack([rim, [0.0, 0.0, length / 2]])
-    return Mesh(f"cone {radius!r} {length!r}", vertices, np.vstack([walls, fan[:, ::-1]]).astype(np.uint32))
-
-
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
 
@@ -135,15 +83,6 @@ def _primitive(element: Element, scale: Vector) -> Shape:
     raise complain(element, f"<{element.tag}> is no shape that is known; use one of {', '.join(SHAPES)}")
 
 
-def _left_out(element: Element, parent: Element, context: Context) -> None:
-    if parent.tag == "visual":
-        context.note("ignored", element, f"a {element.tag} is not drawn")
-    elif context.ignores(element.tag):
-        context.note("ignored", element, "left out as asked: nothing collides with it")
-    else:
-        raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
-
-
 def _plane(element: Element) -> Placed:
     size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
     normal = element.find("normal")
@@ -163,6 +102,15 @@ def _turn_up_to(direction: np.ndarray) -> Pose:
         return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
     w = np.sqrt((1 + z) / 2)
     return Pose((0.0, 0.0, 0.0), (float(w), float(-y / (2 * w)), float(x / (2 * w)), 0.0))
+
+
+def _left_out(element: Element, parent: Element, context: Context) -> None:
+    if parent.tag == "visual":
+        context.note("ignored", element, f"a {element.tag} is not drawn")
+    elif context.ignores(element.tag):
+        context.note("ignored", element, "left out as asked: nothing collides with it")
+    else:
+        raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
 
 
 def _mesh(element: Element, parent: Element, context: Context, scale: Vector) -> Placed | Lost:
@@ -260,3 +208,53 @@ def _checked(shape: Shape, element: Element) -> Shape:
             element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found {max(size, reach):g} m after scaling"
         )
     return shape
+
+
+def read_polyline(geometry: Element, context: Context) -> Mesh:
+    """The hull of all `<polyline>`s of a `<geometry>`, standing on its frame's origin. Raises UserError."""
+    elements = geometry.findall("polyline")
+    height = _height(elements[0])
+    outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
+    corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
+    if len(corners) < 3:
+        raise complain(elements[0], "needs three <point>s that are not in one line")
+    if np.abs(corners).max() > 1e6:
+        raise complain(elements[0], "is larger than 1e+06 m")
+    filled = abs(polygon_area(outlines[0]))
+    if len(elements) > 1 or filled < 0.99 * polygon_area(corners):
+        context.note("replaced", elements[0], "a polyline that is not convex, or has holes, by its convex hull")
+    return prism(corners, height)
+
+
+def _height(element: Element) -> float:
+    child = element.find("height")
+    height = 1.0 if child is None else numbers(child, 1)[0]
+    if not 1e-6 <= height <= 1e6:
+        raise complain(
+            element if child is None else child, f"the height must be from 1e-06 to 1e+06 m, found {height:g}"
+        )
+    return height
+
+
+def prism(corners: np.ndarray, height: float) -> Mesh:
+    """The convex outline `corners` (N, 2), anticlockwise, extruded from z = 0 to `height`, m."""
+    count = len(corners)
+    low = np.column_stack([corners, np.zeros(count)])
+    here, after = np.arange(count), np.roll(np.arange(count), -1)
+    walls = [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
+    fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
+    faces = np.vstack([*walls, fan[:, ::-1], fan + count])
+    # Equal outlines make equal meshes, wherever they stand.
+    origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
+    return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))
+
+
+def cone(radius: float, length: float) -> Mesh:
+    """A cone about its frame's origin, its tip up, m; with 32 sides."""
+    angles = np.arange(SIDES) * 2 * math.pi / SIDES
+    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, -length / 2)])
+    here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
+    walls = np.column_stack([here, after, np.full(SIDES, SIDES)])
+    fan = np.column_stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)])
+    vertices = np.vstack([rim, [0.0, 0.0, length / 2]])
+    return Mesh(f"cone {radius!r} {length!r}", vertices, np.vstack([walls, fan[:, ::-1]]).astype(np.uint32))

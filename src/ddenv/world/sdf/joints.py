@@ -12,62 +12,6 @@ from ddenv.world.sdf.frames import OWN, WORLD, Scope, shown
 from ddenv.world.sdf.parts import Part
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numbers, text_of, truth
 
-
-def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
-    """The link that the frame `name` of a model is attached to, such as `link` or `inner::link`; None where there is none.
-
-    Complaints are about `asker`. Raises UserError.
-    """
-    seen: dict[str, None] = {}
-    while name not in OWN:
-        if name in seen:
-            raise complain(asker, f"frames are attached to each other in a circle: {shown([*seen, name])}")
-        seen[name] = None
-        thing = scope.named.get(name)
-        if thing is None:
-            return _inside(scope, name, asker, context) if "::" in name else None
-        if isinstance(thing, Part):
-            return _joined(name, _canonical(scope.inside(thing), asker, context))
-        if thing.tag == "link":
-            return name
-        name = text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
-    return _canonical(scope, asker, context)
-
-
-def _inside(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
-    first, rest = name.split("::", 1)
-    thing = scope.named.get(first)
-    if not isinstance(thing, Part):
-        return None
-    return _joined(first, link_of(scope.inside(thing), rest, asker, context))
-
-
-def _joined(model: str, link: str | None) -> str | None:
-    return None if link is None else f"{model}::{link}"
-
-
-def _canonical(scope: Scope, asker: Element, context: Context) -> str | None:
-    """The link that a model's own frame is attached to: the one it names, else its first."""
-    key = id(scope.element)
-    if key not in context.canonical:
-        context.canonical[key] = _find_canonical(scope, asker, context)
-    return context.canonical[key]
-
-
-def _find_canonical(scope: Scope, asker: Element, context: Context) -> str | None:
-    named = scope.element.get("canonical_link")
-    if named:
-        return None if named in OWN else link_of(scope, named, asker, context)
-    first = scope.element.find("link")
-    if first is not None:
-        return name_of(first)
-    for part in scope.parts:
-        link = _joined(part.name, _canonical(scope.inside(part), asker, context))
-        if link is not None:
-            return link
-    return None
-
-
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
 LIMITED = ("revolute", "prismatic")
@@ -143,16 +87,6 @@ def _joint(
     return _counted_from_here(joint, first, stands)
 
 
-def _note_unlimited(element: Element, kind: str, context: Context) -> None:
-    for axis in (element.find("axis"), element.find("axis2")):
-        limit = None if axis is None else axis.find("limit")
-        bounds = [] if limit is None else [limit.find("lower"), limit.find("upper")]
-        if kind not in LIMITED and any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds):
-            context.note("ignored", limit, f"the limits of a {kind} joint")
-        if axis is not None and axis.find("use_parent_model_frame") is not None and version(axis) >= (1, 7):
-            context.note("ignored", axis.find("use_parent_model_frame"), "it means nothing since SDF 1.7")
-
-
 def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand], context: Context) -> str:
     """The full name of the link at one end of a joint, or `world`."""
     child = element.find(tag)
@@ -218,6 +152,16 @@ def _nearest_turn(angle: float, lower: float, upper: float) -> float:
     return min(turns, key=lambda turn: max(lower - turn, turn - upper, 0.0))
 
 
+def _note_unlimited(element: Element, kind: str, context: Context) -> None:
+    for axis in (element.find("axis"), element.find("axis2")):
+        limit = None if axis is None else axis.find("limit")
+        bounds = [] if limit is None else [limit.find("lower"), limit.find("upper")]
+        if kind not in LIMITED and any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds):
+            context.note("ignored", limit, f"the limits of a {kind} joint")
+        if axis is not None and axis.find("use_parent_model_frame") is not None and version(axis) >= (1, 7):
+            context.note("ignored", axis.find("use_parent_model_frame"), "it means nothing since SDF 1.7")
+
+
 def _bound(value: float) -> float:
     return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
 
@@ -264,3 +208,58 @@ def check_tree(joints: list[Joint], element: Element) -> None:
             way[at] = None
             at = parents.get(at)
         safe.update(way)
+
+
+def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
+    """The link that the frame `name` of a model is attached to, such as `link` or `inner::link`; None where there is none.
+
+    Complaints are about `asker`. Raises UserError.
+    """
+    seen: dict[str, None] = {}
+    while name not in OWN:
+        if name in seen:
+            raise complain(asker, f"frames are attached to each other in a circle: {shown([*seen, name])}")
+        seen[name] = None
+        thing = scope.named.get(name)
+        if thing is None:
+            return _inside(scope, name, asker, context) if "::" in name else None
+        if isinstance(thing, Part):
+            return _joined(name, _canonical(scope.inside(thing), asker, context))
+        if thing.tag == "link":
+            return name
+        name = text_of(thing.find("child")) if thing.tag == "joint" else (thing.get("attached_to") or "").strip()
+    return _canonical(scope, asker, context)
+
+
+def _inside(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
+    first, rest = name.split("::", 1)
+    thing = scope.named.get(first)
+    if not isinstance(thing, Part):
+        return None
+    return _joined(first, link_of(scope.inside(thing), rest, asker, context))
+
+
+def _joined(model: str, link: str | None) -> str | None:
+    return None if link is None else f"{model}::{link}"
+
+
+def _canonical(scope: Scope, asker: Element, context: Context) -> str | None:
+    """The link that a model's own frame is attached to: the one it names, else its first."""
+    key = id(scope.element)
+    if key not in context.canonical:
+        context.canonical[key] = _find_canonical(scope, asker, context)
+    return context.canonical[key]
+
+
+def _find_canonical(scope: Scope, asker: Element, context: Context) -> str | None:
+    named = scope.element.get("canonical_link")
+    if named:
+        return None if named in OWN else link_of(scope, named, asker, context)
+    first = scope.element.find("link")
+    if first is not None:
+        return name_of(first)
+    for part in scope.parts:
+        link = _joined(part.name, _canonical(scope.inside(part), asker, context))
+        if link is not None:
+            return link
+    return None

@@ -17,7 +17,6 @@ from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
-
 # SDF's default for <mu>, and what simulators use where a surface names none.
 DEFAULT_MU = 1.0
 # A collide_bitmask with which a collision touches all others.
@@ -52,76 +51,6 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def read_friction(collision: Element, context: Context) -> float:
-    """The Coulomb coefficient: the smaller of the two that SDF gives, for two directions. Raises UserError."""
-    engine, names = collision.find("surface/friction/ode"), ("mu", "mu2")
-    if engine is None:
-        engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
-    if engine is None:
-        return DEFAULT_MU
-    both = []
-    for name in names:
-        mu = number(engine, name, DEFAULT_MU)
-        if mu < 0:
-            raise complain(engine.find(name), f"friction must not be negative, found {mu:g}")
-        both.append(mu)
-    if both[0] != both[1]:
-        why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in all"
-        context.note("replaced", engine, why)
-    return min(both)
-
-
-def can_be_touched(collision: Element, context: Context) -> bool:
-    """Whether contacts with this collision push anything: those of sensors do not."""
-    contact = collision.find("surface/contact")
-    if contact is None:
-        return True
-    mask = text_of(contact.find("collide_bitmask"))
-    bits = _integer(contact.find("collide_bitmask"), mask) & EVERYTHING if mask else EVERYTHING
-    if bits == 0:
-        context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
-        return False
-    if bits != EVERYTHING:
-        context.note("ignored", contact.find("collide_bitmask"), "it touches everything")
-    if truth(contact, "collide_without_contact", False):
-        context.note("ignored", collision, "it collides without contact")
-        return False
-    return True
-
-
-def _integer(element: Element, text: str) -> int:
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise complain(element, f"expected a whole number, found '{text[:60]}'") from None
-
-
-def read_color(visual: Element) -> Color | None:
-    """The diffuse colour, else the ambient one, else that of a material of Gazebo's own; None where there is none."""
-    opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
-    color = _written(visual) or _named(text_of(visual.find("material/script/name")))
-    if color is None:
-        return None
-    # Files are full of colours with an alpha of zero, which the simulators that wrote them never looked at.
-    red, green, blue, alpha = color
-    return red, green, blue, (alpha or 1.0) * opacity
-
-
-def _written(visual: Element) -> Color | None:
-    for tag in ("material/diffuse", "material/ambient"):
-        element = visual.find(tag)
-        if element is not None and text_of(element):
-            count = 4 if len((element.text or "").split()) == 4 else 3
-            values = tuple(min(max(value, 0.0), 1.0) for value in numbers(element, count))
-            return (*values, 1.0)[:4]
-    return None
-
-
-def _named(material: str) -> Color | None:
-    color = GAZEBO_COLORS.get(material.removeprefix("Gazebo/"))
-    return None if color is None else (*color, 1.0)
-
-
 @dataclass(frozen=True)
 class Site:
     """Where a link is read to: its `pose` in the world, `local` in its model, and what `<state>` multiplies its sizes by."""
@@ -131,15 +60,6 @@ class Site:
     local: Pose
     scale: Vector = ONE
     moving: bool = False
-
-
-@dataclass(frozen=True)
-class _Item:
-    """A `<collision>` or `<visual>` and its pose in the link."""
-
-    element: Element
-    pose: Pose
-    shape: Placed | Lost | None
 
 
 def read_link(element: Element, scope: Scope, site: Site, context: Context) -> Link:
@@ -159,6 +79,15 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
     if site.moving and truth(element, "kinematic", False):
         context.note("ignored", element.find("kinematic"), "it moves by itself, as any other link")
     return Link(site.name, site.pose, inertia, tuple(collisions), tuple(_visuals(items, site, context)))
+
+
+@dataclass(frozen=True)
+class _Item:
+    """A `<collision>` or `<visual>` and its pose in the link."""
+
+    element: Element
+    pose: Pose
+    shape: Placed | Lost | None
 
 
 def _item(child: Element, scope: Scope, site: Site, context: Context) -> _Item:
@@ -217,3 +146,73 @@ def _visuals(items: list[_Item], site: Site, context: Context) -> Iterator[Visua
             continue
         pose = site.pose @ item.pose @ item.shape.offset
         yield Visual(name_of(item.element), item.shape.shape, pose, read_color(item.element))
+
+
+def can_be_touched(collision: Element, context: Context) -> bool:
+    """Whether contacts with this collision push anything: those of sensors do not."""
+    contact = collision.find("surface/contact")
+    if contact is None:
+        return True
+    mask = text_of(contact.find("collide_bitmask"))
+    bits = _integer(contact.find("collide_bitmask"), mask) & EVERYTHING if mask else EVERYTHING
+    if bits == 0:
+        context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
+        return False
+    if bits != EVERYTHING:
+        context.note("ignored", contact.find("collide_bitmask"), "it touches everything")
+    if truth(contact, "collide_without_contact", False):
+        context.note("ignored", collision, "it collides without contact")
+        return False
+    return True
+
+
+def _integer(element: Element, text: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise complain(element, f"expected a whole number, found '{text[:60]}'") from None
+
+
+def read_friction(collision: Element, context: Context) -> float:
+    """The Coulomb coefficient: the smaller of the two that SDF gives, for two directions. Raises UserError."""
+    engine, names = collision.find("surface/friction/ode"), ("mu", "mu2")
+    if engine is None:
+        engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
+    if engine is None:
+        return DEFAULT_MU
+    both = []
+    for name in names:
+        mu = number(engine, name, DEFAULT_MU)
+        if mu < 0:
+            raise complain(engine.find(name), f"friction must not be negative, found {mu:g}")
+        both.append(mu)
+    if both[0] != both[1]:
+        why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in all"
+        context.note("replaced", engine, why)
+    return min(both)
+
+
+def read_color(visual: Element) -> Color | None:
+    """The diffuse colour, else the ambient one, else that of a material of Gazebo's own; None where there is none."""
+    opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
+    color = _written(visual) or _named(text_of(visual.find("material/script/name")))
+    if color is None:
+        return None
+    # Files are full of colours with an alpha of zero, which the simulators that wrote them never looked at.
+    red, green, blue, alpha = color
+    return red, green, blue, (alpha or 1.0) * opacity
+
+
+def _written(visual: Element) -> Color | None:
+    for tag in ("material/diffuse", "material/ambient"):
+        element = visual.find(tag)
+        if element is not None and text_of(element):
+            count = 4 if len((element.text or "").split()) == 4 else 3
+            values = tuple(min(max(value, 0.0), 1.0) for value in numbers(element, count))
+            return (*values, 1.0)[:4]
+    return None
+
+
+def _named(material: str) -> Color | None:
+    color = GAZEBO_COLORS.get(material.removeprefix("Gazebo/"))
+    return None if color is None else (*color, 1.0)

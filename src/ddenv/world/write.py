@@ -8,6 +8,7 @@ that its parser makes of static models (drake#19263).
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,7 +40,26 @@ from ddenv.world.model import (
 from ddenv.world.pose import Pose, Vector
 
 DRAKE = "http://drake.mit.edu"
+_LINE_START = re.compile(rb"(\r\n|\n|\r)[ \t]*\Z")
 RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
+
+
+def without(world: World, removed: frozenset[str]) -> bytes:
+    """The text of `world` with the models named in `removed` cut out, each with the indentation and line it stood on."""
+    unknown = removed - {model.name for model in world.models}
+    if unknown:
+        raise ValueError(f"no such model: {sorted(unknown)[0]}")
+    spans = sorted(span for model in world.models if model.name in removed for span in model.spans)
+    kept, at = [], 0
+    for start, end in spans:
+        kept.append(_LINE_START.sub(b"", world.text[at:start]) if _ends_line(world.text, end) else world.text[at:start])
+        at = end
+    kept.append(world.text[at:])
+    return b"".join(kept)
+
+
+def _ends_line(text: bytes, end: int) -> bool:
+    return text[end : end + 1] in (b"\n", b"\r", b"")
 
 
 @dataclass
