@@ -75,9 +75,9 @@ def test_folders_and_stand_ins_of_a_scenario_come_after_those_of_the_command_lin
 WRONG = {
     "no folder": ({"model_path": ["nowhere"]}, "--model-path: there is no folder nowhere"),
     "no shape": ({"stand_in": ["model://x"]}, "--stand-in: expected URI=SHAPE"),
-    "unknown shape": ({"stand_in": ["model://x=cone:1,2"]}, "'cone:1,2' is no stand-in; use box:x,y,z"),
+    "unknown shape": ({"stand_in": ["model://x=cone:1,2"]}, "'cone:1,2' is not a stand-in; use box:x,y,z"),
     "too few sizes": ({"stand_in": ["model://x=cylinder:1"]}, "expected radius,length in m, found '1'"),
-    "no size": ({"stand_in": ["model://x=sphere:0"]}, "sizes must be above zero"),
+    "no size": ({"stand_in": ["model://x=sphere:0"]}, "sizes must be positive"),
     "not finite": ({"stand_in": ["model://x=sphere:nan"]}, "expected radius in m"),
     "no centre": ({"stand_in": ["model://x=sphere:1@2"]}, "expected x,y,z in m, found '2'"),
 }
@@ -95,5 +95,5 @@ def test_wrong_options_get_one_line(options, words):
 def test_a_wrong_stand_in_in_a_scenario_is_told_with_its_uri(world, tmp_path):
     scenario = scenario_of(world)
     reading = scenario.reading.model_copy(update={"stand_ins": {"model://barrel": "tube:1"}})
-    with pytest.raises(UserError, match="stand-in for 'model://barrel': 'tube:1' is no stand-in"):
+    with pytest.raises(UserError, match="stand-in for 'model://barrel': 'tube:1' is not a stand-in"):
         create_run(with_options(scenario, reading=reading), tmp_path / "run.ddenv")

@@ -46,7 +46,7 @@ def test_a_program_on_the_path_is_found(words):
         ("no-such-program-of-ours", "no program 'no-such-program-of-ours' on PATH$"),
         ("run.sh", "no program 'run.sh' on PATH; there is one in .*: write ./run.sh"),
         ("./missing.sh", "missing.sh: cannot be read: No such file"),
-        ("./plain.sh", "plain.sh: is not executable; 'chmod [+]x'"),
+        ("./plain.sh", "plain.sh: is not executable; use 'chmod [+]x'"),
         ("/tmp/", "is a folder"),
         ("./run.sh a\0b", "NUL"),
         ("./" + "x" * 5000, "File name too long"),
@@ -63,7 +63,7 @@ def test_what_cannot_start_is_told_in_one_line(words, command, complaint):
     [
         (b"echo hi\n", "its first line does not name an interpreter, as '#!/bin/sh' does"),
         (b"", "its first line does not name an interpreter"),
-        (b"#!/bin/sh\r\necho hi\r\n", "has the line ends of Windows"),
+        (b"#!/bin/sh\r\necho hi\r\n", "has Windows line endings"),
         (b"#! /no/such/python -u\n", ":1: there is no interpreter '/no/such/python'"),
         (b"#!", ":1: there is no interpreter ''"),
     ],
@@ -82,7 +82,7 @@ def test_other_programs_may_start(words, tmp_path, content):
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     gone = {"oracle": Oracle(command="sh"), "folder": tmp_path / "gone"}
-    with pytest.raises(UserError, match=r"^folder: .*gone: there is no such folder"):
+    with pytest.raises(UserError, match=r"^folder: .*gone: no such folder"):
         command_words(load_scenario(DATA / "wall.yaml").model_copy(update=gone))
 
 

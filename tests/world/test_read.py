@@ -73,11 +73,11 @@ WRONG = {
     "not xml": (b"<sdf>\n<world", "here.sdf:2: not well-formed XML"),
     "not sdf": (b"<html/>", "here.sdf:1: /html: expected <sdf>"),
     "no world": (b"<sdf version='1.9'><model name='m'/></sdf>", "expected one <world>"),
-    "entity bomb": (b'<!DOCTYPE l [<!ENTITY a "x"><!ENTITY b "&a;&a;">]>\n<sdf>&b;</sdf>', "DOCTYPE is refused"),
+    "entity bomb": (b'<!DOCTYPE l [<!ENTITY a "x"><!ENTITY b "&a;&a;">]>\n<sdf>&b;</sdf>', "DOCTYPE is not allowed"),
     "unknown encoding": (b"<?xml version='1.0' encoding='foo'?><sdf/>", "here.sdf"),
     "other encoding": (b"<?xml version='1.0' encoding='shift_jis'?><sdf/>", "here.sdf"),
-    "no version": (b"<sdf><world name='w'/></sdf>", "has no version attribute; SDF 1.4 to 1.12 can be read"),
-    "unknown version": (b"<sdf version='2.0'><world name='w'/></sdf>", "version '2.0' is unknown"),
+    "no version": (b"<sdf><world name='w'/></sdf>", "has no version attribute; use SDF 1.4 to 1.12"),
+    "unknown version": (b"<sdf version='2.0'><world name='w'/></sdf>", "version '2.0' is not supported"),
     "utf-16": ("<sdf/>".encode("utf-16"), "save it as UTF-8"),
     "external entity": (b'<!DOCTYPE l [<!ENTITY a SYSTEM "file:///etc/passwd">]><sdf>&a;</sdf>', "refused"),
 }
@@ -93,7 +93,7 @@ def test_broken_files_get_one_line(text, words):
 WRONG_MODELS = {
     "no link": ("<model name='m'/>", "has no <link>"),
     "no name": ("<model><link name='l'/></model>", "has no name"),
-    "links twice": ("<model name='m'><link name='l'/><link name='l'/></model>", "stands twice"),
+    "links twice": ("<model name='m'><link name='l'/><link name='l'/></model>", "is used twice"),
     "pose": (
         "<model name='m'><pose>1 2 3</pose><link name='l'/></model>",
         r"model\[@name='m'\]/pose: expected 6 finite",
@@ -115,11 +115,11 @@ WRONG_MODELS = {
         "expected true or false, found 'maybe'",
     ),
     "frame": ("<model name='m'><pose relative_to='x'>0 0 0 0 0 0</pose><link name='l'/></model>", "no frame 'x' here"),
-    "population": ("<population name='p'/>", "<population> makes are not supported"),
+    "population": ("<population name='p'/>", "<population> is not supported"),
     "joint between models": ("<joint name='j' type='fixed'/>", "joints between models are not supported"),
     "joint end": (
         "<model name='m'><link name='l'/><joint name='j' type='fixed'><parent>l</parent></joint></model>",
-        "<child> names no",
+        "<child> is not a link",
     ),
     "joint type": (
         "<model name='m'><link name='l'/><joint name='j' type='screw'/></model>",

@@ -137,7 +137,7 @@ def test_meshes_beside_the_file_in_its_package_and_in_the_model_path(tmp_path, n
 def test_a_mesh_that_is_nowhere_may_be_stood_in_for():
     base = link("base", BODY + shape('<mesh filename="package://cart/wheel.dae"/>'))
     with pytest.raises(
-        UserError, match=r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' cannot be had"
+        UserError, match=r"robot.urdf:3: /robot\[@name='cart'\]/link.*'package://cart/wheel.dae' is not available"
     ):
         read(base)
     model = read(base, reading=Reading(stand_ins={"package://cart": "cylinder:0.3,1.0"}))
@@ -147,10 +147,10 @@ def test_a_mesh_that_is_nowhere_may_be_stood_in_for():
 A, B = link("a", BODY), link("b", WHEEL)
 REFUSED = {
     "no link": ((), r":2: /robot\[@name='cart'\]: has no <link>"),
-    "two roots": ((A, B), "expected one link that is no joint's child, found a, b"),
+    "two roots": ((A, B), "expected one link that is not the child of a joint, found a, b"),
     "loop": (
         (A, B, joint("j", "fixed", "a", "b"), joint("k", "fixed", "b", "a")),
-        "expected one link that is no joint's child, but joints close a loop",
+        "expected one link that is not the child of a joint, but joints close a loop",
     ),
     "two parents": (
         (
@@ -180,14 +180,14 @@ REFUSED = {
     "size": ((link("a", BODY + shape('<box size="1 2"/>')),), "/box/size: expected 3 finite numbers, found '1 2'"),
     "negative": ((link("a", BODY + shape('<sphere radius="-1"/>')),), "sizes must be from 1e-06"),
     "no radius": ((link("a", BODY + shape('<sphere size="1"/>')),), "has no attribute 'radius'"),
-    "shape": ((link("a", BODY + shape('<cone radius="1"/>')),), "<cone> is no shape of URDF; use one of box, cylinder"),
+    "shape": ((link("a", BODY + shape('<cone radius="1"/>')),), "<cone> is not a URDF shape; use one of box, cylinder"),
     "no shape": ((link("a", BODY + shape("")),), "has no <geometry> with a shape in it"),
     "xacro": (
         (link("a", BODY + shape('<sphere radius="${r}"/>')),),
         r"is xacro, not URDF; run 'xacro FILE > robot.urdf'",
     ),
     "macro": (('<x:macro xmlns:x="http://www.ros.org/wiki/xacro" name="m"/>', A), ":3: .*is xacro, not URDF"),
-    "twice": ((A, A), "this name stands twice"),
+    "twice": ((A, A), "name is used twice"),
 }
 
 

@@ -1,4 +1,4 @@
-"""The command of an oracle: its words, checked, and what is put in for its placeholders."""
+"""The command of an oracle: splits and checks its words, and fills in its placeholders."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from ddenv.world.scenario import Scenario
 
 PLACEHOLDERS = ("world", "seed", "log")
 KEY = "oracle.command"
-# Linux reads no more of the first line of a script.
+# Linux reads only this many bytes of a script's first line.
 LONGEST_FIRST_LINE = 256
 _PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
-    """The words of the scenario's oracle, the program's first as a path or a name on PATH, placeholders as they stand.
+    """The words of the oracle's command, the absolute path of its program first, placeholders unfilled; () without an oracle.
 
-    Raises UserError for what can be known to fail: an unknown placeholder, a folder or a program that is not there, or one that
-    cannot be executed.
+    Raises UserError for an unknown placeholder, a missing folder, and a program that is missing or not executable.
     """
+    if scenario.oracle is None:
+        return ()
     try:
         words = shlex.split(scenario.oracle.command)
     except ValueError as error:
@@ -39,17 +40,17 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
         if name not in PLACEHOLDERS:
             raise UserError(
                 f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
-                "use {world}, {seed} and {log}; there is no shell that knows others"
+                "use {world}, {seed} and {log}; shell variables are not available"
             )
     if not scenario.folder.is_dir():
-        raise UserError(f"folder: {scenario.folder}: there is no such folder to start the command in")
+        raise UserError(f"folder: {scenario.folder}: no such folder; the command starts there")
     program = _program(words[0], scenario.folder)
     _check_first_line(program)
     return program, *words[1:]
 
 
 def _program(word: str, folder: Path) -> str:
-    """The path of the program, relative ones from `folder`."""
+    """The absolute path of the program `word`, relative to `folder` if it has a slash, else from PATH. Raises UserError."""
     path = folder.absolute() / word
     if "/" not in word:
         if found := shutil.which(word):
@@ -59,33 +60,33 @@ def _program(word: str, folder: Path) -> str:
     if why := _why_no_file(path):
         raise UserError(f"{KEY}: {path}: {why}")
     if not os.access(path, os.X_OK):
-        raise UserError(f"{KEY}: {path}: is not executable; 'chmod +x' makes it so")
+        raise UserError(f"{KEY}: {path}: is not executable; use 'chmod +x'")
     return str(path)
 
 
 def _check_first_line(program: str) -> None:
-    """Raises UserError for a script that the system could not start, which would only say that there is no such file."""
+    """Raises UserError for a script without a usable interpreter, for which the system would only report a missing file."""
     try:
         with Path(program).open("rb") as file:
             head = file.read(LONGEST_FIRST_LINE)
     except OSError:
-        # What may be executed may be unreadable.
+        # An executable file may be unreadable.
         return
     line = head.partition(b"\n")[0]
     if not line.startswith(b"#!"):
-        # A program that is no script has bytes that no text has.
+        # Binary programs contain NUL bytes.
         if b"\0" not in head:
             raise UserError(f"{KEY}: {program}: its first line does not name an interpreter, as '#!/bin/sh' does")
         return
     if line.endswith(b"\r"):
-        raise UserError(f"{KEY}: {program}: has the line ends of Windows; save it with those of Unix")
+        raise UserError(f"{KEY}: {program}: has Windows line endings; save it with Unix line endings")
     interpreter = os.fsdecode((line[2:].split() or [b""])[0])
     if not os.access(interpreter, os.X_OK):
         raise UserError(f"{KEY}: {program}:1: there is no interpreter '{interpreter}'")
 
 
 def _why_no_file(path: Path) -> str:
-    """Why `path` is no file that could be a program, or ""."""
+    """Why `path` cannot be a program file, or ""."""
     try:
         size_of(path)
     except Unusable as error:
@@ -94,7 +95,7 @@ def _why_no_file(path: Path) -> str:
 
 
 def filled(words: tuple[str, ...], values: Mapping[str, str]) -> list[str]:
-    """`words` with `values` in the place of their placeholders; the program stays as it is."""
+    """`words` with their placeholders replaced by `values`, except in the program."""
     program, *rest = words
     return [program, *(_PLACEHOLDER.sub(lambda match: values[match[1]], word) for word in rest)]
 

@@ -1,4 +1,4 @@
-"""How large shapes are: the boxes around them, along the axes of the world, m."""
+"""The extent of shapes and models: axis-aligned boxes in the world frame, m; and convex hulls in the plane."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Bounds = tuple[np.ndarray, np.ndarray]
 
 
 def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
-    """Lowest and highest corner, each shape (3,), of what `shape` fills at `pose`. A plane has a place, but no size."""
+    """Lowest and highest corner, each shape (3,), of `shape` at `pose`. A plane has a place but no size."""
     center, rotation = np.array(pose.position), pose.rotation()
     if isinstance(shape, Mesh):
         points = shape.vertices @ rotation.T + center
@@ -21,26 +21,29 @@ def shape_bounds(shape: Shape, pose: Pose) -> Bounds:
 
 
 def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
-    """Half of the box around a shape that is the same on both sides of its centre."""
+    """Half the size of the box around a shape that is symmetric about its centre."""
     up = np.abs(rotation[:, 2])
+    half: np.ndarray
     match shape:
         case Box(size):
-            return np.abs(rotation) @ np.array(size) / 2
+            half = np.abs(rotation) @ np.array(size) / 2
         case Cylinder(radius, length):
-            return radius * np.sqrt(np.maximum(0.0, 1 - up**2)) + up * length / 2
+            half = radius * np.sqrt(np.maximum(0.0, 1 - up**2)) + up * length / 2
         case Capsule(radius, length):
-            return radius + up * length / 2
+            half = radius + up * length / 2
         case Ellipsoid(radii):
-            return np.sqrt((rotation * radii) ** 2 @ np.ones(3))
+            half = np.sqrt((rotation * radii) ** 2 @ np.ones(3))
         case Sphere(radius):
-            return np.full(3, radius)
+            half = np.full(3, radius)
         case Plane():
-            return np.zeros(3)
-    raise TypeError(type(shape).__name__)
+            half = np.zeros(3)
+        case _:
+            raise TypeError(type(shape).__name__)
+    return half
 
 
 def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
-    """The box around all `collisions` that are no planes; None where there are none."""
+    """The box around all `collisions` except planes; None if there are none."""
     boxes = [shape_bounds(one.shape, one.pose) for one in collisions if not isinstance(one.shape, Plane)]
     if not boxes:
         return None
@@ -49,7 +52,7 @@ def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
 
 
 def center(model: Model) -> Vector:
-    """The middle of what a model fills, m: its own frame may be far from it. A model that fills nothing is where its frame is."""
+    """The centre of the box around a model, m, which may be far from its frame; the origin of its frame if it fills nothing."""
     box = model_bounds(model)
     if box is None:
         return model.pose.position
@@ -58,12 +61,12 @@ def center(model: Model) -> Vector:
 
 
 def model_bounds(model: Model) -> Bounds | None:
-    """The box around a model's collisions; None for a ground or a model that nothing can touch."""
+    """The box around a model's collisions; None for the ground and for models that nothing can touch."""
     return bounds(model.collisions)
 
 
 def convex_hull(points: np.ndarray) -> np.ndarray:
-    """The corners of the convex hull of (N, 2) points, anticlockwise (Andrew's monotone chain)."""
+    """The corners (M, 2) of the convex hull of `points` (N, 2), anticlockwise (Andrew's monotone chain)."""
     ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
     if len(ordered) < 3:
         return np.array(ordered).reshape(-1, 2)
@@ -72,7 +75,7 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
 
 
 def polygon_area(corners: np.ndarray) -> float:
-    """The area inside the polygon (N, 2), m^2; negative where it goes clockwise."""
+    """The area of the polygon `corners` (N, 2), m^2; negative if it is clockwise."""
     if len(corners) < 3:
         return 0.0
     x, y = corners.T

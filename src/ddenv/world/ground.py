@@ -1,5 +1,7 @@
-"""Infinite planes as boxes that are large enough: Drake crashes with half spaces among hundreds of boxes, and on the bodies that
-its parser makes of static models (drake#19263)."""
+"""Replaces infinite planes by large boxes.
+
+Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,12 @@ from ddenv.world.extent import model_bounds
 from ddenv.world.model import ENDLESS, Box, Collision, Model, Plane, World
 from ddenv.world.pose import Pose, Vector
 
-DEPTH = 1.0  # m
-# How much ground there is at least beyond everything, m.
-BEYOND = 20.0
+DEPTH = 1.0  # of the box, m
+BEYOND = 20.0  # minimum width of ground beyond all models, m
 
 
 def with_ground_boxes(world: World, places: Iterable[Vector] = ()) -> World:
-    """`world` with a box for each plane, below all of its models and `places` (m, world frame)."""
+    """`world` with a box for each plane, wide enough for all models and `places` (m, world frame)."""
     if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
         return world
     points = _points(world, places)

@@ -1,6 +1,6 @@
-"""A world as plain frozen data: what the simulator, the maps and the writer need of an SDF file.
+"""A world as plain frozen data: the part of an SDF file that the simulator, the maps and the writer need.
 
-Every pose is absolute (in the world frame), lengths are in m, masses in kg, angles in rad.
+Poses are absolute (in the world frame), lengths in m, masses in kg, angles in rad.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """Infinite ground with its normal along its frame's z axis; `size` is only how much of it is drawn."""
+    """Infinite ground with its normal along its frame's z axis; `size` only limits what is drawn."""
 
     size: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Capsule:
-    """A cylinder of `length` along its frame's z axis, with half a ball of the same radius on each end."""
+    """A cylinder of `length` along its frame's z axis, with a hemisphere of the same radius on each end."""
 
     radius: float
     length: float
@@ -57,9 +57,9 @@ class Ellipsoid:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) numbers of vertices, counterclockwise seen from outside.
+    """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise seen from outside.
 
-    Of a collision it is convex. Two meshes are equal if they came from the same file in the same way (`origin`).
+    Convex in a collision. Meshes are equal if they have the same `origin`: the same file, read in the same way.
     """
 
     origin: str
@@ -72,7 +72,7 @@ Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """`mu` is the Coulomb friction coefficient of this surface: the smaller of SDF's `ode/mu` and `ode/mu2`."""
+    """`mu` is the Coulomb friction coefficient: the smaller of SDF's `ode/mu` and `ode/mu2`."""
 
     name: str
     shape: Shape
@@ -82,7 +82,7 @@ class Collision:
 
 @dataclass(frozen=True, slots=True)
 class Visual:
-    """`color` is red, green, blue, alpha in 0..1, or None where the file names none."""
+    """`color` is red, green, blue, alpha in 0..1, or None if the file gives none."""
 
     name: str
     shape: Shape
@@ -92,7 +92,7 @@ class Visual:
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Mass and rotational inertia about the centre of mass, in the axes of `pose` (whose origin is that centre).
+    """Mass and rotational inertia about the centre of mass, in the axes of `pose`, whose origin is that centre.
 
     `moments` are ixx, iyy, izz and `products` ixy, ixz, iyz in kg m^2.
     """
@@ -116,9 +116,9 @@ class Link:
 class Joint:
     """A joint between two links of one model; `pose` is the joint frame, `axis` a unit vector in the world frame.
 
-    `kind` is SDF's type: fixed, revolute, continuous, prismatic, ball or universal (which turns about `axis` and then about
-    `axis2`, at right angles to it). Limits are counted from the pose in which the links are: rad, or m for a prismatic one.
-    `effort` (N m or N) and `velocity` (rad/s or m/s) are infinite where unlimited. The parent may be "world".
+    `kind` is SDF's type: fixed, revolute, continuous, prismatic, ball or universal (turns about `axis`, then about the
+    perpendicular `axis2`). Limits are relative to the initial pose of the links: rad, or m for a prismatic joint.
+    `effort` (N m or N) and `velocity` (rad/s or m/s) are infinite if unlimited. The parent may be "world".
     """
 
     name: str
@@ -137,10 +137,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model of the world, with the links and joints of those nested in it (named `inner::link`).
+    """A model of the world, including the links and joints of its nested models (named `inner::link`).
 
-    `name` is unique: a second model of the same name in the file is called `name #2`. `spans` are the parts of the file's text
-    that go with it (start and end byte): its own element first, then what `<state>` says of it. `line` is its first line.
+    `name` is unique: the second model of one name is called `name #2`. `spans` are the byte ranges (start, end) of the file
+    that belong to it: its own element first, then its entry in `<state>`. `line` is its first line.
     """
 
     name: str
@@ -160,10 +160,10 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something that was not taken as the file has it: `kind` tells whether it was replaced or ignored.
+    """A part of the file that was replaced or ignored (`kind`).
 
-    `model` is whose it is (empty: the world's), `place` is file, line and XPath, `what` the element, and `why` the reason, with
-    what took its place. `detail` is what differs between models of which the same is said.
+    `model` is the model it belongs to (empty: the world itself), `place` is file, line and XPath, `what` the element, `why`
+    the reason and the replacement. `detail` holds what differs between models with otherwise equal notes.
     """
 
     kind: Literal["replaced", "ignored"]
@@ -176,10 +176,10 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """An SDF world. `text` is the file as it was read; `models` are in the file's order; `gravity` is in m/s^2.
+    """An SDF world. `text` is the file's content; `models` are in the file's order; `gravity` is in m/s^2.
 
-    `anchors` names models that others are placed relative to: without them the file could not be read any more. `resources`
-    holds what was read of other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
+    `anchors` names the models that others are placed relative to: without them the file would be invalid. `resources` holds
+    everything read from other files (`ddenv.world.files.resources`), so that `text` can be read again without them.
     """
 
     path: Path
@@ -204,14 +204,14 @@ class World:
         return tuple(model.name for model in self.models if model.name not in stay and not is_ground(model))
 
 
-# A box of this length and width that is shown as an infinite plane is one, m.
+# A box drawn as an infinite plane, and at least this long and wide, stands for one, m.
 ENDLESS = 200.0
 
 
 def is_ground(model: Model) -> bool:
-    """A model with an infinite plane carries everything else: it is never an element.
+    """Whether the model holds an infinite plane, or a box that stands for one (as `ddenv.world.write` writes it).
 
-    So is a box that stands for one: that which `ddenv.world.write` writes.
+    The ground carries everything else: it is never an element.
     """
     if any(isinstance(collision.shape, Plane) for collision in model.collisions):
         return True

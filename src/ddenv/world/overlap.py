@@ -1,4 +1,4 @@
-"""How far two convex shapes overlap."""
+"""How far two convex shapes overlap, or how far they are apart."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose
 
-# A cylinder is taken as a prism with this many sides, an ellipsoid as a ball of as many meridians.
+# Sides of the prism that stands for a cylinder, and meridians of the ball that stands for an ellipsoid.
 SIDES = 16
-# Normals that differ by less, and lengths below it, are taken as equal.
+# Relative tolerance of lengths and of differences between normals.
 SMALL = 1e-9
 _NO_FACES = np.empty((0, 3)), np.empty(0, dtype=int), np.empty((0, 2), dtype=int), np.empty((0, 2), dtype=int)
 
 
 @dataclass(frozen=True)
 class Hull:
-    """A convex body: `vertices` (N, 3) m grown by `radius` m.
+    """A convex body: the hull of `vertices` (N, 3) m, grown by `radius` m.
 
-    `normals` (F, 3) are unit vectors that point out of its faces, `on` (F,) the number of a vertex on each, `edges` (E, 2) numbers
-    of vertices, and `sides` (E, 2) numbers of the normals on both sides of each edge.
+    `normals` (F, 3) are the outward unit normals of its faces, `on` (F,) the index of one vertex on each face, `edges` (E, 2)
+    vertex indices, and `sides` (E, 2) the indices of the two normals beside each edge.
     """
 
     vertices: np.ndarray
@@ -45,21 +45,21 @@ class Hull:
 
 
 def hull(collision: Collision, place: Pose | None = None) -> Hull:
-    """The convex body of a collision shape that is no plane, moved by `place`."""
+    """The convex body of a collision shape other than a plane, moved by `place`."""
     pose = collision.pose if place is None else place @ collision.pose
     return _own(collision.shape).at(pose)
 
 
 def overlap(a: Hull, b: Hull) -> float:
-    """How far two convex bodies must be moved to be apart, m; 0 where they are."""
+    """The shortest move that separates two convex bodies, m; 0 if they do not overlap."""
     grown = a.radius + b.radius
-    # Only what is round cannot be told apart along the directions of faces and edges.
+    # Directions of faces and edges suffice, except for round bodies.
     apart = distance(a, b) if grown else 0.0
     return max(0.0, grown - apart if apart else _depth(a, b))
 
 
 def distance(a: Hull, b: Hull) -> float:
-    """How far the vertices' hulls are from each other, m; 0 where they touch (Gilbert, Johnson and Keerthi)."""
+    """The distance between the hulls of the vertices, m; 0 if they touch (Gilbert, Johnson and Keerthi)."""
     simplex = a.vertices[:1] - b.vertices[:1]
     for _ in range(100):
         nearest, simplex = _nearest(simplex)
@@ -74,7 +74,7 @@ def distance(a: Hull, b: Hull) -> float:
 
 
 def _own(shape: Shape) -> Hull:
-    """The body in its own frame."""
+    """The body of a shape, in its own frame."""
     match shape:
         case Box(size):
             return replace(_CUBE, vertices=_CUBE.vertices * size)
@@ -96,7 +96,7 @@ def _solid(vertices: np.ndarray, faces: np.ndarray) -> Hull:
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
-    # Slivers have no direction; their neighbours bound the body without them.
+    # Slivers have no usable normal; their neighbours bound the body without them.
     good = areas > SMALL * areas.max()
     faces, normals = faces[good], np.round(normals[good] / areas[good, None], 6)
     normals, first, which = np.unique(normals, axis=0, return_index=True, return_inverse=True)
@@ -145,7 +145,7 @@ def _ball() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _segment() -> Hull:
-    """A body without volume, along z: a prism of three sides whose cross-section is a point."""
+    """A line segment along z: a prism of three sides whose cross-section is a point."""
     angles = np.arange(3) * math.tau / 3
     normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
     ends = np.array([[0, 0, -0.5], [0, 0, 0.5]])
@@ -156,7 +156,7 @@ _CUBE, _PRISM, _SEGMENT, _BALL = _cube(), _prism(), _segment(), _ball()
 
 
 def _nearest(simplex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The point of a simplex (at most 4 points) nearest to the origin, and those of its corners that it lies between."""
+    """The point of a simplex (maximum 4 points) nearest to the origin, and the corners that span it."""
     best, corners = simplex[0], simplex[:1]
     for count in range(1, len(simplex) + 1):
         for chosen in combinations(range(len(simplex)), count):
@@ -172,9 +172,9 @@ def _nearest(simplex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _depth(a: Hull, b: Hull) -> float:
-    """The least move that takes the bodies apart, m; below 0 where they are: along a face's normal, or across two edges."""
+    """The shortest separating move along a face normal or across two edges, m; negative if the bodies are apart."""
     moves = np.concatenate([_out_of(a, b), _out_of(b, a)])
-    # A pair of mere points can be moved anywhere.
+    # Two points have no normals: any direction will do.
     least = float(moves.min()) if len(moves) else a.radius + b.radius
     return min([least, *_across(a, b)]) if least > 0 else least
 
@@ -183,12 +183,13 @@ def _out_of(a: Hull, b: Hull) -> np.ndarray:
     """How far `b` must be moved along each of a's normals."""
     if not len(a.normals):
         return np.empty(0)
-    heights = np.einsum("ij,ij->i", a.normals, a.vertices[a.on]) + a.radius
-    return heights - b.span(a.normals)[0]
+    heights: np.ndarray = np.einsum("ij,ij->i", a.normals, a.vertices[a.on]) + a.radius
+    moves: np.ndarray = heights - b.span(a.normals)[0]
+    return moves
 
 
 def _across(a: Hull, b: Hull) -> np.ndarray:
-    """The move needed along each direction at right angles to an edge of both bodies, of those that can be the least."""
+    """The move along each direction perpendicular to an edge of both bodies, for pairs of edges that may give the shortest."""
     first, second = _crossing(a, b)
     from_a, from_b = a.vertices[a.edges[first]], b.vertices[b.edges[second]]
     axes = np.cross(from_a[:, 1] - from_a[:, 0], from_b[:, 1] - from_b[:, 0])
@@ -197,14 +198,16 @@ def _across(a: Hull, b: Hull) -> np.ndarray:
     axes = axes[apart] / lengths[apart, None]
     outward = np.einsum("ij,ij->i", axes, a.normals[a.sides[first[apart]]].sum(axis=1))
     between = from_a[apart, 0] - from_b[apart, 0]
-    return np.einsum("ij,ij->i", axes, between) * np.where(outward < 0, -1, 1) + a.radius + b.radius
+    along: np.ndarray = np.einsum("ij,ij->i", axes, between) * np.where(outward < 0, -1, 1)
+    return along + a.radius + b.radius
 
 
 def _crossing(a: Hull, b: Hull) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of edges that make a face of the bodies' Minkowski difference: those whose normals' arcs cross on the unit sphere."""
+    """Pairs of edges that form a face of the Minkowski difference: the arcs of their normals cross on the unit sphere."""
     start, end = a.normals[a.sides[:, 0]], a.normals[a.sides[:, 1]]
     other_start, other_end = -b.normals[b.sides[:, 0]], -b.normals[b.sides[:, 1]]
     across, other_across = np.cross(end, start), np.cross(other_end, other_start)
     cba, dba = across @ other_start.T, across @ other_end.T
     adc, bdc = start @ other_across.T, end @ other_across.T
-    return np.nonzero((cba * dba < 0) & (adc * bdc < 0) & (cba * bdc > 0))
+    first, second = np.nonzero((cba * dba < 0) & (adc * bdc < 0) & (cba * bdc > 0))
+    return first, second

@@ -1,4 +1,4 @@
-"""Whether the robot can start where a scenario says: no part of it may stand inside a model."""
+"""Checks that the robot can start where a scenario says: no part of it may overlap a model."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ddenv.world.overlap import Hull, hull, overlap
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Spawn
 
-# Contacts rest with a little overlap, and a file's numbers are rounded: less than this is no complaint, m.
+# Tolerated overlap, m: contacts at rest overlap slightly, and numbers in files are rounded.
 TOLERANCE = 0.02
 
 
 def spawn_pose(spawn: Spawn) -> Pose:
-    """The robot's model frame in the world at the start."""
+    """The pose of the robot's model frame in the world at the start."""
     return Pose.from_rpy(spawn.x, spawn.y, spawn.z, 0.0, 0.0, spawn.yaw)
 
 
@@ -33,7 +33,7 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
         depths = [(_depth_inside(bodies, boxes, collision), collision.shape) for collision in model.collisions]
         depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))
         if depth > TOLERANCE:
-            # A mesh may be hollow where its hull is not: what is meant is not what is seen.
+            # The hull of a hollow mesh fills space that looks free.
             what = "the convex hull of model" if isinstance(shape, Mesh) else "model"
             raise UserError(
                 f"{where}: the robot stands inside {what} '{model.name}' by {depth:.2f} m; move the spawn or raise its z"
@@ -41,7 +41,7 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
 
 
 def _depth_inside(bodies: list[Hull], boxes: list[Bounds], collision: Collision) -> float:
-    """How deep the robot's `bodies`, with `boxes` around them, stand in an obstacle, m."""
+    """How deep the robot's `bodies`, with `boxes` around them, overlap an obstacle, m."""
     if isinstance(collision.shape, Plane):
         up = np.array([collision.pose.rotate((0.0, 0.0, 1.0))])
         height = float(up[0] @ collision.pose.position)

@@ -1,8 +1,9 @@
-"""Rigid poses as plain data, in SDF's convention."""
+"""Rigid poses and vectors as plain data, in SDF's convention."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,12 @@ class Pose:
         )
         x, y, z = self.position
         return Pose((x + px, y + py, z + pz), quaternion)
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Three numbers, such as a row of an array, as a plain vector."""
+    x, y, z = values
+    return float(x), float(y), float(z)
 
 
 HERE = Pose()

@@ -1,8 +1,8 @@
 """Reads an SDF world or model file, or a URDF robot, into plain data (`ddenv.world.model`).
 
-We read SDF ourselves because Drake's parser refuses many files that simulators accept, and drops parts of others without
-a word. What this reader replaces or ignores it notes (`World.notes`); what it does not understand it refuses with the file,
-the line and the XPath: it never guesses.
+We read SDF ourselves because Drake's parser refuses many files that simulators accept, and silently drops parts of others.
+This reader notes everything that it replaces or ignores (`World.notes`), and refuses what it does not understand, with file,
+line and XPath. It never guesses.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ddenv.errors import UserError
 from ddenv.world.files.access import read_bytes
 from ddenv.world.files.resources import Disk, Resources
 from ddenv.world.model import Model, World
-from ddenv.world.pose import Vector
+from ddenv.world.pose import Vector, vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
@@ -24,9 +24,9 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
 from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
-# What would put models into the world that this reader does not see.
+# Elements that would hide models or change them in ways that this reader cannot follow, with the error message.
 REFUSED = {
-    "population": "models that a <population> makes are not supported; write them out",
+    "population": "<population> is not supported; write its models out",
     "joint": "joints between models are not supported; put both models into one",
 }
 
@@ -34,19 +34,19 @@ REFUSED = {
 def read_world(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None] | None = None) -> World:
     """The world in the SDF file `path`. Raises UserError with file, line and XPath.
 
-    `tell` is called with a line before something that takes longer.
+    `tell` is called with a line of text before slow steps.
     """
     text = read_bytes(path)
     return parse_world(text, path, reading, disk_of(path, reading, tell))
 
 
 def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
-    """The world in `text`, the content of `path`; other files come from `resources`, or else from the disk."""
+    """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources or disk_of(path, reading, None), reading)
     try:
         return _world(text, path, context)
     except UserError:
-        # What is wrong may only follow from a file that is missing, such as a place relative to a model in it.
+        # The error may only be a consequence of a missing file, such as a pose relative to a model in it.
         context.complain_of_missing()
         raise
     except RecursionError:
@@ -59,7 +59,7 @@ def read_model(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None]
 
 
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
-    """The one model in `text`, the content of `path`; other files come from `resources`, or else from the disk."""
+    """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources or disk_of(path, reading, None), reading)
     urdf = _urdf_root(text, path)
     root = sdf_root(text, path) if urdf is None else to_sdf(urdf, context)
@@ -81,10 +81,10 @@ def _urdf_root(text: bytes, path: Path) -> Element | None:
 
 
 def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) -> Disk:
-    """The files around the world `path`, and those in the folders that the user names. Raises UserError."""
+    """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
-            raise UserError(f"reading.model_path: there is no folder {folder}")
+            raise UserError(f"reading.model_path: no such folder: {folder}")
     return Disk(path.parent, reading.model_path, tell)
 
 
@@ -96,8 +96,9 @@ def _world(text: bytes, path: Path, context: Context) -> World:
         raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}")
     world = worlds[0]
     for tag, message in REFUSED.items():
-        if world.find(tag) is not None:
-            raise complain(world.find(tag), message)
+        refused = world.find(tag)
+        if refused is not None:
+            raise complain(refused, message)
     note_unread(world, context)
     scope = Scope(world, (path,), context)
     models = _models(scope, read_state(world, context), context)
@@ -124,21 +125,22 @@ def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tu
     left = {name: list(saved) for name, saved in state.items()}
     models = []
     for part, name in zip(scope.parts, names, strict=True):
-        saved = left.get(part.name) or [None]
         if name != part.name:
             context.model = name
-            context.note("replaced", part.at, f"its name, which stands {counts[part.name]} times, by '{name}'")
-        models.append(assemble(part, name, scope, saved.pop(0), context))
+            context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
+        entries = left.get(part.name)
+        models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
     context.model = ""
     for entries in left.values():
-        for saved in filter(None, entries):
-            context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}' for it")
+        for saved in entries:
+            context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
     return tuple(models)
 
 
 def unique_names(names: list[str]) -> list[str]:
-    """`names` with the second, third, ... of the same name called `name #2`, `name #3`, ..."""
-    taken, given, unique = set(names), Counter(), []
+    """`names` with repeated ones made unique: the second `name` becomes `name #2`, the third `name #3`, ..."""
+    taken, unique = set(names), []
+    given: Counter[str] = Counter()
     for name in names:
         own, number = name, given[name]
         while number and own in taken:
@@ -154,13 +156,11 @@ def _gravity(world: Element) -> Vector:
     for tag in ("gravity", "physics/gravity"):
         element = world.find(tag)
         if element is not None:
-            return numbers(element, 3)  # type: ignore[return-value]
+            return vector(numbers(element, 3))
     return GRAVITY
 
 
 def _note_unused(context: Context, root: Element) -> None:
-    """A stand-in that nothing asked for is likely to be mistyped."""
+    """An unused stand-in is probably a typing error."""
     for uri in sorted(context.stand_ins.keys() - context.used):
-        context.note(
-            "ignored", root, f"the stand-in for '{uri}' was not needed: nothing of that name is included or drawn"
-        )
+        context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")

@@ -1,4 +1,4 @@
-"""The `<link>`s of URDF: mass, shapes, colours, and the friction that Gazebo's own elements give them."""
+"""Converts a URDF robot to SDF elements: links with mass, shapes, colours and Gazebo's friction, and joints."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ddenv.world.sdf.xml import Element, complain, name_of, number, text_of
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
 LIMITED = ("revolute", "prismatic")
-# URDF's own defaults. Not to be limited at all is a joint of another kind.
+# URDF's defaults; unlimited joints have a type of their own.
 LIMITS = {"lower": "0", "upper": "0"}
-# What URDF says of each shape, by the attribute, with the SDF element that says it.
+# The attributes of each URDF shape, with the corresponding SDF elements.
 SHAPES = {
     "box": {"size": "size"},
     "cylinder": {"radius": "radius", "length": "length"},
@@ -27,9 +27,9 @@ ROOT = "robot"
 
 
 def to_sdf(robot: Element, context: Context) -> Element:
-    """The `<sdf>` for the outermost element of a URDF file, its root link first. Raises UserError."""
+    """The `<sdf>` for a URDF `<robot>`, its root link first. Raises UserError."""
     _check_expanded(robot)
-    # Nothing like the version of SDF, for which it would be taken.
+    # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
     links = {name_of(link): link for link in reversed(robot.findall("link"))}
     if not links:
@@ -50,18 +50,18 @@ def to_sdf(robot: Element, context: Context) -> Element:
 
 
 def massless(robot: Element) -> frozenset[str]:
-    """The names of the links without a mass of their own."""
+    """The names of the links without mass."""
     return frozenset(name_of(link) for link in robot.findall("link") if not has_mass(link))
 
 
 def without_mass(model: Model, names: frozenset[str]) -> Model:
-    """`model` with the links `names` as mere frames: to those the SDF reader gives a mass."""
+    """`model` with the links `names` as mere frames, since the SDF reader gives every link a mass."""
     links = (replace(link, inertia=None) if link.name in names else link for link in model.links)
     return replace(model, links=tuple(links))
 
 
 def has_mass(link: Element) -> bool:
-    """Whether `link` has a mass: many of a robot's links are frames only. Raises UserError."""
+    """Whether `link` has a mass; many links of robots are only frames. Raises UserError."""
     mass = link.find("inertial/mass")
     return mass is not None and value(mass, "value") != 0.0
 
@@ -76,16 +76,17 @@ def _root(robot: Element, links: list[str], children: set[str]) -> str:
     roots = [name for name in reversed(links) if name not in children]
     if len(roots) != 1:
         found = f"found {', '.join(roots[:5])}" if roots else "but joints close a loop"
-        raise complain(robot, f"expected one link that is no joint's child, {found}")
+        raise complain(robot, f"expected one link that is not the child of a joint, {found}")
     return roots[0]
 
 
 def link_of(source: Element, robot: Element, context: Context) -> Element:
-    """The SDF link without its pose. Raises UserError."""
+    """The SDF link for a URDF one, without its pose. Raises UserError."""
     name = name_of(source)
     made = twin(source, name=name)
-    if has_mass(source):
-        made.append(_inertial(source.find("inertial")))
+    inertial = source.find("inertial")
+    if inertial is not None and has_mass(source):
+        made.append(_inertial(inertial))
     for tag in ("collision", "visual"):
         for count, part in enumerate(source.findall(tag)):
             shape = twin(part, name=part.get("name") or f"{tag}_{count}")
@@ -99,7 +100,8 @@ def _inertial(source: Element) -> Element:
     made = twin(source)
     made.append(pose(source))
     mass, tensor = source.find("mass"), source.find("inertia")
-    made.append(element("mass", mass, given(mass, "value")))
+    if mass is not None:
+        made.append(element("mass", mass, given(mass, "value")))
     if tensor is not None:
         inertia = twin(tensor)
         inertia.extend([element(tag, tensor, given(tensor, tag)) for tag in TENSOR])
@@ -113,7 +115,7 @@ def _geometry(part: Element, context: Context) -> Element:
         raise complain(part, "has no <geometry> with a shape in it")
     shape = source[0]
     if shape.tag not in SHAPES:
-        raise complain(shape, f"<{shape.tag}> is no shape of URDF; use one of {', '.join(SHAPES)}")
+        raise complain(shape, f"<{shape.tag}> is not a URDF shape; use one of {', '.join(SHAPES)}")
     made = twin(shape)
     for attribute, tag in SHAPES[shape.tag].items():
         text = given(shape, attribute)
@@ -126,7 +128,7 @@ def _geometry(part: Element, context: Context) -> Element:
 
 
 def _found(uri: str, shape: Element, context: Context) -> str:
-    """The URI of a mesh; one in the package that the file itself lies in is its path."""
+    """The URI of a mesh; the path, if it is in the package that contains the robot's file."""
     package, _, rest = uri.removeprefix("package://").partition("/")
     if not uri.startswith("package://") or context.stand_in(uri) is not None:
         return uri
@@ -135,7 +137,7 @@ def _found(uri: str, shape: Element, context: Context) -> str:
 
 
 def _surface(link: str, part: Element, robot: Element) -> list[Element]:
-    """The `<surface>` that `<gazebo reference="link">` gives a collision, if there is one."""
+    """The `<surface>` of a collision from `<gazebo reference="link">`, if there is one."""
     ode = element("ode", part)
     for extension in robot.findall("gazebo"):
         for tag, ours in FRICTION.items():
@@ -149,7 +151,7 @@ def _surface(link: str, part: Element, robot: Element) -> list[Element]:
 
 
 def _material(part: Element, robot: Element) -> list[Element]:
-    """The `<material>` of a visual: its own colour, or that of the robot's material of that name."""
+    """The `<material>` of a visual: its own colour, or that of the robot's material of the same name."""
     own = part.find("material")
     if own is None:
         return []
@@ -177,7 +179,7 @@ def ends(joint: Element, links: list[str]) -> tuple[str, str]:
 
 
 def joint_of(source: Element, parent: str, child: str) -> Element:
-    """The SDF joint. Raises UserError."""
+    """The SDF joint for a URDF one. Raises UserError."""
     kind = (source.get("type") or "").strip()
     if kind not in KINDS:
         raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
@@ -208,12 +210,12 @@ def _limit(source: Element, kind: str) -> Element:
     made = twin(source)
     for tag, default in LIMITS.items() if kind in LIMITED else ():
         made.append(element(tag, source, source.get(tag, default)))
-    made.extend([element(tag, source, source.get(tag)) for tag in ("effort", "velocity") if source.get(tag)])
+    made.extend([element(tag, source, text) for tag in ("effort", "velocity") if (text := source.get(tag))])
     return made
 
 
 def element(tag: str, source: Element, text: str = "", **attributes: str) -> Element:
-    """An SDF element with that text, which stands where `source` does and belongs to it."""
+    """An SDF element with `text`, at the position of `source` in the file and with it as parent."""
     made = Element(tag, attributes)
     made.text = text
     made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
@@ -222,14 +224,14 @@ def element(tag: str, source: Element, text: str = "", **attributes: str) -> Ele
 
 
 def twin(source: Element, **attributes: str) -> Element:
-    """The SDF element for one of URDF that has the same tag, without what is in it."""
+    """An empty SDF element with the tag, the position and the parent of `source`."""
     made = element(source.tag, source, **attributes)
     made.parent = source.parent
     return made
 
 
 def given(source: Element, attribute: str) -> str:
-    """An attribute that URDF asks for. Raises UserError where it is missing."""
+    """A required attribute. Raises UserError if it is missing."""
     value = source.get(attribute)
     if value is None or not value.strip():
         raise complain(source, f"has no attribute '{attribute}'")
@@ -252,7 +254,7 @@ def three(source: Element, attribute: str, default: str) -> str:
 
 
 def pose(source: Element, relative_to: str = "") -> Element:
-    """The `<pose>` that the `<origin>` in `source` stands for. Raises UserError."""
+    """The `<pose>` for the `<origin>` in `source`. Raises UserError."""
     origin = source.find("origin")
     holder = source if origin is None else origin
     words = "0 0 0 0 0 0" if origin is None else f"{three(origin, 'xyz', '0 0 0')} {three(origin, 'rpy', '0 0 0')}"

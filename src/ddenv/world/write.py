@@ -1,8 +1,8 @@
-"""Writes a world as clean SDF 1.9 that Drake's own parser loads: what was understood of a file, and nothing else.
+"""Writes worlds as SDF: the original text without some models (`without`), or clean SDF 1.9 for Drake's parser (`convert`).
 
-Poses are those after `<state>`, frames are resolved, included and nested models are written out, names are unique, meshes are
-convex hulls in files of their own, and an infinite plane is a large box: Drake crashes with half spaces on the welded bodies
-that its parser makes of static models (drake#19263).
+Clean SDF holds exactly what the reader understood: poses after `<state>`, resolved frames, included and nested models
+written out, unique names, convex hulls of meshes in files of their own, and a large box for an infinite plane, since Drake
+crashes with half spaces on the welded bodies that its parser makes of static models (drake#19263).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
 
 
 def without(world: World, removed: frozenset[str]) -> bytes:
-    """The text of `world` with the models named in `removed` cut out, each with the indentation and line it stood on."""
+    """The text of `world` with the models named in `removed` cut out, each with its indentation and line break; all other bytes stay. Raises ValueError."""
     unknown = removed - {model.name for model in world.models}
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")
@@ -64,7 +64,7 @@ def _ends_line(text: bytes, end: int) -> bool:
 
 @dataclass
 class Converted:
-    """`text` is the world's SDF; `meshes` are the OBJ files it names, by their place beside it."""
+    """`text` is the world's SDF; `meshes` are the OBJ files it refers to, by relative path."""
 
     text: bytes = b""
     meshes: dict[str, bytes] = field(default_factory=dict)
@@ -89,16 +89,16 @@ def convert(world: World, mesh_folder: str) -> Converted:
 
 
 def write_converted(world: World, path: Path) -> list[Path]:
-    """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns what was written. Raises UserError."""
+    """Writes `world` as clean SDF to `path`, its meshes to a folder beside it; returns the written files. Raises UserError."""
     if path.resolve() == world.path.resolve():
-        raise UserError(f"{path}: is the world itself; give another file to write")
+        raise UserError(f"{path}: is the world itself; choose another file")
     folder = path.with_name(f"{path.stem}_meshes")
     converted = convert(world, folder.name)
     if converted.meshes:
         try:
             folder.mkdir(exist_ok=True)
         except OSError as error:
-            raise UserError(f"{folder}: cannot be made: {error.strerror}") from None
+            raise UserError(f"{folder}: cannot be created: {error.strerror}") from None
     files = {path.parent / name: content for name, content in converted.meshes.items()} | {path: converted.text}
     for file, content in files.items():
         write_file(file, content)
@@ -129,10 +129,10 @@ def _link(parent: Element, name: str, link: Link, model: Model, files: dict[Mesh
     if link.inertia is not None:
         _inertia(element, link.inertia, link.pose)
     back = link.pose.inverse()
-    for one, own in zip(link.collisions, _unique(one.name for one in link.collisions), strict=True):
-        _collision(element, own, one, back, files, folder)
-    for one, own in zip(link.visuals, _unique(one.name for one in link.visuals), strict=True):
-        _visual(element, own, one, back, files, folder)
+    for collision, own in zip(link.collisions, _unique(one.name for one in link.collisions), strict=True):
+        _collision(element, own, collision, back, files, folder)
+    for visual, own in zip(link.visuals, _unique(one.name for one in link.visuals), strict=True):
+        _visual(element, own, visual, back, files, folder)
 
 
 def _collision(parent: Element, name: str, one: Collision, back: Pose, files: dict[Mesh, str], folder: str) -> None:
@@ -170,7 +170,7 @@ def _geometry(parent: Element, shape: Shape, files: dict[Mesh, str], folder: str
 
 
 def _primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
-    """The element of a shape that is no mesh, with the sizes in it."""
+    """The tag of a shape other than a mesh, with its sizes by tag."""
     match shape:
         case Box(size):
             return "box", {"size": size}
@@ -199,7 +199,7 @@ def _inertia(parent: Element, inertia: Inertia, link_pose: Pose) -> None:
 
 def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: Pose, names: dict[str, str]) -> None:
     element = SubElement(parent, "joint", name=name, type=joint.kind)
-    # Its axes lie along those of its frame: rounded, those of a universal joint would not be at right angles any more.
+    # Its axes are those of its frame: rounded axes of a universal joint would no longer be perpendicular.
     frame = Pose(joint.pose.position, _turned(joint.axis, joint.axis2 or _across(joint.axis)))
     _pose(element, child_pose.inverse() @ frame)
     SubElement(element, "parent").text = names.get(joint.parent, joint.parent)
@@ -213,7 +213,7 @@ def _joint(parent: Element, name: str, joint: Joint, model: Model, child_pose: P
 
 
 def _across(axis: Vector) -> Vector:
-    """A unit vector at right angles to the unit vector `axis`."""
+    """A unit vector perpendicular to the unit vector `axis`."""
     other = np.eye(3)[int(np.abs(axis).argmin())]
     across = np.cross(axis, other)
     x, y, z = (across / np.linalg.norm(across)).tolist()
@@ -223,7 +223,7 @@ def _across(axis: Vector) -> Vector:
 def _turned(x_axis: Vector, y_axis: Vector) -> tuple[float, float, float, float]:
     """The quaternion (w, x, y, z) of the frame whose x and y axes are these unit vectors."""
     matrix = np.column_stack([x_axis, y_axis, np.cross(x_axis, y_axis)])
-    # The quaternion is the eigenvector of this matrix to its greatest eigenvalue (Bar-Itzhack, 2000).
+    # The quaternion is the eigenvector of the largest eigenvalue (Bar-Itzhack, 2000).
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
     symmetric = np.array(
         [
@@ -249,7 +249,7 @@ def _limits(holder: Element, joint: Joint) -> None:
 
 
 def _pose(parent: Element, pose: Pose) -> None:
-    """Nothing for a pose that is none; yaw alone, as a person would write it; else a quaternion, which loses nothing."""
+    """Nothing for the identity; roll, pitch and yaw if only yaw turns, for readers; else a quaternion, which is exact."""
     w, x, y, z = pose.quaternion
     if x == 0.0 and y == 0.0:
         angles = (0.0, 0.0, pose.yaw())
@@ -260,19 +260,19 @@ def _pose(parent: Element, pose: Pose) -> None:
 
 
 def _numbers(values: Iterable[float]) -> str:
-    # Adding zero makes -0 a plain 0.
+    # Adding zero turns -0 into 0.
     return " ".join(f"{value + 0.0:.12g}" for value in values)
 
 
 def _clean(name: str) -> str:
-    """`name` without what SDF keeps for itself."""
+    """`name` without characters and words that SDF reserves."""
     name = "".join(char if char.isprintable() else "_" for char in name).replace("::", "_")
     reserved = name in RESERVED or (name.startswith("__") and name.endswith("__"))
     return f"{name.strip('_') or 'a'}_" if reserved else name
 
 
 def _unique(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
-    """Clean names, each once; a second one of the same name gets a number."""
+    """Clean, unique names; repeated ones get a number."""
     used, unique = set(taken), []
     for name in map(_clean, names):
         own, number = name, 1

@@ -121,12 +121,12 @@ def test_text_stl_in_another_encoding_and_of_several_solids(tmp_path):
         ("v 0 0 0\n", "no triangles"),
         ("v 0 0\nf 1 1 1", "fewer than three numbers"),
         ("v 0 0 0\nf 1 2 3", "out of bounds"),
-        ("v 0 0 0\nf 1 0 1", "names the vertex 0"),
+        ("v 0 0 0\nf 1 0 1", "refers to the vertex 0"),
         ("v 0 0 0\nf 1 -2 1", "vertex -2"),
         ("v 0 0 x\n", "no triangles|could not be read to its end"),
-        ("v 0 0 inf\nv 0 0 1\nv 1 0 0\nf 1 2 3", "no finite numbers"),
-        ("v 0 0 nan\nv 0 0 1\nv 1 0 0\nf 1 2 3", "no finite numbers"),
-        ("f\nf 1 2", "not there|no triangles|not a valid OBJ"),
+        ("v 0 0 inf\nv 0 0 1\nv 1 0 0\nf 1 2 3", "not finite"),
+        ("v 0 0 nan\nv 0 0 1\nv 1 0 0\nf 1 2 3", "not finite"),
+        ("f\nf 1 2", "does not exist|no triangles|not a valid OBJ"),
     ],
 )
 @pytest.mark.parametrize("convex", [False, True])
@@ -204,7 +204,7 @@ def test_large_visual_becomes_its_hull(tmp_path, monkeypatch):
 
 def test_large_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(meshes, "MESH_LIMIT", 100)
-    with pytest.raises(Unusable, match="the limit is"):
+    with pytest.raises(Unusable, match="the maximum is"):
         mesh_of(tmp_path / "a.stl", BOX.export(file_type="stl"))
 
 
@@ -240,7 +240,7 @@ import sys, numpy
 from ddenv.world.files.meshes import origin, pack
 from ddenv.world.files.resources import Stored, _key
 points, faces = numpy.eye(3), numpy.array([[0, 1, 2]])
-stored = Stored({_key(("mesh", "a.obj", "/", "", False, True)): pack(points, faces)})
+stored = Stored({_key("mesh", "a.obj", "/", "", False, True): pack(points, faces)})
 assert stored.mesh("a.obj", "/", convex=True).faces.tolist() == faces.tolist()
 print([name for name in ("scipy", "trimesh", "collada") if name in sys.modules])
 """

@@ -102,7 +102,7 @@ def test_refusals_are_kept_but_not_taken(world, monkeypatch):
 
 def test_limits(world, monkeypatch):
     monkeypatch.setattr(resources, "SDF_LIMIT", 3)
-    with pytest.raises(Unusable, match="the limit is"):
+    with pytest.raises(Unusable, match="the maximum is"):
         Disk(world).sdf("model://box", world)
 
 

@@ -84,17 +84,17 @@ def test_collisions_follow_frames_of_their_model(read):
 WRONG = {
     "circle": (
         "<model name='m'><link name='a'><pose relative_to='b'/></link><link name='b'><pose relative_to='a'/></link></model>",
-        r"/pose: frames are given relative to each other in a circle: b -> a -> b",
+        r"/pose: the frames form a cycle: b -> a -> b",
     ),
     "circle of attachments": (
         "<model name='m'><link name='l'/><link name='k'/><frame name='f' attached_to='g'/><frame name='g' attached_to='f'/>"
         "<joint name='j' type='fixed'><parent>f</parent><child>l</child></joint></model>",
-        "circle",
+        "attachments of frames form a cycle",
     ),
     "models on each other": (
         "<model name='m'><pose relative_to='n'/><link name='a'/></model>"
         "<model name='n'><pose relative_to='m'/><link name='a'/></model>",
-        "in a circle",
+        "form a cycle",
     ),
     "typing mistake": (
         "<model name='m'><link name='chassis'/><link name='b'><pose relative_to='chasis'/></link></model>",
@@ -103,7 +103,7 @@ WRONG = {
     "far away": ("<model name='m'><pose>1e300 0 0 0 0 0</pose><link name='a'/></model>", "farther than 1e"),
     "no turn": (
         "<model name='m'><pose rotation_format='quat_xyzw'>0 0 0 0 0 0 0</pose><link name='a'/></model>",
-        "quaternion needs a length",
+        "quaternion has no usable length",
     ),
 }
 
@@ -151,7 +151,7 @@ def test_the_old_frame_attribute_means_nothing_in_new_files(read):
     two = "<link name='a'><pose>3 0 0 0 0 0</pose></link><link name='b'><pose frame='a'>1 0 0 0 0 0</pose></link>"
     world = read(f"<model name='m'><static>1</static>{two}</model>", "1.8")
     assert world.models[0].links[1].pose.position == (1, 0, 0)
-    assert "means nothing since SDF 1.7" in world.notes[0].why
+    assert "has no effect since SDF 1.7" in world.notes[0].why
 
 
 def test_rows_of_frames_may_be_long(read):

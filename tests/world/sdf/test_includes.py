@@ -115,8 +115,8 @@ def test_what_is_wrong_in_an_included_file_is_told_of_that_file(read, table):
 
 WRONG = {
     "no uri": ("<include/>", "include: has no <uri>"),
-    "climbing out": (included(uri="model://../../secret"), "climbs out"),
-    "hidden climbing": (included(uri="model://%2e%2e/%2e%2e/secret"), "climbs out"),
+    "climbing out": (included(uri="model://../../secret"), "leaves its folder"),
+    "hidden climbing": (included(uri="model://%2e%2e/%2e%2e/secret"), "leaves its folder"),
     "merge": ("<include merge='true'><uri>model://table</uri></include>", "merge='true' is not supported"),
     "world in a world": (included(uri="models/world.sdf"), "holds no <model>"),
 }
@@ -141,7 +141,7 @@ def test_models_of_one_name_are_told_apart_by_their_place(read):
     one = "<model name='box'><link name='l'/></model>"
     world = read(one + "<model name='box #2'><link name='l'/></model>" + one + one)
     assert [model.name for model in world.models] == ["box", "box #2", "box #3", "box #4"]
-    assert all("stands 3 times" in note.why for note in world.notes if "name" in note.why)
+    assert all("used 3 times" in note.why for note in world.notes if "name" in note.why)
 
 
 def test_unique_names_are_made_quickly():
@@ -153,7 +153,7 @@ def test_words_that_are_not_known_are_noted(read):
     world = read("<model name='m'><link name='l'><colision name='c'/></link></model>")
     (note,) = (note for note in world.notes if note.kind == "ignored")
     assert note.what == "<colision>"
-    assert "no element of SDF" in note.why
+    assert "unknown element of SDF" in note.why
 
 
 def test_plugins_and_sensors_are_noted(read):

@@ -75,13 +75,13 @@ WRONG = {
         "'c' is the child of two",
     ),
     "itself": ((joint("fixed", child="a"),), "joins 'a' to itself"),
-    "no such link": ((joint("fixed", child="d"),), "<child> names no link of this model: 'd'"),
-    "child is the world": ((joint("fixed", child="world"),), "<child> names no link"),
+    "no such link": ((joint("fixed", child="d"),), "<child> is not a link of this model: 'd'"),
+    "child is the world": ((joint("fixed", child="world"),), "<child> is not a link"),
     "no axis": ((joint("revolute", ""),), "needs an <axis>"),
-    "no length": ((joint("revolute", "<axis><xyz>0 0 0</xyz></axis>"),), "length above zero"),
+    "no length": ((joint("revolute", "<axis><xyz>0 0 0</xyz></axis>"),), "no usable length"),
     "limits": (
         (joint("revolute", "<axis><limit><lower>1</lower><upper>0</upper></limit></axis>"),),
-        "lower limit 1 is above the upper one, 0",
+        "lower limit 1 is above the upper limit 0",
     ),
     "one axis": ((joint("universal"),), "needs an <axis2>"),
     "same axes": (
@@ -144,8 +144,8 @@ REPLACED = {
         3.0,
         "moments 1 1 9 kg m",
     ),
-    "no mass": ("<inertial><mass>0</mass></inertial>", 6000.0, "mass 0 kg cannot be: 6e"),
-    "negative mass": ("<inertial><mass>-1</mass></inertial>", 6000.0, "mass -1 kg cannot be"),
+    "no mass": ("<inertial><mass>0</mass></inertial>", 6000.0, "mass 0 kg is impossible: 6e"),
+    "negative mass": ("<inertial><mass>-1</mass></inertial>", 6000.0, "mass -1 kg is impossible"),
     "no inertia": ("<inertial><mass>5</mass></inertial>", 5.0, "no <inertia>"),
 }
 

@@ -58,7 +58,7 @@ def test_models_of_one_name_take_their_entries_in_order(read):
 
 def test_entries_without_a_model_are_noted(read):
     world = read(MODEL + state("<model name='ghost'/><light name='sun'><pose>0 0 0 0 0 0</pose></light>"), "1.6")
-    assert [note.why for note in world.notes] == ["the world has no model 'ghost' for it"]
+    assert [note.why for note in world.notes] == ["the world has no model 'ghost'"]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_what_cannot_be_is_refused_with_its_place(read, inside, words):
 
 def test_what_moved_when_it_was_saved_begins_at_rest(read):
     saved = "<model name='m'><link name='l'><pose>0 0 0 0 0 0</pose><velocity>1 0 0 0 0 0</velocity></link></model>"
-    assert "every run begins at rest" in [note.why for note in read(MODEL + state(saved), "1.6").notes]
+    assert "every run starts at rest" in [note.why for note in read(MODEL + state(saved), "1.6").notes]
 
 
 def test_a_model_that_was_only_turned_is_noted(read):
@@ -105,4 +105,4 @@ def test_a_model_that_was_only_turned_is_noted(read):
 def test_entries_for_links_that_are_not_there_are_noted(read):
     saved = "<model name='m'><link name='lnik'><pose>1 1 1 0 0 0</pose></link><model name='no'/></model>"
     told = [note.why for note in read(MODEL + state(saved), "1.6").notes]
-    assert told == ["the model has no 'lnik' for it", "the model has no 'no' for it"]
+    assert told == ["the model has no 'lnik'", "the model has no 'no'"]

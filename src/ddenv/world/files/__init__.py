@@ -1,1 +1,1 @@
-"""Files that an SDF file names: finding them by their URIs, reading meshes, and keeping both for a run."""
+"""The files that an SDF file refers to: finding them by URI, reading meshes, and keeping both for a run."""

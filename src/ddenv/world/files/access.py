@@ -1,4 +1,4 @@
-"""Reading the files that an SDF file names, with the two ways in which that fails."""
+"""Reads and writes single files, with errors in one line."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 
-MAX_BYTES = 100_000_000
+MAX_BYTES = 100_000_000  # of a file that the user names
 
 
 class Missing(Exception):
-    """No file for a URI anywhere; the text says where was looked."""
+    """No file was found for a URI; the text says where we looked."""
 
 
 class Unusable(Exception):
-    """A file, or a URI, that cannot be used; the text is the reason, in one line."""
+    """A file or URI cannot be used; the text is the reason, in one line."""
 
 
 def read(path: Path, limit: int) -> bytes:
-    """The bytes of the file `path`. Raises Unusable if it is no plain file, cannot be read, or has over `limit` bytes."""
+    """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or exceeds `limit` bytes."""
     size = size_of(path)
     if size > limit:
-        raise Unusable(f"has {size / 1e6:.0f} MB; the limit is {limit / 1e6:.0f} MB")
+        raise Unusable(f"has {size / 1e6:.0f} MB; the maximum is {limit / 1e6:.0f} MB")
     try:
         with path.open("rb") as file:
             return file.read(limit)
@@ -33,23 +33,23 @@ def read(path: Path, limit: int) -> bytes:
 
 
 def size_of(path: Path) -> int:
-    """Size of the file `path` in bytes. Raises Unusable if it is no plain file."""
+    """Size of the file `path` in bytes. Raises Unusable if it is not a regular file."""
     try:
         status = path.stat()
     except OSError as error:
         raise Unusable(reason(error)) from None
     except ValueError:
-        raise Unusable("cannot be the name of a file") from None
+        raise Unusable("is not a valid file name") from None
     if stat.S_ISDIR(status.st_mode):
         raise Unusable("is a folder, not a file")
-    # A pipe or a device could be waited on, or read, for ever.
+    # Reading a pipe or a device might never end.
     if not stat.S_ISREG(status.st_mode):
-        raise Unusable("is not a plain file")
+        raise Unusable("is not a regular file")
     return status.st_size
 
 
 def is_folder(path: Path) -> bool:
-    """Whether `path` is a folder that can be seen."""
+    """Whether `path` is an accessible folder."""
     try:
         return stat.S_ISDIR(path.stat().st_mode)
     except (OSError, ValueError):
@@ -57,7 +57,7 @@ def is_folder(path: Path) -> bool:
 
 
 def without_tilde(name: str) -> Path:
-    """`name` with a leading `~` made the home folder; as it is where nobody knows that folder."""
+    """`name` with a leading `~` expanded, if the home folder is known."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -69,26 +69,26 @@ def reason(error: OSError) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The whole file. Raises UserError for a file that is missing, unreadable or far too large."""
+    """The content of a file. Raises UserError if it is missing, unreadable or larger than `MAX_BYTES`."""
     try:
         if path.is_dir():
             raise UserError(f"{path}: is a folder; expected a file")
         if path.exists() and not path.is_file():
-            raise UserError(f"{path}: is no plain file")
+            raise UserError(f"{path}: is not a regular file")
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; at most {MAX_BYTES / 1e6:.0f} MB are read")
+            raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; the maximum is {MAX_BYTES / 1e6:.0f} MB")
         return path.read_bytes()
     except FileNotFoundError:
         raise UserError(f"{path}: no such file") from None
     except ValueError:
-        raise UserError(f"{path}: cannot be a file's name") from None
+        raise UserError(f"{path}: is not a valid file name") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Writes all of `content` or nothing: a temporary file beside `path`, then a rename. Raises UserError."""
+    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError."""
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     except OSError as error:

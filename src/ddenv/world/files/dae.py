@@ -1,8 +1,8 @@
-"""COLLADA (.dae) files through trimesh and pycollada, in the frame in which Gazebo shows them.
+"""Reads COLLADA (.dae) files with trimesh and pycollada, in the frame in which Gazebo shows them.
 
-As in Gazebo's own loader, `<unit>` scales the mesh and `<up_axis>` changes nothing: models are posed for how Gazebo shows
-them, and exporters wrote any up axis. trimesh applies neither, and forgets the names of nodes, so every instance is given a
-geometry of its own to be known by. Materials, lights, animations and skeletons are taken out: a mistake there spoils no shape.
+As in Gazebo's loader, `<unit>` scales the mesh and `<up_axis>` is ignored: worlds pose their models for Gazebo's view, and
+exporters wrote any up axis. trimesh applies neither and forgets the names of nodes, so each instance gets its own numbered
+geometry. Materials, lights, animations and skeletons are removed, so that errors in them do no harm.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from ddenv.world.files.triangles import Part, parts_of
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 TRANSFORMS = ("matrix", "translate", "scale")
 INSTANCES = ("instance_visual_scene", "instance_node", "instance_geometry", "instance_controller")
-# A few lines can place one geometry a million times.
+# Maximum size of the expanded scene, bytes: a few lines can place one geometry a million times.
 MOST_WEIGHT = 400_000_000
 
 
 def read_dae(data: bytes) -> list[Part]:
-    """Every instance of every geometry in the scene, in m, named by its node, its geometry, and their ids.
+    """Every instance of every geometry in the scene, in m, named by its node, its geometry and their ids.
 
-    A reference to what is not there is passed over, as Gazebo does. Raises what pycollada raises, and ValueError.
+    Dangling references are skipped, as in Gazebo. Raises what pycollada raises, and ValueError.
     """
     import trimesh
     from trimesh.exchange.dae import load_collada
 
     root = _parse(data)
-    known = {element.get("id"): element for element in root.iter() if element.get("id")}
+    known = {id: element for element in root.iter() if (id := element.get("id"))}
     instance = root.find("scene/instance_visual_scene")
     scene = None if instance is None else _target(instance, known)
     if scene is None:
@@ -40,13 +40,16 @@ def read_dae(data: bytes) -> list[Part]:
         _repair(geometry, known)
     places: list[tuple[tuple[str, ...], Element]] = []
     nodes = [_placed(node, "", known, places) for node in scene.iterfind("node")]
-    # With `ignore_broken`, geometry that is not understood is left out without a word.
-    loaded = load_collada(BytesIO(_document(nodes, [geometry for _, geometry in places])), ignore_broken=False)
+    # With `ignore_broken`, unsupported geometry would be dropped silently.
+    loaded = load_collada(  # type: ignore[no-untyped-call]  # trimesh
+        BytesIO(_document(nodes, [geometry for _, geometry in places])), ignore_broken=False
+    )
     metres, meshes = _metres(root), []
     for place in loaded["graph"]:
         shape = loaded["geometry"][place["geometry"]]
         mesh = trimesh.Trimesh(shape["vertices"], shape["faces"], process=False)
-        mesh.apply_transform(place["matrix"]).apply_scale(metres)
+        mesh.apply_transform(place["matrix"])
+        mesh.apply_scale(metres)  # type: ignore[no-untyped-call]  # trimesh
         meshes.append((places[int(place["geometry"].partition("_")[0])][0], mesh))
     return parts_of(meshes)
 
@@ -60,7 +63,7 @@ def _parse(data: bytes) -> Element:
     except ParseError as error:
         raise ValueError(f"line {error.position[0]}: not well-formed XML") from None
     except DefusedXmlException:
-        raise ValueError("a DOCTYPE is refused (its entities can fill the memory)") from None
+        raise ValueError("DOCTYPE is not allowed (its entities can exhaust memory)") from None
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2]
     if root.tag != "COLLADA":
@@ -69,7 +72,7 @@ def _parse(data: bytes) -> Element:
 
 
 def _metres(root: Element) -> float:
-    """How many m one unit of the file is; 1 where that is missing or no sensible number."""
+    """The length of one unit of the file, m; 1 if that is missing or nonsense."""
     unit = root.find("asset/unit")
     try:
         metres = float("1" if unit is None else unit.get("meter", "1"))
@@ -79,12 +82,12 @@ def _metres(root: Element) -> float:
 
 
 def _repair(geometry: Element, known: dict[str, Element]) -> None:
-    """Leaves only what has faces, and of that refuses or puts straight what pycollada reads wrongly."""
+    """Removes everything without faces; repairs what pycollada would misread. Raises ValueError for what it cannot repair."""
     for place in geometry.iterfind("mesh/vertices/input[@semantic='POSITION']"):
         source = known.get(place.get("source", "")[1:], Element("source"))
-        # pycollada makes a zero of what is no number, and knows no gaps.
+        # pycollada reads NaN as zero, and ignores gaps.
         if "nan" in source.findtext("float_array", "").lower():
-            raise ValueError("has vertices that are no finite numbers")
+            raise ValueError("has vertices that are not finite")
         if any((each.get("stride", "3"), each.get("offset", "0")) != ("3", "0") for each in source.iter("accessor")):
             raise ValueError("its positions are stored with gaps; save it without them")
     for mesh in geometry.iterfind("mesh"):
@@ -97,21 +100,22 @@ def _repair(geometry: Element, known: dict[str, Element]) -> None:
 
 
 def _repair_faces(element: Element) -> None:
-    """The same for one primitive; polygons lose their holes."""
+    """The same for one primitive; holes of polygons are dropped. Raises ValueError."""
     paths = [path for path in (*element.iterfind("p"), *element.iterfind("ph/p")) if (path.text or "").strip()]
-    if any("-" in path.text for path in paths):
-        raise ValueError("a face has a number below zero")
+    texts = [path.text or "" for path in paths]
+    if any("-" in text for text in texts):
+        raise ValueError("a face has a negative index")
     if element.tag == "triangles" and paths:
-        # pycollada reads the first alone.
-        paths[0].text = " ".join(path.text for path in paths)
+        # pycollada reads only the first.
+        paths[0].text = " ".join(texts)
         del paths[1:]
     counts = [int(word) for word in element.findtext("vcount", "").split()]
-    # pycollada makes arrays of any size that these say.
-    if counts and (min(counts) < 0 or sum(counts) > sum(len(path.text) for path in paths)):
+    # pycollada would allocate arrays of any size given here.
+    if counts and (min(counts) < 0 or sum(counts) > sum(map(len, texts))):
         raise ValueError("<vcount> does not match <p>")
     for each in element.findall("input"):
         if each.get("semantic") != "VERTEX":
-            # Normals, textures and colors keep their place among the numbers, as the one kind that nothing looks into.
+            # Normals, textures and colours keep their place in the index list, as the one kind that pycollada does not check.
             each.set("semantic", "TANGENT")
         if int(each.get("offset", 0)) < 0:
             raise ValueError(f"<{element.tag}> has no vertices")
@@ -121,9 +125,9 @@ def _repair_faces(element: Element) -> None:
 def _placed(
     node: Element, name: str, known: dict[str, Element], places: list[tuple[tuple[str, ...], Element]]
 ) -> Element:
-    """A copy of `node` with its place and all that it places; adds the names and geometries to `places`.
+    """A copy of `node` with its transforms and everything it places; appends names and geometries to `places`.
 
-    A node without a name goes by that of the node around it. Raises RecursionError if it is in itself.
+    A node without a name takes its parent's. Raises RecursionError if a node contains itself.
     """
     name = node.get("name") or name
     copy = Element("node")
@@ -142,7 +146,7 @@ def _placed(
 
 
 def _rotation(element: Element) -> Element:
-    """pycollada needs an axis of length one; around none, nothing turns."""
+    """A rotation about a unit axis, as pycollada needs it; an axis of length zero turns nothing."""
     *axis, angle = (float(word) for word in (element.text or "").split())
     length = math.hypot(*axis)
     values = [*(value / length for value in axis), angle % 360] if length else [0.0] * 4
@@ -152,7 +156,7 @@ def _rotation(element: Element) -> Element:
 
 
 def _target(instance: Element, known: dict[str, Element]) -> Element | None:
-    """What an instance places; other files are not opened. A shape with a skeleton stands as it was drawn."""
+    """The element that an instance places; other files are not opened. Skinned shapes keep their original pose."""
     target = known.get(instance.get("url", "")[1:]) if instance.tag in INSTANCES else None
     if target is not None and target.tag == "controller":
         return known.get("".join(skin.get("source", "")[1:] for skin in target.iterfind("skin")))
@@ -160,7 +164,7 @@ def _target(instance: Element, known: dict[str, Element]) -> Element | None:
 
 
 def _weight(element: Element, known: dict[str, Element], weights: dict[Element, int]) -> int:
-    """About how many bytes a copy of `element` takes, with all that it places. Raises RecursionError if it is in itself."""
+    """The approximate bytes of `element` with everything it places. Raises RecursionError if it contains itself."""
     if element not in weights:
         target = _target(element, known)
         parts = [*element, *([] if target is None else [target])]
@@ -169,7 +173,7 @@ def _weight(element: Element, known: dict[str, Element], weights: dict[Element, 
 
 
 def _document(nodes: list[Element], geometries: list[Element]) -> bytes:
-    """A file in which each geometry is placed once, and called by its number."""
+    """A file that places each geometry once; a geometry's id is its number."""
     root = Element("COLLADA", xmlns="http://www.collada.org/2005/11/COLLADASchema", version="1.4.1")
     library = SubElement(root, "library_geometries")
     for number, geometry in enumerate(geometries):

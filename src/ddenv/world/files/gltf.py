@@ -1,8 +1,8 @@
-"""glTF 2.0 files (.gltf, .glb) through trimesh, in the axes of the file.
+"""Reads glTF 2.0 files (.gltf, .glb) with trimesh, in the axes of the file.
 
-glTF is Y-up, but Gazebo takes its coordinates as they are, as it does for every format: the `<pose>` in the SDF turns the mesh
-up. So do we. trimesh is given a header with nothing but the shape: it would decode images, drop what stands below a camera,
-and read as zeros, or as something else, what it does not know.
+glTF is Y-up, but Gazebo uses the coordinates of every format as they are, and lets the `<pose>` in the SDF turn the mesh
+upright. So do we. trimesh gets a header that holds only the shape: otherwise it would decode images, drop nodes below a
+camera, and misread what it does not support.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from urllib.parse import unquote
 from ddenv.world.files.access import Unusable, read
 from ddenv.world.files.triangles import MOST_FACES, MOST_PARTS, Part, parts_of
 
-# How positions are stored (32-bit floats), and numbers of vertices (8, 16 and 32 bits).
+# Accepted accessors of positions (32-bit floats) and of vertex indices (8, 16 and 32 bits).
 _POSITIONS = ("VEC3", (5126,))
 _INDICES = ("SCALAR", (5121, 5123, 5125))
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _PLACE = ("children", "matrix", "translation", "rotation", "scale")
-# What takes the place of an accessor that is not read.
+# Replaces accessors that are not read.
 _NOTHING = {"componentType": 5126, "count": 0, "type": "SCALAR"}
 
 
 def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     """Every mesh of every node in the scene, named by its node and its mesh.
 
-    Buffers beside the file, in `folder`, are read too, of up to `limit` bytes. Raises ValueError or Unusable, and for files of
-    the wrong structure whatever trimesh trips over.
+    Also reads buffers in `folder`, of at most `limit` bytes each. Raises ValueError or Unusable, and any exception of
+    trimesh for malformed files.
     """
     import trimesh
 
     is_binary = data.startswith(b"glTF")
-    # A .glb has its header in a first chunk, after 12 bytes, the size of the chunk and its type.
+    # The header of a .glb is its first chunk, after 12 bytes, the chunk's size and its type.
     end = 20 + int.from_bytes(data[12:16], "little")
     header = json.loads(data[20:end] if is_binary else data)
     text = json.dumps(_shape(header, limit), allow_nan=False).encode()
@@ -45,7 +45,7 @@ def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
     uris = {each["uri"] for each in header["buffers"] if "base64," not in each.get("uri", "base64,")}
     buffers = {uri: _buffer(uri, folder, limit) for uri in uris}
     scene = trimesh.load_scene(BytesIO(text), "glb" if is_binary else "gltf", resolver=buffers, process=False)
-    # trimesh adds random letters to the numbers of nodes with several primitives.
+    # trimesh appends random letters to the names of nodes with several primitives.
     placed = [(int(mesh.metadata["node"].partition("_")[0]), mesh) for mesh in scene.dump()]
     nodes, meshes = header["nodes"], header["meshes"]
     return parts_of(
@@ -55,7 +55,7 @@ def read_gltf(data: bytes, folder: Path, limit: int) -> list[Part]:
 
 
 def _buffer(uri: str, folder: Path, limit: int) -> bytes:
-    """The bytes of a buffer in a file of the same folder."""
+    """The content of a buffer file in `folder`. Raises ValueError or Unusable."""
     name = os.path.normpath(unquote(uri, errors="surrogateescape"))
     if ":" in name or name.startswith(("/", "..")) or "\0" in name:
         raise ValueError(f"buffer '{uri[:60]}' is outside the file's folder")
@@ -66,19 +66,19 @@ def _buffer(uri: str, folder: Path, limit: int) -> bytes:
 
 
 def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
-    """The header of the triangles and their places alone; nodes are called by their numbers."""
+    """The header reduced to triangles and their transforms; a node's name is its number. Raises ValueError."""
     if compressed := [name for name in header.get("extensionsRequired", []) if "compress" in name]:
         raise ValueError(f"{compressed[0][:60]} is not supported; save it without compression")
     accessors, views, nodes = header["accessors"], header["bufferViews"], header["nodes"]
-    # numpy counts those below zero from the end, and trimesh leaves out such a mesh.
+    # numpy would count negative numbers from the end, and trimesh would drop such a mesh.
     counts = ("byteOffset", "byteLength", "count", "mesh")
     if any(each.get(key, 0) < 0 for each in (*accessors, *views, *nodes) for key in counts):
-        raise ValueError("has numbers below zero")
-    # Each view becomes a copy of its bytes.
+        raise ValueError("has negative numbers")
+    # Each view is copied.
     if sum(each["byteLength"] for each in views) > limit:
         raise ValueError("its buffer views are larger than its buffers")
     meshes = [list(_primitives(mesh, accessors)) for mesh in header["meshes"]]
-    # Primitives may share their numbers, so a small file can have any number of triangles.
+    # Primitives may share accessors, so a small file can have any number of triangles.
     placed = [primitive for node in nodes if "mesh" in node for primitive in meshes[node["mesh"]]]
     for primitives in (placed, [primitive for mesh in meshes for primitive in mesh]):
         if sum(_size(each, accessors) for each in primitives) > MOST_FACES or len(primitives) > MOST_PARTS:
@@ -97,8 +97,8 @@ def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
     }
 
 
-def _primitives(mesh: dict[str, Any], accessors: list[dict]) -> Iterator[dict[str, Any]]:
-    """The triangles of a mesh, without points and lines, normals, colors and materials."""
+def _primitives(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The triangle primitives of a mesh, without normals, colours and materials. Raises ValueError."""
     for primitive in mesh["primitives"]:
         mode, position = primitive.get("mode", _TRIANGLES), primitive["attributes"].get("POSITION")
         if mode == _FAN:
@@ -110,29 +110,30 @@ def _primitives(mesh: dict[str, Any], accessors: list[dict]) -> Iterator[dict[st
             accessor = accessors[number]
             plain = "bufferView" in accessor and "sparse" not in accessor
             if not plain or accessor["type"] != kind or accessor["componentType"] not in codes:
-                raise ValueError(f"accessor {number} is of a kind that is not supported")
+                raise ValueError(f"the type of accessor {number} is not supported")
         yield {"mode": mode, "attributes": {"POSITION": position}, **indices}
 
 
-def _size(primitive: dict[str, Any], accessors: list[dict]) -> int:
-    """The number of its vertices or of its triangles, at most, whichever is more."""
-    corners = accessors[primitive["indices"]]["count"] if "indices" in primitive else 0
+def _size(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
+    """The larger of its number of vertices and its maximum number of triangles."""
+    corners: int = accessors[primitive["indices"]]["count"] if "indices" in primitive else 0
     faces = corners // 3 if primitive["mode"] == _TRIANGLES else corners
-    return max(accessors[primitive["attributes"]["POSITION"]]["count"], faces)
+    vertices: int = accessors[primitive["attributes"]["POSITION"]]["count"]
+    return max(vertices, faces)
 
 
 def _roots(header: dict[str, Any]) -> list[int]:
-    """The topmost nodes of the scene. Raises ValueError where a node is met twice."""
+    """The root nodes of the scene. Raises ValueError unless the nodes form trees."""
     nodes = header["nodes"]
-    roots = header["scenes"][header.get("scene", 0)]["nodes"]
+    roots: list[int] = header["scenes"][header.get("scene", 0)]["nodes"]
     listed = [*roots, *(child for node in nodes for child in node.get("children", []))]
-    # glTF demands a tree; of a node with two parents, trimesh keeps one.
+    # glTF requires trees; trimesh would keep one parent of a node with two.
     if len(set(listed)) < len(listed) or not set(listed) <= {*range(len(nodes))} or len(nodes) > MOST_PARTS:
-        raise ValueError("its nodes are no tree")
+        raise ValueError("its nodes do not form a tree")
     return roots
 
 
-def _node(number: int, node: dict[str, Any], meshes: list[list[dict]]) -> dict[str, Any]:
-    """trimesh forgets the place of a node whose mesh has no triangles, and with it all below."""
+def _node(number: int, node: dict[str, Any], meshes: list[list[dict[str, Any]]]) -> dict[str, Any]:
+    """A node without the mesh if that has no triangles: trimesh would lose the transform for all nodes below."""
     mesh = {"mesh": node["mesh"]} if "mesh" in node and meshes[node["mesh"]] else {}
     return {"name": str(number), **{key: node[key] for key in _PLACE if key in node}, **mesh}

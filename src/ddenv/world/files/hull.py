@@ -1,4 +1,4 @@
-"""The convex hull of points, made fit for contact: never flat, and of few vertices."""
+"""Convex hulls suitable for contact: never flat, with few vertices."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 
-# Contact needs no more; a finer hull only costs time in every step of a run.
+# Maximum number of vertices: a finer hull only makes every time step slower.
 MOST_VERTICES = 256
-# What is thinner than this part of its own size is grown: to `THICKNESS` m, or for large ones to `THICKNESS_RATIO` of the size.
+# A hull thinner than `THIN_RATIO` of its size is thickened to `THICKNESS` m, or to `THICKNESS_RATIO` of a large size.
 THIN_RATIO = 1e-5
 THICKNESS = 1e-3
 THICKNESS_RATIO = 1e-4
 
 
 def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (at most `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3), in m.
+    """Vertices (maximum `MOST_VERTICES`) and outward faces of the convex hull of `points` (N, 3), m.
 
-    Points in a plane, on a line or in one place get a hull that is 1 mm thick. Raises ValueError if there is no hull.
+    Points in one plane, line or place get a hull that is 1 mm thick. Raises ValueError if there is no hull.
     """
     points = _thickened(np.unique(points, axis=0))
     chosen, faces = _qhull(points)
@@ -28,7 +28,7 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the points are vertices, and the faces as numbers of those."""
+    """The indices of the points that are vertices, and the faces as indices into these. Raises ValueError."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -44,19 +44,20 @@ def _qhull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unit(points: np.ndarray) -> np.ndarray:
-    """`points` stretched to the cube from -1 to 1: Qhull's tolerances suit that, and a hull stays a hull."""
+    """`points` stretched to the cube from -1 to 1, which suits Qhull's tolerances; a hull stays a hull."""
     low, high = points.min(axis=0), points.max(axis=0)
-    return (points - (low + high) / 2) / ((high - low) / 2)
+    stretched: np.ndarray = (points - (low + high) / 2) / ((high - low) / 2)
+    return stretched
 
 
 def _extremes(points: np.ndarray) -> np.ndarray:
-    """Numbers of at most `MOST_VERTICES` points: the farthest ones in directions spread evenly, the axes among them."""
+    """Indices of the extreme points in `MOST_VERTICES` evenly spread directions, including the axes."""
     points = _unit(points)
     return np.unique([int(_along(points, direction).argmax()) for direction in _directions(MOST_VERTICES)])
 
 
 def _directions(count: int) -> list[tuple[float, float, float]]:
-    """The six axis directions, which keep the bounding box, and points of a spiral on the sphere."""
+    """The six axis directions, which preserve the bounding box, and a spiral of points on the sphere."""
     axes = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     turn = math.pi * (3 - math.sqrt(5))
     rest = count - len(axes)
@@ -68,7 +69,7 @@ def _directions(count: int) -> list[tuple[float, float, float]]:
 
 
 def _thickened(points: np.ndarray) -> np.ndarray:
-    """`points`, and where they lie in a plane, on a line or in one place, copies on both sides of it."""
+    """`points`; if they lie in one plane, line or place, copies of them on both sides of it."""
     size = math.dist(points.min(axis=0), points.max(axis=0))
     thickness = max(THICKNESS, THICKNESS_RATIO * size)
     for axis in _thin_axes(points, THIN_RATIO * size):
@@ -77,9 +78,9 @@ def _thickened(points: np.ndarray) -> np.ndarray:
 
 
 def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
-    """Unit vectors at right angles to each other, along which `points` reach no farther than `limit`.
+    """Perpendicular unit vectors along which the extent of `points` is `limit` at most, m.
 
-    By the farthest points, one after the other, instead of a decomposition: sums over all points may differ between machines.
+    Found from successive farthest points, not by a decomposition: sums over all points may differ between machines.
     """
     start = points[_length(points - points[0]).argmax()]
     offsets = points - start
@@ -99,9 +100,12 @@ def _thin_axes(points: np.ndarray, limit: float) -> list[np.ndarray]:
     return [normal] if heights.max() - heights.min() <= limit else []
 
 
-def _along(points: np.ndarray, direction) -> np.ndarray:
-    return points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2]
+def _along(points: np.ndarray, direction: np.ndarray | tuple[float, float, float]) -> np.ndarray:
+    # Without BLAS, whose sums may differ between machines.
+    along: np.ndarray = points[:, 0] * direction[0] + points[:, 1] * direction[1] + points[:, 2] * direction[2]
+    return along
 
 
 def _length(offsets: np.ndarray) -> np.ndarray:
-    return np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2 + offsets[:, 2] ** 2)
+    lengths: np.ndarray = np.sqrt(offsets[:, 0] ** 2 + offsets[:, 1] ** 2 + offsets[:, 2] ** 2)
+    return lengths

@@ -1,11 +1,11 @@
-"""Mesh files (obj, stl, dae, gltf, glb) as `Mesh` of the world model, and a compact form of those to keep in a run file.
+"""Reads mesh files (obj, stl, dae, gltf, glb) as `Mesh`, and packs meshes into bytes for the run file.
 
-The coordinates are those that Gazebo gives a mesh: the axes of the file whatever it says of "up", `<unit>` of a .dae applied, all
-instances of a scene placed and joined. Nothing but the mesh file (and the buffers of a .gltf) is opened.
+Coordinates are as in Gazebo: the axes of the file whatever it says about "up", `<unit>` of a .dae applied, all instances of
+a scene placed and joined. Only the mesh file itself is opened, and the buffers of a .gltf.
 
-Limits, most of them trimesh's: a .dae is read with 32-bit numbers, and refused if it has no scene, if its positions are stored
-with gaps or without the names of their axes, or if a texture's or normal's numbers are missing. A .gltf is refused if it has no
-scene, triangle fans, or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
+Limitations, mostly of trimesh: a .dae is read in 32-bit precision, and refused if it has no scene, if its positions have gaps
+or unnamed axes, or if texture or normal indices are missing. A .gltf is refused if it has no scene, or if it has triangle
+fans or compressed, sparse or quantized meshes. A text .stl is read up to its last `endsolid`.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from ddenv.world.files.triangles import MOST_FACES, Part, chosen, joined, read_o
 from ddenv.world.model import Mesh
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
-MESH_LIMIT = 200_000_000
-# Above this a visual is drawn as its hull: a browser would stall on the triangles.
+MESH_LIMIT = 200_000_000  # bytes of a file
+# Maximum number of faces drawn; beyond it a visual becomes its hull, since a browser would stall.
 MOST_DRAWN = 50_000
-FARTHEST = 1e6
+FARTHEST = 1e6  # of a vertex from the origin, m
 _MAGIC = b"ddmesh1\0"
 _HEADER = struct.Struct("<8sIII")
 
@@ -49,20 +49,20 @@ def read_parts(path: Path) -> list[Part]:
     except Unusable:
         raise
     except MemoryError:
-        raise Unusable("needs more memory than there is") from None
+        raise Unusable("needs more memory than is available") from None
     except RecursionError:
         reason = "it is nested too deeply"
     except KeyError as error:
         reason = f"it has no {error}"
-    # Whatever a reader trips over, the file is to blame: it may hold anything.
+    # Readers may raise anything for a malformed file.
     except Exception as error:
-        reason = str(error) or "its numbers do not fit together"
+        reason = str(error) or "its numbers are inconsistent"
     raise Unusable(f"is not a valid {suffix[1:].upper()} file: {_line(reason)}") from None
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Nothing on the terminal from the libraries, and an error where an older numpy stops amid numbers with a warning only."""
+    """Silences the libraries, and turns the warning of older numpy versions about half-read numbers into an error."""
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -88,8 +88,8 @@ def _line(text: str) -> str:
 def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
     """The mesh of all `parts`, or of those called `submesh`.
 
-    `center` moves the middle of its bounding box to the origin. A `convex` mesh is the hull, of at most 256 vertices, and so is one
-    of more than 50,000 faces. `name` begins its `origin`. Raises Unusable.
+    `center` moves the middle of its bounding box to the origin. A `convex` mesh, and one of more than `MOST_DRAWN` faces, is
+    replaced by its hull. `name` begins its `origin`. Raises Unusable.
     """
     try:
         vertices, faces = _checked(*joined(chosen(parts, submesh)))
@@ -104,28 +104,28 @@ def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = Fal
 
 
 def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every place once."""
+    """The same without duplicate vertices."""
     unique, places = np.unique(vertices, axis=0, return_inverse=True)
     return unique, places.reshape(-1)[faces]
 
 
 def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same, with sound numbers. Raises ValueError."""
+    """The same arrays. Raises ValueError unless all numbers are valid."""
     if not len(faces):
         raise ValueError("has no triangles")
     if len(faces) > MOST_FACES:
         raise ValueError(f"has more than {MOST_FACES} triangles")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ValueError("has faces with vertices that are not there")
+        raise ValueError("has faces with vertices that do not exist")
     if not np.isfinite(vertices).all():
-        raise ValueError("has vertices that are no finite numbers")
+        raise ValueError("has vertices that are not finite")
     if np.abs(vertices).max() > FARTHEST:
         raise ValueError(f"has vertices farther than {FARTHEST:.0f} m from its origin")
     return vertices, faces
 
 
 def pack(vertices: np.ndarray, faces: np.ndarray) -> bytes:
-    """Header, vertices and faces, little-endian; vertices in 32 bits where that loses nothing, as for most files."""
+    """Header, vertices and faces as little-endian bytes; vertices in 32 bits if that loses no precision, as for most files."""
     short = vertices.astype("<f4")
     kept = short if np.array_equal(short.astype("<f8"), vertices) else vertices.astype("<f8")
     header = _HEADER.pack(_MAGIC, kept.itemsize, len(vertices), len(faces))
@@ -133,7 +133,7 @@ def pack(vertices: np.ndarray, faces: np.ndarray) -> bytes:
 
 
 def unpack(name: str, packed: bytes) -> Mesh:
-    """The mesh that was packed: equal to the one that `build` gave. Raises Unusable for anything else than a sound mesh."""
+    """The packed mesh, equal to the one from `build`. Raises Unusable for damaged bytes."""
     size, vertices, faces = (0, 0, 0)
     if len(packed) >= _HEADER.size and packed.startswith(_MAGIC):
         _, size, vertices, faces = _HEADER.unpack_from(packed)
@@ -154,7 +154,7 @@ def _arrays(packed: bytes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mesh(name: str, packed: bytes) -> Mesh:
-    """A mesh with arrays that cannot be written to; the digest of its content tells files of one name apart."""
+    """A mesh with read-only arrays; the digest of its content distinguishes files of one name."""
     vertices, faces = _arrays(packed)
     vertices.flags.writeable = False
     faces.flags.writeable = False
@@ -162,5 +162,5 @@ def _mesh(name: str, packed: bytes) -> Mesh:
 
 
 def origin(uri: str, submesh: str, center: bool, convex: bool) -> str:
-    """What a mesh is called, before its content is added."""
+    """The `origin` of a mesh without the digest of its content."""
     return json.dumps([uri, submesh, center, convex])

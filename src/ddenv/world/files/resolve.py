@@ -1,4 +1,4 @@
-"""Which file a URI of an SDF file means. Nothing is ever downloaded, and no URI climbs out of the folder it is relative to."""
+"""Finds the file that a URI in an SDF file refers to. Never downloads, and no URI leaves the folder it is relative to."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason,
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
 ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
-# The newest SDF that is understood: a model's folder may hold one file for each version.
+# The newest supported SDF version: a model's folder may hold one file per version.
 NEWEST_SDF = (1, 12)
-MODEL_CONFIG_LIMIT = 1_000_000
-CLIMBS = "climbs out of its folder through '..' (the folder it goes to may be named with --model-path)"
+MODEL_CONFIG_LIMIT = 1_000_000  # bytes
+CLIMBS = "leaves its folder with '..' (give the target folder with --model-path)"
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):(.*)", re.DOTALL)
-# What the file system says of a file that is simply not there.
+# Errors of the file system for files that do not exist.
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 
 def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path, ...]:
-    """Where models are looked for: `model_path`, then Gazebo's environment variables, then the world's own folder.
+    """The folders searched for models: `model_path`, then Gazebo's environment variables, then the world's own folder.
 
-    The folders are absolute; those that do not exist are left out, and each stands once.
+    They are absolute, exist, and are listed once.
     """
     named = [str(folder) for folder in model_path]
     for variable in ENVIRONMENT:
@@ -37,9 +37,9 @@ def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path
 
 
 def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
-    """The file or folder that `uri` means, named in a file of the folder `base`, with `folders` from `search_folders`.
+    """The file or folder that `uri`, in a file of the folder `base`, refers to; `folders` are from `search_folders`.
 
-    Raises Missing if there is none, and Unusable if the URI cannot be followed.
+    Raises Missing if there is none, and Unusable if the URI is invalid or not supported.
     """
     scheme, rest = _split(uri.strip())
     if scheme in ("model", "package"):
@@ -55,7 +55,7 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
 
 
 def _split(uri: str) -> tuple[str, str]:
-    """Scheme in small letters (empty for a plain path) and what follows it, percent-decoded."""
+    """The scheme in lower case (empty for a plain path) and the rest, percent-decoded. Raises Unusable."""
     match = _SCHEME.fullmatch(uri)
     scheme, rest = ("", uri) if match is None else (match[1].lower(), match[2].removeprefix("//"))
     rest = unquote(rest, errors="surrogateescape")
@@ -67,7 +67,7 @@ def _split(uri: str) -> tuple[str, str]:
 
 
 def _inside(rest: str) -> str:
-    """`rest`, normalised, as a path below some folder; "." is that folder. Raises Unusable if it would leave it."""
+    """`rest` as a normalised relative path. Raises Unusable if it would leave its folder."""
     path = os.path.normpath(rest.lstrip("/") or ".")
     if Path(path).parts[:1] == ("..",):
         raise Unusable(CLIMBS)
@@ -85,7 +85,7 @@ def _of_model(path: str, folders: Sequence[Path]) -> Iterator[Path]:
 
 
 def _beside(rest: str, base: Path, folders: Sequence[Path]) -> Iterator[Path]:
-    """`rest` below `base`, and below each search folder, as long as that stays in any of them."""
+    """`rest` below `base` and each search folder. Raises Unusable if it leaves all of them."""
     allowed = [_absolute(folder) for folder in (base, *folders)]
     candidates = [Path(os.path.normpath(folder / rest)) for folder in (base, *folders)]
     staying = [path for path in candidates if any(_absolute(path).is_relative_to(folder) for folder in allowed)]
@@ -110,9 +110,9 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
 
 
 def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
-    """Folders where the Fuel cache may have the model; of `version`, or the newest if that is empty or "tip".
+    """Folders where the Fuel cache may hold the model: `version`, or the newest if that is empty or "tip".
 
-    The cache is $GZ_FUEL_CACHE_PATH, or else `CACHES`; both hosts are looked at, since Fuel moved from one to the other.
+    The cache is $GZ_FUEL_CACHE_PATH, by default `CACHES`. Both hosts are tried, since Fuel moved from one to the other.
     """
     chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
     for cache in (chosen,) if chosen else CACHES:
@@ -125,7 +125,7 @@ def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
 
 
 def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
-    """Folders called `name` in any of `folders`; then those that differ by case only, or by `_` for a space."""
+    """Folders called `name` in any of `folders`; then those that differ only in case, or in `_` for a space."""
     for folder in folders:
         yield folder / name
     for folder in folders:
@@ -133,7 +133,7 @@ def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:
 
 
 def folders_of(folder: Path) -> list[str]:
-    """Names of the folders in `folder`, sorted; none if it cannot be looked at."""
+    """The sorted names of the folders in `folder`; none if it is not accessible."""
     try:
         with os.scandir(folder) as entries:
             return sorted(entry.name for entry in entries if entry.is_dir())
@@ -146,7 +146,7 @@ def _plain(name: str) -> str:
 
 
 def _first(candidates: Iterable[Path], where: str) -> Path:
-    """The first candidate that exists. One that cannot be looked at matters only if none of the others is there."""
+    """The first candidate that exists. Raises Missing, or Unusable if one that is not accessible may be it."""
     problem = ""
     for path in candidates:
         try:
@@ -154,7 +154,7 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
         except OSError as error:
             problem = problem or ("" if error.errno in _ABSENT else reason(error))
         except ValueError:
-            raise Unusable("cannot be the name of a file") from None
+            raise Unusable("is not a valid file name") from None
         else:
             return path
     if problem:
@@ -163,20 +163,20 @@ def _first(candidates: Iterable[Path], where: str) -> Path:
 
 
 def _absolute(path: Path) -> Path:
-    """`path` without `..`, as text: a link on the way is not looked at."""
+    """`path` made absolute and without `..`; symbolic links are not followed."""
     return Path(os.path.normpath(path.absolute()))
 
 
 def _listed(folders: Sequence[Path]) -> str:
-    """The first folders of the model path by name."""
+    """The first three folders by name."""
     names = ", ".join(str(folder)[:100] for folder in folders[:3])
     return names if len(folders) <= 3 else f"{names} and {len(folders) - 3} more"
 
 
 def model_file(folder: Path) -> Path:
-    """The SDF file of a model's folder: what its model.config names for the newest SDF we read, or else model.sdf.
+    """The SDF file of a model's folder: the newest supported one in its model.config, or else model.sdf.
 
-    Raises Unusable if model.config cannot be read or names no file of the folder, and Missing if there is no SDF file at all.
+    Raises Unusable for an invalid model.config, and Missing if there is no SDF file.
     """
     config = folder / "model.config"
     if not _is_there(config):
@@ -188,7 +188,7 @@ def model_file(folder: Path) -> Path:
         path = _inside(name)
     except Unusable as error:
         raise Unusable(f"model.config: <sdf> {error}") from None
-    return _first([folder / path], f"model.config names '{name[:60]}', which is not there")
+    return _first([folder / path], f"model.config names '{name[:60]}', which does not exist")
 
 
 def _is_there(path: Path) -> bool:
@@ -200,7 +200,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _configured(text: bytes) -> str:
-    """The file that a model.config names for the newest SDF version up to ours; empty if there is none."""
+    """The file that a model.config names for the newest supported SDF version; empty if there is none."""
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
@@ -209,17 +209,17 @@ def _configured(text: bytes) -> str:
     except ElementTree.ParseError as error:
         raise Unusable(f"model.config:{error.position[0]}: not well-formed XML") from None
     except DefusedXmlException:
-        raise Unusable("model.config: a DOCTYPE is refused (its entities can read other files)") from None
+        raise Unusable("model.config: DOCTYPE is not allowed (its entities can read other files)") from None
     except (LookupError, ValueError):
         raise Unusable("model.config: cannot be decoded; save it as UTF-8") from None
     entries = [(_version(element.get("version", "")), (element.text or "").strip()) for element in root.findall("sdf")]
-    # Of two entries for one version the first counts.
+    # `max` takes the first of two entries for one version.
     usable = [entry for entry in entries if entry[0] <= NEWEST_SDF and entry[1] and "\0" not in entry[1]]
     return max(usable, key=lambda entry: entry[0], default=((), ""))[1]
 
 
 def _version(text: str) -> tuple[int, ...]:
-    """1.12 is above 1.9. Whatever is no version counts as the oldest."""
+    """The version as numbers, since 1.12 is newer than 1.9; (0, 0) for anything else."""
     match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", text)
     return (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
 

@@ -1,11 +1,11 @@
-"""The files that an SDF file names, from disk or from what an earlier reading has kept."""
+"""The files that an SDF file refers to, from disk (`Disk`) or from what an earlier reading stored (`Stored`)."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from ddenv.world.files.access import Missing, Unusable, is_folder, read, size_of
 from ddenv.world.files.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
@@ -15,35 +15,35 @@ from ddenv.world.model import Mesh
 
 __all__ = ["Disk", "Missing", "Resources", "Stored", "Unusable"]
 
-SDF_LIMIT = 50_000_000
-# A mesh of more bytes takes long enough to be announced.
-SLOW_MESH = 3_000_000
+SDF_LIMIT = 50_000_000  # bytes of a file
+SLOW_MESH = 3_000_000  # bytes; reading a larger mesh is announced
 
 Answer = TypeVar("Answer")
 
 
 class Resources(Protocol):
-    """Answers for URIs in SDF files. `base` is the folder of the file that names the URI.
+    """Answers URIs in SDF files. `base` is the folder of the file that contains the URI.
 
-    Both raise Missing if there is no such file, and Unusable if it is there and cannot be used. Equal requests get the same object.
-    `taken` holds what was given so far, or more, by request.
+    Both methods raise Missing if there is no such file, and Unusable if it cannot be used. Equal requests return the same
+    object. `taken` holds at least everything returned so far, by request.
     """
 
-    taken: Mapping[str, bytes]
+    @property
+    def taken(self) -> Mapping[str, bytes]: ...
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        """Path and content of an SDF file, given by its own URI or by that of its model's folder."""
+        """Path and content of an SDF file, given by its own URI or by its model's folder."""
         ...
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        """A mesh file, or the part of it called `submesh`, in m; `center` puts the middle of its box at the origin."""
+        """A mesh file in m, or its part called `submesh`; `center` moves the middle of its bounding box to the origin."""
         ...
 
 
 class Disk:
-    """Reads from disk, and keeps in `taken` all that it gave, for `Stored` to give again.
+    """Reads from disk, and keeps everything it returned in `taken`, for a later `Stored`.
 
-    `tell` is called before something slow starts, with what that is.
+    `tell` is called with a line of text before slow steps.
     """
 
     def __init__(
@@ -52,31 +52,32 @@ class Disk:
         self.taken: dict[str, bytes] = {}
         self._folders = search_folders(model_path, world_folder)
         self._tell = tell or (lambda message: None)
-        self._answers: dict[tuple, object] = {}
-        # A collision and its visual mostly name the same file, one after the other.
+        self._sdfs = _Answers[tuple[Path, bytes]]()
+        self._meshes = _Answers[Mesh]()
+        # A collision and its visual mostly use the same file, one after the other.
         self._last: tuple[Path, list[Part]] | None = None
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        request = ("sdf", uri, str(base))
-        return _known(self._answers, request, lambda: self._read_sdf(request, base))
+        key = _key("sdf", uri, str(base))
+        return self._sdfs.get(key, lambda: self._read_sdf(key, uri, base))
 
-    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        request = ("mesh", uri, str(base), submesh, center, convex)
-        return _known(self._answers, request, lambda: self._read_mesh(request, base))
-
-    def _read_sdf(self, request: tuple, base: Path) -> tuple[Path, bytes]:
-        path = find(request[1], base, self._folders)
+    def _read_sdf(self, key: str, uri: str, base: Path) -> tuple[Path, bytes]:
+        path = find(uri, base, self._folders)
         path = model_file(path) if is_folder(path) else path
         text = read(path, SDF_LIMIT)
-        self.taken[_key(request)] = str(path).encode("utf-8", "surrogateescape") + b"\0" + text
+        self.taken[key] = str(path).encode("utf-8", "surrogateescape") + b"\0" + text
         return path, text
 
-    def _read_mesh(self, request: tuple, base: Path) -> Mesh:
-        _, uri, _, submesh, center, convex = request
-        parts = self._parts(find(uri, base, self._folders))
-        mesh = build(parts, origin(*_way(request)), submesh=submesh, center=center, convex=convex)
-        self.taken[_key(request)] = pack(mesh.vertices, mesh.faces)
-        return mesh
+    def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
+        def read_mesh() -> Mesh:
+            parts = self._parts(find(uri, base, self._folders))
+            name = origin(uri, submesh, center, convex)
+            mesh = build(parts, name, submesh=submesh, center=center, convex=convex)
+            self.taken[key] = pack(mesh.vertices, mesh.faces)
+            return mesh
+
+        key = _key("mesh", uri, str(base), submesh, center, convex)
+        return self._meshes.get(key, read_mesh)
 
     def _parts(self, path: Path) -> list[Part]:
         if self._last is None or self._last[0] != path:
@@ -89,49 +90,50 @@ class Disk:
 
 
 class Stored:
-    """Gives again what a `Disk` has taken, and looks at no disk. What it did not take is Missing; damaged bytes are Unusable."""
+    """Returns what a `Disk` has taken, without using the disk. Raises Missing for all else, Unusable for damaged bytes."""
 
     def __init__(self, taken: Mapping[str, bytes]) -> None:
         self.taken = taken
-        self._answers: dict[tuple, object] = {}
+        self._sdfs = _Answers[tuple[Path, bytes]]()
+        self._meshes = _Answers[Mesh]()
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
-        request = ("sdf", uri, str(base))
-        return _known(self._answers, request, lambda: _unpack_sdf(self._bytes(request)))
+        key = _key("sdf", uri, str(base))
+        return self._sdfs.get(key, lambda: _unpack_sdf(self._bytes(key)))
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
-        request = ("mesh", uri, str(base), submesh, center, convex)
-        return _known(self._answers, request, lambda: unpack(origin(*_way(request)), self._bytes(request)))
+        key = _key("mesh", uri, str(base), submesh, center, convex)
+        return self._meshes.get(key, lambda: unpack(origin(uri, submesh, center, convex), self._bytes(key)))
 
-    def _bytes(self, request: tuple) -> bytes:
+    def _bytes(self, key: str) -> bytes:
         try:
-            return self.taken[_key(request)]
+            return self.taken[key]
         except KeyError:
             raise Missing("was not found when the world was read") from None
 
 
-def _known(answers: dict[tuple, object], request: tuple, make: Callable[[], Answer]) -> Answer:
-    """The answer to `request`, made once. A refusal is kept too: a world may name one broken file a thousand times."""
-    answer = answers.get(request)
-    if answer is None:
-        try:
-            answer = make()
-        except (Missing, Unusable) as error:
-            answer = error
-        answers[request] = answer
-    if isinstance(answer, Missing | Unusable):
-        # A new exception each time: one that is raised again would collect a traceback of all its uses.
-        raise type(answer)(str(answer))
-    return answer
+class _Answers(Generic[Answer]):
+    """Answers by request, each made once. Failures are kept too: a world may name one broken file a thousand times."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, Answer | Missing | Unusable] = {}
+
+    def get(self, key: str, make: Callable[[], Answer]) -> Answer:
+        if key not in self._known:
+            try:
+                self._known[key] = make()
+            except (Missing, Unusable) as error:
+                self._known[key] = error
+        answer = self._known[key]
+        if isinstance(answer, Missing | Unusable):
+            # A new exception each time: an exception raised again would collect a traceback of all its uses.
+            raise type(answer)(str(answer))
+        return answer
 
 
-def _key(request: tuple) -> str:
+def _key(*request: str | bool) -> str:
+    """The name under which a run file stores the answer to a request."""
     return json.dumps(request)
-
-
-def _way(request: tuple) -> tuple[str, str, bool, bool]:
-    _, uri, _, submesh, center, convex = request
-    return uri, submesh, center, convex
 
 
 def _unpack_sdf(packed: bytes) -> tuple[Path, bytes]:

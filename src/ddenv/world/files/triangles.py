@@ -1,23 +1,24 @@
-"""Named pieces of a mesh file, as they come out of every format's reader."""
+"""Named parts of a mesh file, as every format's reader returns them; and the readers of the plain formats, OBJ and STL."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 
-# A few lines of a file can place one geometry a million times.
+# Maximum numbers in one file, whose few lines can place one geometry a million times.
 MOST_FACES = 20_000_000
 MOST_PARTS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Triangles of one place in a file: `vertices` (N, 3) in m, `faces` (M, 3) numbers of them, counterclockwise from outside.
+    """One part of a mesh file: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise from outside.
 
-    `names` are what a `<submesh>` may call it, the one that Gazebo goes by first.
+    `names` are what a `<submesh>` may call it; the first is the one that Gazebo uses.
     """
 
     names: tuple[str, ...]
@@ -26,24 +27,24 @@ class Part:
 
 
 def parts_of(meshes: Iterable[tuple[tuple[str, ...], object]]) -> list[Part]:
-    """Parts from names and what trimesh loaded, which may be points or empty too. Raises ValueError."""
+    """The parts among pairs of names and what trimesh loaded; point clouds and empty meshes are dropped. Raises ValueError."""
     return [_part(names, mesh) for names, mesh in meshes if len(getattr(mesh, "faces", ()))]
 
 
-def _part(names: tuple[str, ...], mesh) -> Part:
-    """Only the vertices that its faces use: many parts may share one long list."""
+def _part(names: tuple[str, ...], mesh: Any) -> Part:
+    """A part with only the vertices that its faces use, since many parts may share one long list. Raises ValueError."""
     vertices = mesh.vertices.view(np.ndarray)
     used, places = np.unique(mesh.faces, return_inverse=True)
-    # trimesh lets such faces pass, and numpy counts negative numbers from the end.
+    # trimesh does not check this, and numpy counts negative numbers from the end.
     if not 0 <= used[0] <= used[-1] < len(vertices):
-        raise ValueError("a face names a vertex that is not there")
+        raise ValueError("a face refers to a vertex that does not exist")
     if vertices.shape[1] != 3:
         raise ValueError("a vertex has fewer than three numbers")
     return Part(names, vertices[used], places.reshape(-1, 3))
 
 
 def chosen(parts: Sequence[Part], name: str) -> list[Part]:
-    """The parts called `name`, or all for an empty name. Raises ValueError with the names that exist."""
+    """The parts called `name`, or all if it is empty. Raises ValueError listing the existing names."""
     if not name:
         return list(parts)
     for rank in range(max((len(part.names) for part in parts), default=0)):
@@ -58,12 +59,13 @@ def chosen(parts: Sequence[Part], name: str) -> list[Part]:
 
 
 def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of all parts in one. Raises ValueError for none."""
+    """Vertices and faces of all parts together. Raises ValueError if there are none."""
     if not parts:
         raise ValueError("has no triangles")
     from trimesh.util import append_faces
 
-    return append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    vertices, faces = append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    return vertices, faces
 
 
 def read_obj(data: bytes) -> list[Part]:
@@ -78,10 +80,10 @@ def read_obj(data: bytes) -> list[Part]:
 
 
 def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
-    """The vertices and faces alone, in objects called 0, 1, ..., and the names of those.
+    """An OBJ file with only vertices and faces, in objects called 0, 1, ..., and the original names of these objects.
 
-    trimesh misreads without a word: numbers that count back, the number 0, lines that begin with or are parted by other than one
-    blank, and corners with and without `/` in one object; and it joins the names of object and group to one.
+    trimesh silently misreads negative indices, the index 0, white space other than single blanks, and corners with and
+    without `/` in one object; and it joins the names of object and group.
     """
     vertices: list[str] = []
     objects: dict[tuple[str, ...], list[str]] = {}
@@ -92,7 +94,7 @@ def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
             vertices.append("v " + " ".join(rest[:3]))
         elif word == "f" and len(rest) > 2:
             corners = " ".join(str(_counted(corner, len(vertices))) for corner in rest)
-            # A file without objects goes by its groups.
+            # Without objects, groups serve as objects.
             objects.setdefault((name, group) if name else (group,), []).append("f " + corners)
         elif word == "o":
             name, group = " ".join(rest), ""
@@ -103,24 +105,24 @@ def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
 
 
 def _counted(corner: str, vertices: int) -> int:
-    """The number of a corner's vertex, from 1; negative ones count back from the last of the `vertices` before the face."""
+    """The 1-based index of a corner's vertex; negative ones count back from the last of the `vertices` before the face."""
     number = int(corner.partition("/")[0])
     counted = number if number > 0 else vertices + 1 + number
     if number == 0 or counted < 1:
-        raise ValueError(f"a face names the vertex {number}, which is not there")
+        raise ValueError(f"a face refers to the vertex {number}, which does not exist")
     return counted
 
 
 def read_stl(data: bytes) -> list[Part]:
-    """The triangles of a binary or ASCII file; STL has no units, so its numbers are m. Raises ValueError."""
+    """The triangles of a binary or ASCII file; STL has no units, so metres are assumed. Raises ValueError."""
     import trimesh
 
     end = 84 + 50 * int.from_bytes(data[80:84], "little")
     if data.lstrip()[:5].lower() != b"solid":
-        # trimesh takes a binary file for text if anything follows its triangles.
+        # trimesh takes a binary file for text if it has trailing bytes.
         data = data[: max(end, 84)]
     elif len(data) != end:
-        # A name that is not UTF-8 would need a library that guesses encodings.
+        # For names in other encodings, trimesh would need a library that guesses them.
         data = data.decode("utf-8", errors="replace").encode()
     scene = trimesh.load_scene(BytesIO(data), "stl", process=False)
     return parts_of(((), mesh) for mesh in scene.geometry.values())

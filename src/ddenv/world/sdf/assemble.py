@@ -1,4 +1,4 @@
-"""Puts a model together: its links and joints and those of the models nested in it, as `<state>` has them."""
+"""Assembles a model from its links and joints and those of its nested models, at the poses that `<state>` gives."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from ddenv.world.model import Joint, Link, Model, is_ground
-from ddenv.world.pose import ONE, Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
 from ddenv.world.sdf.joints import Stand, check_tree, read_joints
@@ -14,19 +14,19 @@ from ddenv.world.sdf.links import Site, read_link
 from ddenv.world.sdf.parts import Part
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, text_of, truth
 
-# A model that moved faster than this when the world was saved did not stand still, m/s and rad/s.
+# Maximum speed of a link at rest in `<state>`, m/s and rad/s.
 STILL = 0.01
-# What `<state>` has less than this from its own pose has not been moved, m and as a part of half a turn.
+# Smallest difference between `<state>` and a model's own pose that counts as a move, m and sine of half the angle.
 MOVED = 0.001
-# A few files that include each other many times can ask for more models than any machine holds.
+# Maximum number of models: a few files that include each other could ask for more than any machine can hold.
 MOST_MODELS = 50_000
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a model, or one nested in it, is assembled: its frame in the world as its file has it, and as it is after `<state>`.
+    """The place of a model or nested model: its frame in the world, `nominal` as in its file and `actual` after `<state>`.
 
-    `prefix` begins the names of its links; `saved` is what `<state>` says of it; `scale` multiplies its sizes.
+    `prefix` begins the names of its links, `saved` is its entry in `<state>`, `scale` multiplies its sizes.
     """
 
     nominal: Pose
@@ -38,7 +38,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Saved:
-    """What `<state>` says of one model; poses are in the world frame, and of the links that it names."""
+    """The entry of one model in `<state>`; poses are in the world frame."""
 
     element: Element
     pose: Pose | None = None
@@ -48,7 +48,7 @@ class Saved:
 
 
 def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: Context) -> Model:
-    """The model of `part`, under the unique `name`. Raises UserError."""
+    """The model of `part`, called by the unique `name`. Raises UserError."""
     context.model = name
     nominal = outer.placed(part)
     actual = nominal if saved is None or saved.pose is None else saved.pose
@@ -79,9 +79,9 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
 
 
 class _Builder:
-    """Collects the links and joints of a model from its `<model>` and those inside it.
+    """Collects the links and joints of a model and of its nested models.
 
-    `elements` and `self_collide` are those of the links, in their order.
+    `elements` and `self_collide` have one entry per link, in the same order.
     """
 
     def __init__(self, static: bool, context: Context) -> None:
@@ -94,10 +94,10 @@ class _Builder:
         self.stands: dict[str, Stand] = {}
 
     def add(self, scope: Scope, spot: Spot) -> None:
-        """Adds what is in `scope`, whose frame is at `spot`. Raises UserError."""
+        """Adds everything in `scope`, whose frame is at `spot`. Raises UserError."""
         self.context.assembled += 1
         if self.context.assembled > MOST_MODELS:
-            why = f"there are more than {MOST_MODELS} models, with those that are nested or included"
+            why = f"there are more than {MOST_MODELS} models, including nested and included ones"
             raise complain(scope.element, why)
         note_unread(scope.element, self.context)
         if spot.saved is not None and spot.saved.scale != ONE:
@@ -117,9 +117,9 @@ class _Builder:
         own = name_of(element)
         name = spot.prefix + own
         if own == WORLD:
-            raise complain(element, "'world' is a name that SDF keeps for the world itself; give it another")
+            raise complain(element, "the name 'world' is reserved by SDF; choose another")
         if name in self.stands:
-            raise complain(element, "this name stands twice; every link of a model needs a name of its own")
+            raise complain(element, "this link name is used twice; give each link of the model its own name")
         local = scope.place(element)
         stand = Stand(spot.nominal @ local, spot.actual @ local)
         if spot.saved is not None and own in spot.saved.links:
@@ -140,7 +140,7 @@ class _Builder:
             self._hold(self.links[before:])
 
     def _hold(self, links: list[Link]) -> None:
-        """Welds the links of a static model, nested in one that moves, to the world."""
+        """Welds the links of a static model nested in a moving one to the world."""
         held = {link.name for link in links}
         self.joints = [joint for joint in self.joints if joint.child not in held]
         self.joints += [_weld(link) for link in links]
@@ -149,7 +149,7 @@ class _Builder:
         known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
         for name in (*saved.links, *saved.models):
             if name not in known:
-                self.context.note("ignored", saved.element, f"the model has no '{name[:80]}' for it")
+                self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")
 
 
 def _is_static(part: Part) -> bool:
@@ -157,7 +157,7 @@ def _is_static(part: Part) -> bool:
 
 
 def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Link:
-    """A static model may have no link, such as one that only holds a plugin."""
+    """The link of a model without links: only a static model may have none, for example if it only holds a plugin."""
     if not static:
         raise complain(element, "has no <link>")
     context.note("ignored", element, "it has no <link>: nothing can touch it")
@@ -181,45 +181,46 @@ def _weld(link: Link) -> Joint:
 
 
 def _held(model: Model, element: Element, context: Context) -> Model:
-    """A ground that the file lets move: simulators never do."""
+    """`model`, a ground that the file calls dynamic, made static, as simulators do."""
     context.note("replaced", element, "static, since an infinite plane does not move")
     links = tuple(replace(link, inertia=None) for link in model.links)
     return replace(model, static=True, links=links, joints=())
 
 
 def _note_move(stands: list[Stand], saved: Saved, context: Context) -> None:
-    ways = [math.dist(stand.nominal.position, stand.actual.position) for stand in stands]
+    distances = [math.dist(stand.nominal.position, stand.actual.position) for stand in stands]
     turns = [abs(_half_turn(stand.nominal.inverse() @ stand.actual)) for stand in stands]
-    farthest = max(ways, default=0.0)
+    farthest = max(distances, default=0.0)
     if farthest > MOVED:
         context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{farthest:.2f} m away")
     elif max(turns, default=0.0) > MOVED:
         context.note("replaced", saved.element, "its own <pose> by the one in <state>", "turned")
     if saved.scale != ONE:
         scale = " ".join(f"{part:g}" for part in saved.scale)
-        context.note("replaced", saved.element, f"its sizes by those that <scale> {scale} gives")
+        context.note("replaced", saved.element, f"its sizes by those with <scale> {scale}")
 
 
 def _half_turn(pose: Pose) -> float:
-    """How far a pose is turned: the sine of half its angle."""
+    """The sine of half the angle of rotation of a pose."""
     return math.hypot(*pose.quaternion[1:])
 
 
 def _note_differences(builder: _Builder, element: Element, context: Context) -> None:
-    """Of some things there is one for all links of a model."""
+    """Notes settings that differ between links, but are simulated for the model as a whole."""
     pulled = [truth(link, "gravity", True) for link in builder.elements]
     if any(pulled) and not all(pulled):
-        light = builder.elements[pulled.index(False)]
-        context.note("ignored", light.find("gravity"), "gravity acts on all links of a model, or on none")
+        light = builder.elements[pulled.index(False)].find("gravity")
+        assert light is not None
+        context.note("ignored", light, "gravity acts on all links of a model or on none")
     if any(builder.self_collide) and not all(builder.self_collide):
-        context.note("replaced", element, "the links that collide with others of the model by all of them")
+        context.note("replaced", element, "self-collision of some links by self-collision of all links")
 
 
 def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
-    """What the world's `<state>` says of its models, by name, in the file's order. Raises UserError."""
+    """The entries of models in the world's `<state>`, by name, in the file's order. Raises UserError."""
     states = world.findall("state")
     if len(states) > 1:
-        raise complain(states[1], "a second <state>; a world has one")
+        raise complain(states[1], "a second <state>; a world may have only one")
     saved: dict[str, list[Saved]] = {}
     if not states:
         return saved
@@ -246,7 +247,7 @@ def _saved(model: Element, context: Context) -> Saved:
 def _still(link: Element, context: Context) -> Pose | None:
     velocity = link.find("velocity")
     if velocity is not None and any(abs(part) > STILL for part in floats(velocity)):
-        context.note("ignored", velocity, "every run begins at rest")
+        context.note("ignored", velocity, "every run starts at rest")
     return _pose(link)
 
 
@@ -259,4 +260,4 @@ def _scale(element: Element) -> Vector:
     values = numbers(element, 3)
     if min(values) < 1e-6 or max(values) > 1e6:
         raise complain(element, f"a scale must be from 1e-06 to 1e+06, found '{text_of(element)[:60]}'")
-    return values  # type: ignore[return-value]
+    return vector(values)

@@ -1,4 +1,4 @@
-"""What the reading of one file carries along: where other files come from, what the user allows, and what was noted."""
+"""The context of reading one file: where other files come from, what the user allows, and the notes on unread elements."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ddenv.world.sdf.standin import StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
-# What is read, and what has no part in how a robot drives, by the element that it is in.
+# By parent: the children that need no note, since they are read or do not affect how a robot drives.
 QUIET: dict[str, frozenset[str]] = {
     tag: frozenset(children.split())
     for tag, children in {
@@ -56,7 +56,7 @@ REASONS = {
     "battery": "it never runs out",
     "mimic": "no joint follows another",
 }
-# What would change how things move if it were simulated, by its parent and itself, and how it is without.
+# By parent and child: physics that is not simulated, and what is simulated instead.
 WITHOUT = {
     ("dynamics", "friction"): "joints turn without dry friction",
     ("dynamics", "spring_stiffness"): "joints have no springs",
@@ -64,7 +64,7 @@ WITHOUT = {
     ("velocity_decay", "linear"): "nothing but contacts and joints slows a link down",
     ("velocity_decay", "angular"): "nothing but contacts and joints slows a link down",
 }
-# Those of them that are not read by a function of their own, which would note them again.
+# Substructures without a reader of their own; a reader notes its element itself.
 INSIDE = frozenset(
     ["inertial", "inertia", "surface", "friction", "bounce", "axis", "axis2", "limit", "dynamics", "velocity_decay"]
 )
@@ -72,7 +72,12 @@ INSIDE = frozenset(
 
 @dataclass
 class Context:
-    """`model` is the name of the world's model that is being read, for the notes."""
+    """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
+
+    `used` are the URIs of stand-ins that were asked for, `missing` the errors of missing files by URI, `files` the parsed
+    files. `scopes` and `canonical` are caches by the `id` of a `<model>`: its frames, and the link its own frame is
+    attached to.
+    """
 
     resources: Resources
     reading: Reading = PLAIN
@@ -90,15 +95,15 @@ class Context:
         self.stand_ins = parse_stand_ins(self.reading.stand_ins)
 
     def note(self, kind: Literal["replaced", "ignored"], element: Element, why: str, detail: str = "") -> None:
-        """Remembers that `element` was not taken as it is."""
+        """Notes that `element` was replaced or ignored."""
         self.notes.append(Note(kind, self.model, place(element), f"<{element.tag}>", why, detail))
 
     def miss(self, uri: str, error: UserError) -> None:
-        """Remembers a complaint about a file that is nowhere, so that all of them can be told at once."""
+        """Remembers the error of a missing file, so that one message can list all of them."""
         self.missing.setdefault(uri, error)
 
     def complain_of_missing(self) -> None:
-        """Raises the first complaint about a file that is nowhere, with the names of the others."""
+        """Raises the first error of a missing file, with the names of the other files."""
         if not self.missing:
             return
         (_, first), *others = self.missing.items()
@@ -110,7 +115,7 @@ class Context:
         return tag in self.reading.ignore
 
     def stand_in(self, uri: str) -> tuple[str, StandIn] | None:
-        """What the user gave in place of `uri`, with the text it was given as."""
+        """The stand-in for `uri`, with the text that the user gave for it; None if there is none."""
         key = matching(self.stand_ins, uri)
         if key is None:
             return None
@@ -118,7 +123,7 @@ class Context:
         return self.reading.stand_ins[key], self.stand_ins[key]
 
     def root(self, element: Element, uri: str) -> Element:
-        """The `<sdf>` of the file that `element` includes. Raises Missing, and UserError for a file that is no SDF."""
+        """The `<sdf>` of the file that `element` includes. Raises Missing, and UserError for a file that is not SDF."""
         try:
             path, text = self.resources.sdf(uri, element.source.parent)
         except Unusable as error:
@@ -129,14 +134,14 @@ class Context:
 
 
 def sdf_root(text: bytes, path: Path) -> Element:
-    """The `<sdf>` element of a file of a version that is known. Raises UserError."""
+    """The `<sdf>` element of a file of a supported version. Raises UserError."""
     root = parse(text, path)
     if root.tag != "sdf":
         raise complain(root, "expected <sdf> as the outermost element: is this an SDF file?")
     given = (root.get("version") or "").strip()
     if given not in VERSIONS:
-        said = f"version '{given[:20]}' is unknown" if given else "has no version attribute"
-        raise complain(root, f"{said}; SDF {VERSIONS[0]} to {VERSIONS[-1]} can be read")
+        said = f"version '{given[:20]}' is not supported" if given else "has no version attribute"
+        raise complain(root, f"{said}; use SDF {VERSIONS[0]} to {VERSIONS[-1]}")
     return root
 
 
@@ -150,12 +155,12 @@ def version(element: Element) -> tuple[int, int]:
 
 
 def refuse(element: Element, message: str) -> UserError:
-    """The complaint for what is not read, whose remedy is to leave it out by `--ignore`."""
+    """The error for an element that is not supported but can be left out with `--ignore`."""
     return complain(element, f"{message}; leave it out with --ignore {element.tag}")
 
 
 def note_unread(element: Element, context: Context) -> None:
-    """Notes what is in `element`, and in what belongs to it alone, that is neither read nor without meaning here."""
+    """Notes every child of `element`, and of its plain substructures, that matters but is not read."""
     quiet = QUIET[element.tag]
     once: set[str] = set()
     for child in element:
@@ -178,4 +183,4 @@ def _note_inside(child: Element, context: Context) -> None:
 
 
 def _unknown(extension: bool) -> str:
-    return "an extension of SDF that is not known here" if extension else "no element of SDF that is known here"
+    return "an unknown extension of SDF" if extension else "an unknown element of SDF"

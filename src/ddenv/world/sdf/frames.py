@@ -1,4 +1,4 @@
-"""Where the named things of a model or a world are (the pose frame semantics of SDF 1.7 and, as far as they go, of older files)."""
+"""Poses of the named things in a model or world: SDF's pose frame semantics, of version 1.7 and older."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ddenv.world.sdf.context import Context, version
 from ddenv.world.sdf.parts import Part, parts
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
-# Nothing stands farther from the origin of its frame: numbers beyond lose their millimetres, m.
+# Maximum distance from the origin of a frame, m: larger numbers lose their millimetres.
 FARTHEST = 1e6
 OWN = ("", "__model__")
 WORLD = "world"
 
 
 class Scope:
-    """The frames inside one `<model>` or `<world>`; all poses are in its own frame."""
+    """The frames inside one `<model>` or `<world>`; all poses are relative to its own frame."""
 
     def __init__(self, element: Element, files: tuple[Path, ...], context: Context) -> None:
         self.element = element
@@ -28,17 +28,18 @@ class Scope:
         self._poses: dict[str, Pose] = {}
 
     def inside(self, part: Part) -> Scope:
-        """The frames inside one of the `parts`; models included from one file share them."""
+        """The frames inside one of the `parts`, shared by all includes of one model."""
         scopes = self._context.scopes
         key = id(part.element)
         if key not in scopes:
             scopes[key] = Scope(part.element, part.files, self._context)
-        return scopes[key]
+        scope: Scope = scopes[key]
+        return scope
 
     @cached_property
     def named(self) -> dict[str, Element | Part]:
-        """Everything that has a name here."""
-        # Where names stand twice, the first of these kinds wins.
+        """Everything with a name here."""
+        # Of equal names the kind added last wins, and within it the first in the file.
         named: dict[str, Element | Part] = {}
         for tag in ("joint", "link", "frame"):
             named.update((name_of(child), child) for child in reversed(self.element.findall(tag)))
@@ -46,14 +47,14 @@ class Scope:
         return named
 
     def pose(self, name: str, asker: Element) -> Pose:
-        """The pose of the frame called `name`; complaints are about `asker`. Raises UserError."""
-        # Step by step instead of a call for each: rows of frames may be longer than Python's stack.
+        """The pose of the frame called `name`; errors point at `asker`. Raises UserError."""
+        # A loop, since chains of frames may be longer than Python's stack.
         way: dict[str, Element | Part] = {}
         at, asked_by = name, asker
         while not self._is_known(at):
             if at in way:
                 names = [*way, at][list(way).index(at) :]
-                raise complain(asker, f"frames are given relative to each other in a circle: {shown(names)}")
+                raise complain(asker, f"the frames form a cycle: {shown(names)}")
             way[at] = self._find(at, asked_by)
             at, asked_by = self._base(at, way[at])
         pose = self._poses.get(at, HERE)
@@ -70,34 +71,32 @@ class Scope:
     def placed(self, part: Part) -> Pose:
         """The pose of one of the `parts`."""
         element = part.pose
-        pose = self._at(_named_in(element), element, part.at)
-        frame = part.placement_frame
-        return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
+        return self._by_placement_frame(part, self._at(_named_in(element), element, part.at))
 
     def _at(self, base: str, element: Element | None, holder: Element) -> Pose:
         local = HERE if element is None else pose_of(element)
         if element is not None and element.get("frame") and version(element) >= (1, 7):
-            self._context.note("ignored", element, "the attribute 'frame' means nothing since SDF 1.7, use relative_to")
+            self._context.note("ignored", element, "the attribute 'frame' has no effect since SDF 1.7; use relative_to")
         return local if base in OWN else self.pose(base, holder if element is None else element) @ local
 
     def _is_known(self, name: str) -> bool:
         return name in OWN or name in self._poses or (name == WORLD and self.element.tag != "model")
 
     def _find(self, name: str, asker: Element) -> Element | Part:
-        """What is called `name`; of `a::b` the part `a`."""
+        """The thing called `name`; for `a::b` inside a part, the part `a`. Raises UserError."""
         thing = self.named.get(name)
         if thing is not None:
             return thing
         first = self.named.get(name.split("::", 1)[0]) if "::" in name else None
         if isinstance(first, Part):
             return first
-        # Looking for the nearest of thousands of names would take longer than reading them.
+        # A nearest match among thousands of names would take longer than reading the file.
         near = difflib.get_close_matches(name[:80], list(self.named)[:500], n=1)
         hint = f" (did you mean '{near[0][:80]}'?)" if near else ""
         raise complain(asker, f"there is no frame '{name[:80]}' here{hint}")
 
     def _base(self, name: str, thing: Element | Part) -> tuple[str, Element]:
-        """The frame that `thing` is placed relative to, and the element that says so; of `a::b` that is `a`."""
+        """The frame that `thing` is placed relative to, and the element that says so; for `a::b` this is `a`."""
         if isinstance(thing, Part):
             element, holder = thing.pose, thing.at
             base = _named_in(element) if name == thing.name else thing.name
@@ -108,16 +107,20 @@ class Scope:
         return base, holder if element is None else element
 
     def _local(self, name: str, thing: Element | Part, asker: Element) -> Pose:
-        """The pose of `thing` in the frame that it is placed relative to."""
+        """The pose of `thing` in its base frame."""
         if isinstance(thing, Part) and name != thing.name:
             return self.inside(thing).pose(name.split("::", 1)[1], asker)
         element = thing.pose if isinstance(thing, Part) else thing.find("pose")
         pose = HERE if element is None else pose_of(element)
-        frame = thing.placement_frame if isinstance(thing, Part) else ""
-        return pose @ self.inside(thing).pose(frame, thing.at).inverse() if frame else pose
+        return self._by_placement_frame(thing, pose) if isinstance(thing, Part) else pose
+
+    def _by_placement_frame(self, part: Part, pose: Pose) -> Pose:
+        """The pose of `part`, if `pose` is that of its placement frame."""
+        frame = part.placement_frame
+        return pose @ self.inside(part).pose(frame, part.at).inverse() if frame else pose
 
     def references(self) -> set[str]:
-        """The names of everything in this world that poses and frames directly inside it are given relative to."""
+        """The names that poses and frames directly inside this world refer to."""
         holders = [*self.element.findall("frame"), *(part.at for part in self.parts)]
         named = [holder.get("attached_to") or "" for holder in holders]
         for pose in (holder.find("pose") for holder in holders):
@@ -127,13 +130,13 @@ class Scope:
 
 
 def shown(names: list[str]) -> str:
-    """A row of names, short enough for one line."""
+    """A chain of names, cut to one line."""
     cut = [name[:40] for name in names]
     return " -> ".join(cut if len(cut) <= 6 else [*cut[:4], f"... ({len(cut) - 5} more)", cut[-1]])
 
 
 def pose_of(element: Element) -> Pose:
-    """The numbers of a `<pose>`: roll, pitch and yaw, or a quaternion, in rad or degrees. Raises UserError."""
+    """The pose in a `<pose>`: roll, pitch, yaw (rad or degrees) or a quaternion. Raises UserError."""
     if not text_of(element):
         return HERE
     form = (element.get("rotation_format") or "euler_rpy").strip()
@@ -154,13 +157,13 @@ def pose_of(element: Element) -> Pose:
 def _unit(element: Element, quaternion: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     length = math.hypot(*quaternion)
     if not 1e-9 < length < 1e9:
-        raise complain(element, "a quaternion needs a length above zero")
+        raise complain(element, "the quaternion has no usable length")
     w, x, y, z = (part / length for part in quaternion)
     return w, x, y, z
 
 
 def _named_in(pose: Element | None) -> str:
-    """The frame that a `<pose>` says it is relative to; empty where it names none."""
+    """The frame that a `<pose>` is relative to; empty if it names none."""
     if pose is None:
         return ""
     old = pose.get("frame") if pose.get("frame") and version(pose) < (1, 7) else ""

@@ -1,4 +1,4 @@
-"""The shape in a `<geometry>`."""
+"""Reads the shape in a `<geometry>`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from ddenv.world.extent import convex_hull, polygon_area
 from ddenv.world.files.resources import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import HERE, ONE, Pose, Vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
 from ddenv.world.sdf.standin import SIZES
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 
-SIDES = 32
+SIDES = 32  # of a cone
 SHAPES = ("box", "cylinder", "sphere", "plane", "capsule", "ellipsoid", "cone", "mesh", "polyline")
 SMALLEST, LARGEST = 1e-6, 1e6  # m
 
@@ -31,7 +31,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Lost:
-    """A mesh that cannot be had, and why; `sibling` names what the user lets stand in for it."""
+    """A mesh that is not available, and the reason; `sibling` is the kind of shapes that the user wants in its place."""
 
     element: Element
     uri: str
@@ -40,9 +40,9 @@ class Lost:
 
 
 def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
-    """The shape of a `<collision>` or `<visual>`; None where there is none to have. Raises UserError.
+    """The shape of a `<collision>` or `<visual>`; None if it is empty or left out. Raises UserError.
 
-    Sizes are multiplied by `scale`, along the shape's own axes.
+    `scale` multiplies its sizes, along the shape's own axes.
     """
     geometry = parent.find("geometry")
     if geometry is None or not len(geometry):
@@ -50,7 +50,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
     element = next((child for child in geometry if child.tag in SHAPES), geometry[0])
     for other in geometry:
         if other is not element and (other.tag, element.tag) != ("polyline", "polyline"):
-            context.note("ignored", other, f"a <geometry> has one shape: its <{element.tag}> counts")
+            context.note("ignored", other, f"a <geometry> has one shape; <{element.tag}> is used")
     match element.tag:
         case "mesh":
             return _mesh(element, parent, context, scale)
@@ -61,7 +61,8 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
         case "empty":
             return None
         case "heightmap" | "image":
-            return _left_out(element, parent, context)
+            _leave_out(element, parent, context)
+            return None
     if element.tag == "cone":
         (radius,), (length,) = _sizes(element, "radius", (max(scale[:2]),)), _sizes(element, "length", scale[2:])
         return Placed(cone(radius, length))
@@ -71,7 +72,7 @@ def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed
 def _primitive(element: Element, scale: Vector) -> Shape:
     match element.tag:
         case "box":
-            return Box(_sizes(element, "size", scale))
+            return Box(vector(_sizes(element, "size", scale)))
         case "cylinder":
             return Cylinder(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
         case "sphere":
@@ -79,24 +80,24 @@ def _primitive(element: Element, scale: Vector) -> Shape:
         case "capsule":
             return Capsule(*_sizes(element, "radius", (max(scale[:2]),)), *_sizes(element, "length", scale[2:]))
         case "ellipsoid":
-            return Ellipsoid(_sizes(element, "radii", scale))
-    raise complain(element, f"<{element.tag}> is no shape that is known; use one of {', '.join(SHAPES)}")
+            return Ellipsoid(vector(_sizes(element, "radii", scale)))
+    raise complain(element, f"<{element.tag}> is not a known shape; use one of {', '.join(SHAPES)}")
 
 
 def _plane(element: Element) -> Placed:
-    size = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
+    x, y = (100.0, 100.0) if element.find("size") is None else _sizes(element, "size", ONE[:2])
     normal = element.find("normal")
     if normal is None:
-        return Placed(Plane(size))
+        return Placed(Plane((x, y)))
     direction = np.array(numbers(normal, 3))
     length = float(np.linalg.norm(direction))
     if not 1e-9 < length < 1e9:
-        raise complain(normal, "a normal needs a length above zero")
-    return Placed(Plane(size), _turn_up_to(direction / length))
+        raise complain(normal, "the normal has no usable length")
+    return Placed(Plane((x, y)), _turn_up_to(direction / length))
 
 
 def _turn_up_to(direction: np.ndarray) -> Pose:
-    """The turn that takes the z axis to a unit vector the short way."""
+    """The shortest rotation from the z axis to a unit vector."""
     x, y, z = (float(part) for part in direction)
     if z < -1 + 1e-12:
         return Pose((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
@@ -104,11 +105,12 @@ def _turn_up_to(direction: np.ndarray) -> Pose:
     return Pose((0.0, 0.0, 0.0), (float(w), float(-y / (2 * w)), float(x / (2 * w)), 0.0))
 
 
-def _left_out(element: Element, parent: Element, context: Context) -> None:
+def _leave_out(element: Element, parent: Element, context: Context) -> None:
+    """Notes a shape that is not supported. Raises UserError if the robot could collide with it."""
     if parent.tag == "visual":
         context.note("ignored", element, f"a {element.tag} is not drawn")
     elif context.ignores(element.tag):
-        context.note("ignored", element, "left out as asked: nothing collides with it")
+        context.note("ignored", element, "left out by --ignore: nothing collides with it")
     else:
         raise refuse(element, f"a {element.tag} is not supported: nothing would collide with it")
 
@@ -118,14 +120,16 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     if not uri:
         raise complain(element, "has no <uri>")
     factor = element.find("scale")
-    own = ONE if factor is None else numbers(factor, 3)
-    if min(map(abs, own)) < 1e-9 or max(map(abs, own)) > LARGEST:
-        raise complain(factor, f"a scale must not be zero, found '{text_of(factor)}'")
+    own = ONE if factor is None else vector(numbers(factor, 3))
+    if factor is not None and (min(map(abs, own)) < 1e-9 or max(map(abs, own)) > LARGEST):
+        raise complain(
+            factor, f"the factors of a scale must be from 1e-09 to 1e+06 or negative, found '{text_of(factor)}'"
+        )
     given = context.stand_in(uri)
     if given is not None:
         text, stand_in = given
         if stand_in.shape is None:
-            return Lost(element, uri, f"the {stand_in.sibling} stands in for it", stand_in.sibling)
+            return Lost(element, uri, f"the {stand_in.sibling} shapes replace it", stand_in.sibling)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
         return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.center, scale)))
     submesh = element.find("submesh")
@@ -142,13 +146,13 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
-    """What can be done about a collision mesh that cannot be had; `siblings` are the kinds of other shapes in its link."""
-    # Of model://barrel/meshes/barrel.dae the model is named: what stands in for one of its meshes does for all.
+    """The error for a missing collision mesh, with all remedies; `siblings` are the kinds of other shapes in its link."""
+    # For model://barrel/meshes/barrel.dae name the model: one stand-in then covers all of its meshes.
     package = "/".join(lost.uri.split("/")[:3]) if lost.uri.startswith(("model://", "package://")) else lost.uri
     others = ", ".join(f"{kind}:{sizes}" for kind, sizes in SIZES.items() if kind != "cylinder")
     also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
     return (
-        f"mesh '{lost.uri[:200]}' cannot be had: {lost.reason}; name its folder with --model-path, or a shape in m with "
+        f"mesh '{lost.uri[:200]}' is not available: {lost.reason}; give its folder with --model-path, a shape in m with "
         f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, or leave it out with --ignore mesh"
     )
 
@@ -166,7 +170,7 @@ def _scaled(shape: Shape, scale: Vector) -> Shape:
         case Ellipsoid(radii):
             return Ellipsoid(_times(radii, scale))
         case Mesh(origin, vertices, faces):
-            # A mirrored surface is turned inside out unless its faces are turned over.
+            # Mirroring turns a surface inside out: reverse its faces.
             turned = faces[:, ::-1] if np.prod(scale) < 0 else faces
             return Mesh(f"{origin} * {scale}", vertices * np.array(scale), turned)
     return shape
@@ -179,7 +183,7 @@ def _times(vector: Vector, scale: Vector) -> Vector:
 
 
 def _sizes(parent: Element, tag: str, scale: tuple[float, ...]) -> tuple[float, ...]:
-    """The sizes in the child `tag`, one for each factor of `scale`, and multiplied by it. Raises UserError."""
+    """The numbers in the child `tag`, one for each factor of `scale` and multiplied by it. Raises UserError."""
     element = parent.find(tag)
     if element is None:
         raise complain(parent, f"has no <{tag}>")
@@ -200,7 +204,7 @@ def _by(scale: tuple[float, ...]) -> str:
 
 
 def _checked(shape: Shape, element: Element) -> Shape:
-    """A mesh of a size that can be. Raises UserError."""
+    """`shape`, a mesh. Raises UserError if it is too small or too large."""
     assert isinstance(shape, Mesh)
     size, reach = np.ptp(shape.vertices, axis=0).max(), np.abs(shape.vertices).max()
     if size < SMALLEST or reach > LARGEST:
@@ -211,13 +215,13 @@ def _checked(shape: Shape, element: Element) -> Shape:
 
 
 def read_polyline(geometry: Element, context: Context) -> Mesh:
-    """The hull of all `<polyline>`s of a `<geometry>`, standing on its frame's origin. Raises UserError."""
+    """The convex hull of all `<polyline>`s of a `<geometry>`, extruded upwards from z = 0. Raises UserError."""
     elements = geometry.findall("polyline")
     height = _height(elements[0])
     outlines = [np.array([numbers(point, 2) for point in element.findall("point")]) for element in elements]
     corners = convex_hull(np.vstack([outline.reshape(-1, 2) for outline in outlines]))
     if len(corners) < 3:
-        raise complain(elements[0], "needs three <point>s that are not in one line")
+        raise complain(elements[0], "needs at least three <point>s that are not on one line")
     if np.abs(corners).max() > 1e6:
         raise complain(elements[0], "is larger than 1e+06 m")
     filled = abs(polygon_area(outlines[0]))
@@ -244,13 +248,13 @@ def prism(corners: np.ndarray, height: float) -> Mesh:
     walls = [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
     fan = np.column_stack([np.zeros(count - 2, dtype=int), np.arange(1, count - 1), np.arange(2, count)])
     faces = np.vstack([*walls, fan[:, ::-1], fan + count])
-    # Equal outlines make equal meshes, wherever they stand.
+    # Meshes of equal outlines compare equal.
     origin = f"polyline {hashlib.blake2b(corners.tobytes(), digest_size=8).hexdigest()} {height!r}"
     return Mesh(origin, np.vstack([low, low + np.array([0, 0, height])]), faces.astype(np.uint32))
 
 
 def cone(radius: float, length: float) -> Mesh:
-    """A cone about its frame's origin, its tip up, m; with 32 sides."""
+    """A cone centred on its frame's origin, its tip up, m."""
     angles = np.arange(SIDES) * 2 * math.pi / SIDES
     rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(SIDES, -length / 2)])
     here, after = np.arange(SIDES), np.roll(np.arange(SIDES), -1)

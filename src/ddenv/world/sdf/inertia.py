@@ -1,4 +1,4 @@
-"""Mass and inertia of the links that move: as the file says, or worked out from their shapes where that cannot be."""
+"""Mass and inertia of moving links: from the file, or computed from their shapes where the file has none or impossible ones."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Inertia, Mesh, Plane, Shape, Sphere
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, Vector, vector
 from ddenv.world.sdf.context import Context
 from ddenv.world.sdf.frames import pose_of
-from ddenv.world.sdf.xml import Element, complain, floats, number, text_of
+from ddenv.world.sdf.xml import Element, complain, floats, numbers, text_of
 
-WATER = 1000.0  # kg/m^3, SDF's default for a link whose mass is to be computed
+WATER = 1000.0  # kg/m^3, SDF's default density
 DEFAULT_MASS = 1.0  # kg, SDF's default for a link without an <inertial>
-# A link without shapes is taken as a ball of this radius, m.
+# Radius of the ball that a link without shapes is taken for, m.
 BARE = 0.05
-LIGHTEST, HEAVIEST = 1e-9, 1e9  # kg
-THINNEST, DENSEST = 1e-3, 1e6  # kg/m^3
-LEAST_MOMENT = 1e-15  # kg m^2
+LIGHTEST, HEAVIEST = 1e-9, 1e9  # accepted masses, kg
+THINNEST, DENSEST = 1e-3, 1e6  # accepted densities, kg/m^3
+LEAST_MOMENT = 1e-15  # minimum principal moment of inertia, kg m^2
 
 
 def read_inertia(
     link: Element, link_pose: Pose, collisions: Sequence[Collision], density: Sequence[float], context: Context
 ) -> Inertia:
-    """The inertia of a moving link at `link_pose`; `density` (kg/m^3) is of each of its `collisions`, in the world frame."""
+    """The inertia of a moving link at `link_pose`, in the world frame; `density` (kg/m^3) has one entry per collision."""
     element = link.find("inertial")
     if element is None:
         context.note("replaced", link, f"no <inertial>: {DEFAULT_MASS:g} kg, spread evenly over its shapes")
@@ -36,32 +36,35 @@ def read_inertia(
         return spread(collisions, density, link_pose, mass if given else None)
     if not LIGHTEST <= mass <= HEAVIEST:
         computed = spread(collisions, density, link_pose, None)
-        why = f"mass {mass:g} kg cannot be: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
+        why = (
+            f"mass {mass:g} kg is impossible: {computed.mass:.3g} kg, from its shapes and a density of {WATER:g} kg/m^3"
+        )
         context.note("replaced", element, why)
         return computed
     tensor = element.find("inertia")
     place = element.find("pose")
     pose = Pose() if place is None else pose_of(place)
     if place is not None and (place.get("relative_to") or place.get("frame")):
-        context.note("ignored", place, "a centre of mass is given in the frame of its link")
+        context.note("ignored", place, "the centre of mass is read in the frame of its link")
     if tensor is not None:
-        moments = tuple(_number(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
-        products = tuple(_number(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
+        moments = vector(_number(tensor, tag, 1.0) for tag in ("ixx", "iyy", "izz"))
+        products = vector(_number(tensor, tag, 0.0) for tag in ("ixy", "ixz", "iyz"))
         rounded = _rounded_up(moments, products)
         if is_possible(rounded, products):
-            return Inertia(mass, link_pose @ pose, rounded, products)  # type: ignore[arg-type]
-    said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 cannot be"
-    context.note("replaced", element, f"{said}: worked out from its shapes and its mass of {mass:g} kg")
+            return Inertia(mass, link_pose @ pose, rounded, products)
+    said = "no <inertia>" if tensor is None else f"moments {_shown(tensor)} kg m^2 are impossible"
+    context.note("replaced", element, f"{said}: computed from its shapes and its mass of {mass:g} kg")
     return spread(collisions, density, link_pose, mass)
 
 
 def read_density(parent: Element, default: float) -> float:
     """The `<density>` in `parent`, kg/m^3. Raises UserError."""
-    density = number(parent, "density", default)
+    element = parent.find("density")
+    if element is None:
+        return default
+    density = numbers(element, 1)[0]
     if not THINNEST <= density <= DENSEST:
-        raise complain(
-            parent.find("density"), f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}"
-        )
+        raise complain(element, f"a density must be from {THINNEST:g} to {DENSEST:g} kg/m^3, found {density:g}")
     return density
 
 
@@ -75,17 +78,17 @@ def _shown(tensor: Element) -> str:
     return " ".join(text_of(tensor.find(tag))[:12] or "1" for tag in ("ixx", "iyy", "izz"))
 
 
-def _rounded_up(moments: Sequence[float], products: Sequence[float]) -> tuple[float, ...]:
-    """`moments`, a little larger where only the rounding of a thin plate's figures makes them impossible."""
+def _rounded_up(moments: Vector, products: Vector) -> Vector:
+    """`moments`, slightly enlarged if only rounding makes them impossible, as for thin plates."""
     low, middle, high = _principal(moments, products)
     excess = high - low - middle
     if not -1e-9 * high < excess < 1e-5 * high:
-        return tuple(moments)
-    return tuple(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
+        return moments
+    return vector(moment + max(excess, 0.0) + 1e-9 * high for moment in moments)
 
 
-def _principal(moments: Sequence[float], products: Sequence[float]) -> tuple[float, float, float]:
-    """The principal moments, the least first; NaN where there are none."""
+def _principal(moments: Vector, products: Vector) -> tuple[float, float, float]:
+    """The principal moments in ascending order; NaN for unusable numbers."""
     xx, yy, zz = moments
     xy, xz, yz = products
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -95,8 +98,8 @@ def _principal(moments: Sequence[float], products: Sequence[float]) -> tuple[flo
     return low, middle, high
 
 
-def is_possible(moments: Sequence[float], products: Sequence[float]) -> bool:
-    """Whether a body can have these: its principal moments are above zero, and none exceeds the sum of the others."""
+def is_possible(moments: Vector, products: Vector) -> bool:
+    """Whether a body can have this inertia: principal moments are positive, and none exceeds the sum of the others."""
     low, middle, high = _principal(moments, products)
     return bool(low > LEAST_MOMENT and high <= low + middle)
 
@@ -117,13 +120,12 @@ def spread(collisions: Sequence[Collision], density: Sequence[float], link_pose:
         tensor += each * (rotation @ unit @ rotation.T + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
     factor = 1.0 if mass is None else mass / total
     tensor *= factor
-    moments = tuple(float(tensor[axis, axis]) for axis in range(3))
+    moments = vector(tensor[axis, axis] for axis in range(3))
     products = (float(tensor[0, 1]), float(tensor[0, 2]), float(tensor[1, 2]))
     moments = _rounded_up(moments, products)
     if not is_possible(moments, products):
         return _ball(link_pose, total * factor)
-    place = Pose(tuple(float(part) for part in middle))  # type: ignore[arg-type]
-    return Inertia(total * factor, place, moments, products)  # type: ignore[arg-type]
+    return Inertia(total * factor, Pose(vector(middle)), moments, products)
 
 
 def _ball(link_pose: Pose, mass: float) -> Inertia:
@@ -167,7 +169,7 @@ def _capsule(radius: float, length: float) -> tuple[float, np.ndarray, np.ndarra
 
 
 def _polyhedron(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """By signed tetrahedra between a point inside and each of the triangles (N, 3, 3)."""
+    """Sums signed tetrahedra between an inner point and each of the triangles (N, 3, 3)."""
     inside = triangles.reshape(-1, 3).mean(axis=0)
     a, b, c = np.moveaxis(triangles - inside, 1, 0)
     volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6

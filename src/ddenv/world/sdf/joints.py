@@ -1,4 +1,4 @@
-"""Reads the `<joint>`s between the links of one model, in the world frame."""
+"""Reads the `<joint>`s between the links of one model, in the world frame, and finds the links that they name."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numb
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
 WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
 LIMITED = ("revolute", "prismatic")
-# An unlimited value is written by simulators as a huge number or as -1; SDF's own default for both limits is infinite.
+# Simulators write "unlimited" as a number at least this large, or as -1; SDF's own default is infinite.
 UNLIMITED = 1e15
 
 
 @dataclass(frozen=True)
 class Stand:
-    """A link's pose in the world: as its model has it, and as it is once `<state>` moved it."""
+    """A link's pose in the world: `nominal` as in its model, `actual` after `<state>`."""
 
     nominal: Pose
     actual: Pose
 
 
 def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand], context: Context) -> list[Joint]:
-    """The joints directly inside a model at the nominal `pose`; `stands` are its links by full name. Raises UserError."""
+    """The joints directly inside the model at nominal `pose`; `stands` are its links by full name. Raises UserError."""
     joints, names = [], set()
     for element in scope.element.findall("joint"):
         note_unread(element, context)
         if name_of(element) in names:
-            raise complain(element, "this name stands twice; every joint of a model needs a name of its own")
+            raise complain(element, "this joint name is used twice; give each joint of the model its own name")
         names.add(name_of(element))
         kind = element.get("type", "")
         if kind in KINDS:
             joints.append(_joint(element, kind, scope, pose, prefix, stands, context))
         elif context.ignores("joint"):
-            context.note("ignored", element, f"a '{kind}' joint is left out as asked: its links move freely")
+            context.note("ignored", element, f"a '{kind}' joint is left out by --ignore: its links move freely")
         else:
             raise refuse(element, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
     return joints
@@ -57,7 +57,7 @@ def _joint(
     parent, child = (_end(element, tag, scope, prefix, stands, context) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
-    # By its own element: something else in the model may have the same name.
+    # By element, not by name: something else in the model may have the same name.
     nominal = model_pose @ scope.place(element, text_of(element.find("child")))
     moved = stands[child].actual @ stands[child].nominal.inverse()
     axis = element.find("axis")
@@ -82,9 +82,9 @@ def _joint(
         damping=0.0 if dynamics is None else _damping(dynamics),
         axis2=None if second is None else moved.rotate(second),
     )
-    if joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf:
-        raise complain(limit, f"the lower limit {joint.lower:g} is above the upper one, {joint.upper:g}")
-    return _counted_from_here(joint, first, stands)
+    if limit is not None and (joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf):
+        raise complain(limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}")
+    return _relative_to_start(joint, first, stands)
 
 
 def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand], context: Context) -> str:
@@ -95,25 +95,28 @@ def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str
         return WORLD
     link = link_of(scope, name, element, context) if name else None
     if link is None or prefix + link not in stands:
-        raise complain(element if child is None else child, f"<{tag}> names no link of this model: '{name[:80]}'")
+        raise complain(element if child is None else child, f"<{tag}> is not a link of this model: '{name[:80]}'")
     return prefix + link
 
 
 def _axis(axis: Element | None, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
-    """The unit vector of an `<axis>` in the world frame, as the links nominally are."""
+    """The unit vector of an `<axis>` in the world frame, at the nominal poses."""
     element = None if axis is None else axis.find("xyz")
-    x, y, z = (0.0, 0.0, 1.0) if element is None else numbers(element, 3)
-    length = math.sqrt(x * x + y * y + z * z)
-    if not 1e-9 < length < 1e9:
-        raise complain(axis if element is None else element, "a joint's axis needs a length above zero")
-    unit = (x / length, y / length, z / length)
-    frame = "" if element is None else element.get("expressed_in") or ""
-    if frame:
-        return (model_pose @ scope.pose(frame, element)).rotate(unit)
+    unit = (0.0, 0.0, 1.0) if element is None else _unit(element)
+    if element is not None and element.get("expressed_in"):
+        return (model_pose @ scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
     in_model = (
         axis is not None and version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5))
     )
     return (model_pose if in_model else joint_pose).rotate(unit)
+
+
+def _unit(element: Element) -> Vector:
+    x, y, z = numbers(element, 3)
+    length = math.sqrt(x * x + y * y + z * z)
+    if not 1e-9 < length < 1e9:
+        raise complain(element, "the axis has no usable length")
+    return x / length, y / length, z / length
 
 
 def _second_axis(element: Element, first: Vector, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
@@ -129,16 +132,16 @@ def _second_axis(element: Element, first: Vector, scope: Scope, model_pose: Pose
     return x / length, y / length, z / length
 
 
-def _counted_from_here(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> Joint:
-    """`joint` with its limits counted from where `<state>` has the links; `axis` is as they nominally are."""
+def _relative_to_start(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> Joint:
+    """`joint` with limits relative to the actual poses of its links; `axis` is at the nominal ones."""
     if math.isinf(joint.lower) and math.isinf(joint.upper):
         return joint
     parent = stands.get(joint.parent, Stand(Pose(), Pose()))
     child = stands[joint.child]
     seen = parent.nominal @ parent.actual.inverse() @ child.actual
     if joint.kind == "prismatic":
-        way = zip(seen.position, child.nominal.position, strict=True)
-        here = sum((a - b) * c for (a, b), c in zip(way, axis, strict=True))
+        moved = [a - b for a, b in zip(seen.position, child.nominal.position, strict=True)]
+        here = sum(a * b for a, b in zip(moved, axis, strict=True))
     else:
         w, *turn = (seen @ child.nominal.inverse()).quaternion
         here = 2 * math.atan2(sum(a * b for a, b in zip(turn, axis, strict=True)), w)
@@ -147,7 +150,7 @@ def _counted_from_here(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> 
 
 
 def _nearest_turn(angle: float, lower: float, upper: float) -> float:
-    """`angle` or the same a whole number of turns on, whichever is nearest to being within the limits, rad."""
+    """`angle` plus the whole number of turns that brings it nearest to the limits, rad."""
     turns = (angle + 2 * math.pi * number for number in (0, 1, -1, 2, -2))
     return min(turns, key=lambda turn: max(lower - turn, turn - upper, 0.0))
 
@@ -156,10 +159,12 @@ def _note_unlimited(element: Element, kind: str, context: Context) -> None:
     for axis in (element.find("axis"), element.find("axis2")):
         limit = None if axis is None else axis.find("limit")
         bounds = [] if limit is None else [limit.find("lower"), limit.find("upper")]
-        if kind not in LIMITED and any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds):
+        given = any(one is not None and abs(sum(floats(one))) < UNLIMITED for one in bounds)
+        if limit is not None and given and kind not in LIMITED:
             context.note("ignored", limit, f"the limits of a {kind} joint")
-        if axis is not None and axis.find("use_parent_model_frame") is not None and version(axis) >= (1, 7):
-            context.note("ignored", axis.find("use_parent_model_frame"), "it means nothing since SDF 1.7")
+        old = None if axis is None else axis.find("use_parent_model_frame")
+        if old is not None and version(old) >= (1, 7):
+            context.note("ignored", old, "it has no effect since SDF 1.7")
 
 
 def _bound(value: float) -> float:
@@ -167,7 +172,7 @@ def _bound(value: float) -> float:
 
 
 def _limit_of(limit: Element | None, tag: str, default: float) -> float:
-    """A number that may also be infinite. Raises UserError."""
+    """The number in child `tag` of `limit`, which may be infinite, or `default`. Raises UserError."""
     child = None if limit is None else limit.find(tag)
     if child is None:
         return default
@@ -189,7 +194,7 @@ def _damping(dynamics: Element) -> float:
 
 
 def check_tree(joints: list[Joint], element: Element) -> None:
-    """Raises UserError where joints close a loop, or hold one link from two sides."""
+    """Raises UserError if joints close a loop, or if a link is the child of two joints."""
     parents: dict[str, str] = {}
     for joint in joints:
         if joint.child in parents:
@@ -197,7 +202,7 @@ def check_tree(joints: list[Joint], element: Element) -> None:
                 element, f"link '{joint.child}' is the child of two joints; only trees of links are supported"
             )
         parents[joint.child] = joint.parent
-    # Every link has one parent, so that each way upwards ends in a link that was seen before: in a safe one, or in a loop.
+    # Every link has at most one parent: each path upwards ends at the root, at a link known to be safe, or in a loop.
     safe: set[str] = set()
     for start in parents:
         way: dict[str, None] = {}
@@ -211,14 +216,14 @@ def check_tree(joints: list[Joint], element: Element) -> None:
 
 
 def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
-    """The link that the frame `name` of a model is attached to, such as `link` or `inner::link`; None where there is none.
+    """The link that the frame `name` of a model is attached to, such as `link` or `inner::link`; None if there is none.
 
-    Complaints are about `asker`. Raises UserError.
+    Errors point at `asker`. Raises UserError.
     """
     seen: dict[str, None] = {}
     while name not in OWN:
         if name in seen:
-            raise complain(asker, f"frames are attached to each other in a circle: {shown([*seen, name])}")
+            raise complain(asker, f"the attachments of frames form a cycle: {shown([*seen, name])}")
         seen[name] = None
         thing = scope.named.get(name)
         if thing is None:
@@ -244,7 +249,7 @@ def _joined(model: str, link: str | None) -> str | None:
 
 
 def _canonical(scope: Scope, asker: Element, context: Context) -> str | None:
-    """The link that a model's own frame is attached to: the one it names, else its first."""
+    """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
     key = id(scope.element)
     if key not in context.canonical:
         context.canonical[key] = _find_canonical(scope, asker, context)

@@ -1,4 +1,4 @@
-"""Reads a `<link>`: its collisions, visuals and inertia, in the world frame."""
+"""Reads a `<link>`: its collisions with their friction, its visuals with their colours, and its inertia, in the world frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
-from ddenv.world.pose import ONE, Pose, Vector
+from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies
@@ -17,11 +17,11 @@ from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
-# SDF's default for <mu>, and what simulators use where a surface names none.
+# SDF's default for <mu>, also used by simulators.
 DEFAULT_MU = 1.0
-# A collide_bitmask with which a collision touches all others.
+# The collide_bitmask of a collision that touches all others.
 EVERYTHING = 0xFFFF
-# The colours of Gazebo's own materials that worlds name most often.
+# Colours of the Gazebo materials that worlds use most.
 GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
     "Black": (0.05, 0.05, 0.05),
     "Blue": (0.1, 0.2, 0.8),
@@ -53,7 +53,7 @@ GAZEBO_COLORS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True)
 class Site:
-    """Where a link is read to: its `pose` in the world, `local` in its model, and what `<state>` multiplies its sizes by."""
+    """The place of a link: its full `name`, its `pose` in the world, `local` in its model, and the `scale` from `<state>`."""
 
     name: str
     pose: Pose
@@ -76,14 +76,15 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
                 collisions.append(Collision(name_of(item.element), placed.shape, pose, mu))
                 density.append(read_density(item.element, _density(element)))
     inertia = read_inertia(element, site.pose, collisions, density, context) if site.moving else None
-    if site.moving and truth(element, "kinematic", False):
-        context.note("ignored", element.find("kinematic"), "it moves by itself, as any other link")
+    kinematic = element.find("kinematic")
+    if kinematic is not None and site.moving and truth(element, "kinematic", False):
+        context.note("ignored", kinematic, "forces move it like any other link")
     return Link(site.name, site.pose, inertia, tuple(collisions), tuple(_visuals(items, site, context)))
 
 
 @dataclass(frozen=True)
 class _Item:
-    """A `<collision>` or `<visual>` and its pose in the link."""
+    """A `<collision>` or `<visual>`, its pose in the link, and its shape."""
 
     element: Element
     pose: Pose
@@ -107,18 +108,20 @@ def _density(link: Element) -> float:
 
 
 def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None:
-    """The shape of a collision, with something in place of a mesh that cannot be had. Raises UserError."""
+    """The shape of a collision, with a replacement for a missing mesh; None if nothing collides. Raises UserError."""
     if not isinstance(item.shape, Lost):
         return item.shape
     lost = item.shape
     if lost.sibling:
         box = _box_around([other for other in items if other.element.tag == lost.sibling])
         if box is None:
-            raise complain(lost.element, f"no {lost.sibling} shape of its link can stand in for '{lost.uri[:200]}'")
+            raise complain(lost.element, f"its link has no {lost.sibling} shape that could replace '{lost.uri[:200]}'")
         context.note("replaced", lost.element, f"'{lost.uri}' by the box around its link's {lost.sibling} shapes")
         return Placed(box.shape, item.pose.inverse() @ box.offset)
     if context.ignores("mesh"):
-        context.note("ignored", lost.element, f"'{lost.uri}' cannot be had ({lost.reason}): nothing collides with it")
+        context.note(
+            "ignored", lost.element, f"'{lost.uri}' is not available ({lost.reason}): nothing collides with it"
+        )
         return None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
     context.miss(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
@@ -126,14 +129,13 @@ def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None
 
 
 def _box_around(items: list[_Item]) -> Placed | None:
-    """The box around shapes, in the frame of their link; None where none can be had."""
+    """The box around the shapes of `items`, in the frame of their link; None if there are no shapes."""
     placed = [(item.shape, item.pose) for item in items if isinstance(item.shape, Placed)]
     if not placed:
         return None
     lows, highs = zip(*(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed), strict=True)
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-    size = tuple(float(part) for part in np.maximum(high - low, 1e-3))
-    return Placed(Box(size), Pose(tuple(float(part) for part in (low + high) / 2)))  # type: ignore[arg-type]
+    return Placed(Box(vector(np.maximum(high - low, 1e-3))), Pose(vector((low + high) / 2)))
 
 
 def _visuals(items: list[_Item], site: Site, context: Context) -> Iterator[Visual]:
@@ -149,24 +151,26 @@ def _visuals(items: list[_Item], site: Site, context: Context) -> Iterator[Visua
 
 
 def can_be_touched(collision: Element, context: Context) -> bool:
-    """Whether contacts with this collision push anything: those of sensors do not."""
+    """Whether contacts with this collision exert forces; those of sensors do not."""
     contact = collision.find("surface/contact")
     if contact is None:
         return True
-    mask = text_of(contact.find("collide_bitmask"))
-    bits = _integer(contact.find("collide_bitmask"), mask) & EVERYTHING if mask else EVERYTHING
-    if bits == 0:
-        context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
-        return False
-    if bits != EVERYTHING:
-        context.note("ignored", contact.find("collide_bitmask"), "it touches everything")
+    mask = contact.find("collide_bitmask")
+    if mask is not None and text_of(mask):
+        bits = _integer(mask) & EVERYTHING
+        if bits == 0:
+            context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
+            return False
+        if bits != EVERYTHING:
+            context.note("ignored", mask, "everything touches it")
     if truth(contact, "collide_without_contact", False):
         context.note("ignored", collision, "it collides without contact")
         return False
     return True
 
 
-def _integer(element: Element, text: str) -> int:
+def _integer(element: Element) -> int:
+    text = text_of(element)
     try:
         return int(text, 0)
     except ValueError:
@@ -174,7 +178,7 @@ def _integer(element: Element, text: str) -> int:
 
 
 def read_friction(collision: Element, context: Context) -> float:
-    """The Coulomb coefficient: the smaller of the two that SDF gives, for two directions. Raises UserError."""
+    """The Coulomb friction coefficient: the smaller of SDF's two, which are for two directions. Raises UserError."""
     engine, names = collision.find("surface/friction/ode"), ("mu", "mu2")
     if engine is None:
         engine, names = collision.find("surface/friction/bullet"), ("friction", "friction2")
@@ -182,9 +186,10 @@ def read_friction(collision: Element, context: Context) -> float:
         return DEFAULT_MU
     both = []
     for name in names:
-        mu = number(engine, name, DEFAULT_MU)
-        if mu < 0:
-            raise complain(engine.find(name), f"friction must not be negative, found {mu:g}")
+        element = engine.find(name)
+        mu = DEFAULT_MU if element is None else numbers(element, 1)[0]
+        if element is not None and mu < 0:
+            raise complain(element, f"friction must not be negative, found {mu:g}")
         both.append(mu)
     if both[0] != both[1]:
         why = f"friction of {both[0]:g} and {both[1]:g} in two directions by {min(both):g} in all"
@@ -193,12 +198,12 @@ def read_friction(collision: Element, context: Context) -> float:
 
 
 def read_color(visual: Element) -> Color | None:
-    """The diffuse colour, else the ambient one, else that of a material of Gazebo's own; None where there is none."""
+    """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there is none."""
     opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
     color = _written(visual) or _named(text_of(visual.find("material/script/name")))
     if color is None:
         return None
-    # Files are full of colours with an alpha of zero, which the simulators that wrote them never looked at.
+    # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
     red, green, blue, alpha = color
     return red, green, blue, (alpha or 1.0) * opacity
 
@@ -208,8 +213,8 @@ def _written(visual: Element) -> Color | None:
         element = visual.find(tag)
         if element is not None and text_of(element):
             count = 4 if len((element.text or "").split()) == 4 else 3
-            values = tuple(min(max(value, 0.0), 1.0) for value in numbers(element, count))
-            return (*values, 1.0)[:4]
+            red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
+            return red, green, blue, alpha[0] if alpha else 1.0
     return None
 
 

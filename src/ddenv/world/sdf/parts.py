@@ -12,17 +12,17 @@ from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import SIZES, StandIn
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
-# What an included file may hold in place of a model, which nothing can touch.
+# Intangible things that an included file may hold in place of a model.
 UNTOUCHABLE = ("actor", "light")
-# How the names of files begin that stand in for others.
+# Prefix of the made-up file names of stand-ins.
 STAND_IN = "stand-in "
 
 
 @dataclass(frozen=True)
 class Part:
-    """A `<model>` (`element`) and where it stands in the file that holds it: there, or as an `<include>` (`at`).
+    """A model inside another model or a world: its `<model>` (`element`), and the `<include>` that names it or itself (`at`).
 
-    `static` is what the include says of that. `files` are the files that are being included, the outermost first.
+    `static` is the include's own setting, None without one. `files` are the chain of including files, outermost first.
     """
 
     element: Element
@@ -33,13 +33,13 @@ class Part:
 
     @property
     def pose(self) -> Element | None:
-        """The `<pose>` that counts: an include's own wins."""
+        """The `<pose>` in force: an include's own overrides the model's."""
         given = self.at.find("pose")
         return self.element.find("pose") if given is None else given
 
     @property
     def placement_frame(self) -> str:
-        """The frame inside the model that the pose is of; empty for the model's own."""
+        """The frame inside the model that the pose places; empty for the model's own."""
         given = "" if self.at is self.element else text_of(self.at.find("placement_frame"))
         return given or (self.element.get("placement_frame") or "").strip()
 
@@ -67,7 +67,7 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
     if (include.get("merge") or "").strip().lower() in ("true", "1"):
         if not context.ignores("include"):
             raise refuse(include, "merge='true' is not supported")
-        context.note("ignored", include, "merge='true': left out as asked")
+        context.note("ignored", include, "merge='true': left out by --ignore include")
         return None
     root = _root(include, uri, context)
     if root is None:
@@ -84,12 +84,12 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
 
 
 def _last_of(uri: str) -> str:
-    """What a model is called of which only the URI is known."""
+    """The name of a model that is known by its URI alone."""
     return unquote(uri).rstrip("/").rsplit("/", 1)[-1].removesuffix(".sdf") or "model"
 
 
 def _root(include: Element, uri: str, context: Context) -> Element | None:
-    """The included file; None where it is nowhere and the user wants it left out."""
+    """The root of the included file; None if it is missing (noted or remembered in `context`)."""
     given = context.stand_in(uri)
     if given is not None:
         outer = context.model
@@ -105,7 +105,7 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
             return None
         error = complain(
             include,
-            f"'{uri[:200]}' was not found ({missing}); name its folder with --model-path, or a shape for it with --stand-in "
+            f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path, a shape for it with --stand-in "
             f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), or leave it out with --ignore include",
         )
         context.miss(uri, error)
@@ -124,7 +124,7 @@ def _only_model(root: Element, include: Element, context: Context) -> Element | 
 
 
 def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
-    """A file with one model of that shape, static unless the include says otherwise."""
+    """A file with one static model of the stand-in's shape."""
     if stand_in.shape is None:
         raise complain(include, f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model")
     geometry = _geometry_text(stand_in.shape)

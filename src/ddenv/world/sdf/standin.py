@@ -1,4 +1,4 @@
-"""Stand-ins: simple shapes in place of models and meshes that cannot be found."""
+"""Stand-ins: simple shapes that replace missing models and meshes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from ddenv.world.pose import Vector
+from ddenv.world.pose import Vector, vector
 
-# The kinds, with the sizes (m) each wants, as they are written in complaints.
+# The sizes (m) of each kind, as shown in error messages.
 SIZES = {
     "box": "x,y,z",
     "cylinder": "radius,length",
@@ -27,7 +27,7 @@ HOW = (
 
 @dataclass(frozen=True)
 class StandIn:
-    """A shape with the place of its centre in the frame of what it stands for, m; or the box around the link's `sibling` shapes."""
+    """A `shape` with its `center` in the frame of what it replaces, m; or (None) the box around the link's `sibling` shapes."""
 
     shape: Shape | None
     center: Vector
@@ -35,7 +35,7 @@ class StandIn:
 
 
 def parse_stand_ins(texts: Mapping[str, str]) -> dict[str, StandIn]:
-    """The stand-ins of a scenario by the URI they are for. Raises UserError."""
+    """The stand-ins of a scenario by the URI that they replace. Raises UserError."""
     return {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
 
 
@@ -49,22 +49,22 @@ def parse_option(option: str) -> tuple[str, str]:
 
 
 def parse_stand_in(text: str, where: str) -> StandIn:
-    """The stand-in written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError, which `where` begins.
+    """The stand-in written as `kind:sizes` or `kind:sizes@x,y,z`. Raises UserError beginning with `where`.
 
-    It stands on the origin of the frame of what it replaces, as the meshes of most props do; `@x,y,z` puts its centre elsewhere.
+    It stands on the origin of the frame that it replaces, as most meshes of props do; `@x,y,z` sets its centre instead.
     """
     if text in SIBLINGS:
         return StandIn(None, (0.0, 0.0, 0.0), text)
     kind, _, rest = text.partition(":")
     words, at, center = rest.partition("@")
     if kind not in SIZES:
-        raise UserError(f"{where}: '{text[:60]}' is no stand-in; use {HOW}")
+        raise UserError(f"{where}: '{text[:60]}' is not a stand-in; use {HOW}")
     sizes = _numbers(words, SIZES[kind], f"{where}: {kind}")
     if min(sizes) <= 0:
-        raise UserError(f"{where}: {kind}: sizes must be above zero, found '{words[:60]}'")
+        raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
     shape = _shape(kind, sizes)
     middle = _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, _height(shape) / 2)
-    return StandIn(shape, middle)  # type: ignore[arg-type]
+    return StandIn(shape, vector(middle))
 
 
 def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
@@ -80,14 +80,14 @@ def _numbers(text: str, names: str, where: str) -> tuple[float, ...]:
 def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
     match kind:
         case "box":
-            return Box(sizes)  # type: ignore[arg-type]
+            return Box(vector(sizes))
         case "cylinder":
             return Cylinder(*sizes)
         case "sphere":
             return Sphere(*sizes)
         case "capsule":
             return Capsule(*sizes)
-    return Ellipsoid(tuple(size / 2 for size in sizes))  # type: ignore[arg-type]
+    return Ellipsoid(vector(size / 2 for size in sizes))
 
 
 def _height(shape: Shape) -> float:
@@ -106,6 +106,6 @@ def _height(shape: Shape) -> float:
 
 
 def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
-    """The longest of the URIs given that is `uri` or a folder above it."""
+    """The longest key of `stand_ins` that is `uri` or a folder above it; None if there is none."""
     found = [key for key in stand_ins if uri == key or uri.startswith(key.rstrip("/") + "/")]
     return max(found, key=len, default=None)

@@ -1,10 +1,12 @@
-"""XML that remembers where it stands: elements with their file, line and bytes, so that every complaint can point."""
+"""XML elements that know their file, line and byte range, so that every error message can point at its cause."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 from xml.etree import ElementTree
 
 from defusedxml import DefusedXmlException
@@ -12,13 +14,13 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from ddenv.errors import UserError
 
-# Deeper than any world that a program wrote; what reads it calls itself once for each level.
+# Maximum nesting depth, far above that of real worlds: the reader recurses once for each level.
 DEEPEST = 100
 _TAG_END = re.compile(rb"""(?:[^'">]|"[^"]*"|'[^']*')*>""")
 
 
 class Element(ElementTree.Element):
-    """An XML element with its file (`source`), its first `line`, its byte `start` and `end` in it, and its `parent`."""
+    """An XML element with its file (`source`), its first `line`, its byte range (`start`, `end`) there, and its `parent`."""
 
     __slots__ = ("end", "line", "parent", "source", "start")
 
@@ -28,19 +30,28 @@ class Element(ElementTree.Element):
     end: int
     parent: Element | None
 
+    # All elements below an Element are Elements.
+    if TYPE_CHECKING:
+
+        def find(self, path: str, namespaces: dict[str, str] | None = None) -> Element | None: ...
+        def findall(self, path: str, namespaces: dict[str, str] | None = None) -> list[Element]: ...  # type: ignore[override]  # narrower
+        def iter(self, tag: str | None = None) -> Iterator[Element]: ...  # type: ignore[override]  # narrower
+        def __iter__(self) -> Iterator[Element]: ...
+        def __getitem__(self, index: int) -> Element: ...  # type: ignore[override]  # no slices
+
 
 class _Builder(ElementTree.TreeBuilder):
-    """Builds `Element`s; `expat` tells where in the file each of them is."""
+    """Builds `Element`s; their positions come from the parser `expat`."""
 
     def __init__(self, text: bytes, source: Path) -> None:
         super().__init__(element_factory=Element)
         self.text = text
         self.source = source
         self.open: list[Element] = []
-        self.expat = None
+        self.expat: Any = None
 
-    def start(self, tag, attributes):
-        element = super().start(tag, attributes)
+    def start(self, tag: str, attributes: dict[str, str]) -> Element:
+        element = cast(Element, super().start(tag, attributes))
         element.source = self.source
         element.line = self.expat.CurrentLineNumber
         element.start = self.expat.CurrentByteIndex
@@ -50,41 +61,41 @@ class _Builder(ElementTree.TreeBuilder):
             raise UserError(f"{self.source}:{element.line}: elements are nested more than {DEEPEST} deep")
         return element
 
-    def end(self, tag):
+    def end(self, tag: str) -> Element:
         element = self.open.pop()
-        # Where expat says that `<a/>` ends depends on its version, so such elements are told by their own tag.
+        # Where expat puts the end of `<a/>` depends on its version, so the tag itself decides.
         found = _TAG_END.match(self.text, element.start)
         if found and not found.group().endswith(b"/>"):
             found = _TAG_END.match(self.text, self.expat.CurrentByteIndex)
         element.end = found.end() if found else len(self.text)
-        return super().end(tag)
+        return cast(Element, super().end(tag))
 
 
 def parse(text: bytes, path: Path) -> Element:
-    """The root element of `text`. Raises UserError with file and line for anything that is not plain, safe XML."""
+    """The root element of `text`. Raises UserError with file and line for anything but plain, safe XML."""
     if not text.strip():
         raise UserError(f"{path}: the file is empty; expected an SDF file")
     if text.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in text[:100]:
-        raise UserError(f"{path}: is UTF-16 or UTF-32, or no text at all; save it as UTF-8")
+        raise UserError(f"{path}: is UTF-16, UTF-32 or not text; save it as UTF-8")
     builder = _Builder(text, path)
     parser = DefusedXMLParser(target=builder, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     builder.expat = parser.parser
     try:
         parser.feed(text)
-        return parser.close()
+        return cast(Element, parser.close())
     except ElementTree.ParseError as error:
         reason = str(error).split(":")[0]
         raise UserError(f"{path}:{error.position[0]}: not well-formed XML: {reason}") from None
     except DefusedXmlException:
         line = builder.expat.CurrentLineNumber
-        why = "its entities can read other files and fill the memory"
-        raise UserError(f"{path}:{line}: a DOCTYPE is refused ({why}); remove it") from None
+        why = "its entities can read other files and exhaust memory"
+        raise UserError(f"{path}:{line}: DOCTYPE is not allowed ({why}); remove it") from None
     except (LookupError, ValueError) as error:
         raise UserError(f"{path}: cannot be decoded: {error}; save it as UTF-8") from None
 
 
 def xpath(element: Element) -> str:
-    """Where `element` stands, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
+    """The XPath of `element`, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
     steps = []
     node: Element | None = element
     while node is not None:
@@ -100,27 +111,27 @@ def place(element: Element) -> str:
 
 
 def complain(element: Element, message: str) -> UserError:
-    """A UserError that says where: file, line and XPath."""
+    """A UserError with file, line and XPath of `element`."""
     return UserError(f"{place(element)}: {message}")
 
 
 def text_of(element: Element | None) -> str:
-    """The text of `element` without the blanks around it; empty where there is no element."""
+    """The text of `element` without surrounding white space; empty for None."""
     return "" if element is None else (element.text or "").strip()
 
 
 def name_of(element: Element) -> str:
-    """The name attribute. Raises UserError where there is none."""
+    """The name attribute. Raises UserError if it is missing."""
     name = element.get("name")
     if not name or not name.strip():
-        raise complain(element, "has no name attribute; give it one")
+        raise complain(element, "has no name attribute; add one")
     return name
 
 
 def floats(element: Element) -> tuple[float, ...]:
-    """All numbers in the text of `element`, which may be infinite or NaN; none at all if one of the words is no number."""
+    """All numbers in the text of `element`, infinite ones and NaN included; empty if any word is not a number."""
     text = element.text or ""
-    # Python would also take 1_000, and the digits of other scripts.
+    # Python would also accept 1_000 and the digits of other scripts.
     if "_" in text or not text.isascii():
         return ()
     try:
@@ -130,7 +141,7 @@ def floats(element: Element) -> tuple[float, ...]:
 
 
 def numbers(element: Element, count: int) -> tuple[float, ...]:
-    """The `count` finite numbers that are the text of `element`."""
+    """The text of `element` as `count` finite numbers. Raises UserError."""
     values = floats(element)
     if len(values) != count or not all(map(math.isfinite, values)):
         shown = " ".join((element.text or "").split())[:60]
@@ -140,13 +151,13 @@ def numbers(element: Element, count: int) -> tuple[float, ...]:
 
 
 def number(parent: Element, tag: str, default: float) -> float:
-    """The number in child `tag` of `parent`, or `default` where there is none."""
+    """The number in child `tag` of `parent`, or `default` if there is no such child. Raises UserError."""
     child = parent.find(tag)
     return default if child is None else numbers(child, 1)[0]
 
 
 def truth(parent: Element, tag: str, default: bool) -> bool:
-    """SDF's booleans: true, false, 1, 0."""
+    """The boolean (true, false, 1, 0) in child `tag` of `parent`, or `default`. Raises UserError."""
     child = parent.find(tag)
     if child is None:
         return default
