@@ -323,7 +323,7 @@ OF_THE_FILE = (
     r":\d+: DOCTYPE is not allowed",
     r":\d+: elements are nested more than ",
     r": the file is empty",
-    r": is UTF-16 ",
+    r": is UTF-16, ",
     r": cannot be decoded: ",
     r": expected one <world> inside <sdf>, found ",
     r": models or frames are nested too deeply",

@@ -73,7 +73,7 @@ ROWS: dict[str, list[str]] = {
     "`<include>` of what is nowhere": [include("<uri>model://nowhere</uri>")],
     "`<include merge='true'>`": [include("<uri>model://nowhere</uri>", "merge='true'")],
     "includes in a circle": [include("<uri>refused.sdf</uri>")],
-    "a URI that climbs": [include("<uri>model://../../x</uri>"), include("<uri>ftp://x/y</uri>")],
+    "a URI that leaves its folder": [include("<uri>model://../../x</uri>"), include("<uri>ftp://x/y</uri>")],
     "a shape without its sizes": [
         shape("<box/>"),
         shape("<sphere><radius>0</radius></sphere>"),

@@ -45,7 +45,7 @@ RESERVED = ("world", "WorldModelInstance", "DefaultModelInstance")
 
 
 def without(world: World, removed: frozenset[str]) -> bytes:
-    """The text of `world` with the models named in `removed` cut out, each with its indentation and line break; all other bytes stay. Raises ValueError."""
+    """The text of `world` without the models named in `removed` and their indentation; all other bytes stay. Raises ValueError."""
     unknown = removed - {model.name for model in world.models}
     if unknown:
         raise ValueError(f"no such model: {sorted(unknown)[0]}")

@@ -226,7 +226,7 @@ def test_read_refuses_what_is_no_file(tmp_path):
     for name, reason in (("", "is a folder"), ("pipe", "not a regular file"), ("none", "No such file")):
         with pytest.raises(Unusable, match=reason):
             read(tmp_path / name, 10)
-    with pytest.raises(Unusable, match="the limit is"):
+    with pytest.raises(Unusable, match="the maximum is"):
         read(put(tmp_path / "big", "x" * 11), 10)
     assert read(put(tmp_path / "fits", "x" * 10), 10) == b"x" * 10
 
