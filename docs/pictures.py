@@ -1,4 +1,4 @@
-"""Makes the 3-D pictures of what is left of the bundled scenarios again, each with the robot where it failed.
+"""Makes the 3-D pictures of what is left of the bundled scenarios, each with the robot where it failed.
 
     python -m docs.pictures RUN...
 
@@ -36,7 +36,7 @@ CAMERAS = {
 }
 LEGEND = ("way of this test", "left out of this test")
 READY = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 20"
-# Meshcat's own controls, and what the legend tells of that is not in the picture.
+# Hides Meshcat's own controls, and the entries of the legend that are not in the picture.
 TIDY = """
     document.querySelectorAll('.dg').forEach((box) => box.style.display = 'none');
     document.querySelectorAll('#legend span').forEach((one) => {

@@ -44,14 +44,16 @@ def main() -> None:
 def filled(page: str, tables: dict[str, str]) -> str:
     """The page with these tables between the marks of their names."""
     for name, table in tables.items():
-        between = f"<!-- {name} -->\n\n{table}\n<!-- end -->"
-        page = re.sub(rf"<!-- {name} -->\n.*?<!-- end -->", lambda _, text=between: text, page, flags=re.DOTALL)
+        begin, end = f"<!-- {name} -->\n", "<!-- end -->"
+        before, found, rest = page.partition(begin)
+        if found:
+            page = f"{before}{begin}\n{table}\n{end}{rest.partition(end)[2]}"
     return page
 
 
 def marked(page: str, name: str) -> str:
     """The lines of the table between the marks of this name."""
-    return TABLE.findall(page.partition(f"<!-- {name} -->")[2].partition("<!-- end -->")[0])[0]
+    return _tables(page.partition(f"<!-- {name} -->")[2].partition("<!-- end -->")[0])[0]
 
 
 def headline(nine: str) -> str:
@@ -71,6 +73,10 @@ def _range(cells: tuple[str, ...]) -> str:
     return low if low == high else f"{low.split()[0]} to {high}"
 
 
+def _tables(text: str) -> list[str]:
+    return [found[0] for found in TABLE.finditer(text)]
+
+
 def _sections(study: Path) -> dict[str, str]:
     """The parts of a study's Markdown by their titles; of a scenario's title only its name."""
     _, *parts = re.split(r"^## ", (study / "study.md").read_text(), flags=re.MULTILINE)
@@ -78,7 +84,7 @@ def _sections(study: Path) -> dict[str, str]:
 
 
 def _table(study: Path, title: str, number: int) -> str:
-    return TABLE.findall(_sections(study)[title])[number]
+    return _tables(_sections(study)[title])[number]
 
 
 def _scenarios(study: Path, number: int) -> str:
@@ -87,7 +93,7 @@ def _scenarios(study: Path, number: int) -> str:
     for name, part in _sections(study).items():
         if " models" not in part.partition("\n")[0]:
             continue
-        head, sides, *rows = TABLE.findall(part)[number].splitlines()
+        head, sides, *rows = _tables(part)[number].splitlines()
         lines += [] if lines else [f"| scenario {head}", f"| --- {sides}"]
         lines += [f"| {name} {row}" for row in rows]
     return "\n".join([*lines, ""])

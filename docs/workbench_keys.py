@@ -20,12 +20,12 @@ def main() -> None:
 
 
 def filled(page: str) -> str:
-    """The page with the tables as they have to be."""
+    """The page with all tables up to date."""
     return TABLE.sub(lambda found: f"{found[1]}{table(found[2].split())}{found[3]}", page)
 
 
 def sections(page: str) -> list[str]:
-    """The sections that the page has tables for."""
+    """The sections that have tables in the page."""
     return [section for found in TABLE.finditer(page) for section in found[2].split()]
 
 
@@ -41,7 +41,7 @@ def row(action: Action) -> str:
 
 
 def _typed(key: str) -> str:
-    """A capital letter is typed as one."""
+    """As one types it: a capital letter stays one."""
     return key if len(key) == 1 else shown_key(key)
 
 

@@ -1,8 +1,8 @@
-"""Makes the pictures of the workbench again, docs/screens/NAME.svg: a run of the ditch, guided by hand, with Drake.
+"""Makes the pictures of the workbench, docs/screens/NAME.svg: a run of the ditch, guided by hand, with Drake.
 
     python docs/workbench_pictures.py
 
-All are made in one go. Nothing in them tells of the machine: folders, user and host have other names here.
+All are made in one go. They show nothing of this machine: folders, user and host have other names.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from textual.pilot import Pilot
+from textual.widgets import Select
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
@@ -37,7 +38,7 @@ from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"
 MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
-# How long anything may take, s; when a robot is far enough on its way to be looked at, simulated s.
+# Maximum time for anything, s; after this much of its run the robot is worth a picture, simulated s.
 PATIENCE, UNDER_WAY = 120.0, 14.0
 HOME = Path(tempfile.gettempdir()) / "you"
 FLOOR = ("asphalt_near", "asphalt_far")
@@ -45,7 +46,7 @@ FLOOR = ("asphalt_near", "asphalt_far")
 
 @dataclass(frozen=True)
 class Picture:
-    """`screen` is the class of what is seen; `words` say it to who does not see it."""
+    """`screen` is the class of the screen; `words` are the caption, for readers who cannot see the picture."""
 
     screen: str
     words: str
@@ -127,7 +128,7 @@ async def make_all() -> None:
 # The run of the ditch.
 
 
-async def begin(pilot: Pilot, run: Path) -> None:
+async def begin(pilot: Pilot[int], run: Path) -> None:
     """From the baseline to the middle of a round."""
     await until(pilot, lambda: is_under_way(pilot, tests=4))
     await take(pilot, "baseline")
@@ -152,8 +153,8 @@ async def begin(pilot: Pilot, run: Path) -> None:
         await take_live(other, "watch", pilot)
 
 
-async def take_dialogs(pilot: Pilot) -> None:
-    """What can be opened above a run at any time."""
+async def take_dialogs(pilot: Pilot[int]) -> None:
+    """The dialogs that can be opened at any time."""
     for name, key in (("help", "question_mark"), ("method", "e"), ("layers", "l"), ("copy", "y"), ("quit", "q")):
         await press(pilot, key)
         await take(pilot, name)
@@ -167,7 +168,7 @@ async def take_dialogs(pilot: Pilot) -> None:
     await press(pilot, "x")
 
 
-async def guide(pilot: Pilot) -> None:
+async def guide(pilot: Pilot[int]) -> None:
     """Another failure is looked at, a platform is pinned, and the platforms are tried alone: they are enough."""
     while not (rows := others(state(pilot))):
         await accept_if_waiting(pilot)
@@ -185,13 +186,13 @@ async def guide(pilot: Pilot) -> None:
     await press(pilot, "home")
     await take(pilot, "trial")
     await press(pilot, "a")
-    await until(pilot, lambda: state(pilot).here.how == "adopted")
+    await until(pilot, lambda: state(pilot).nodes[state(pilot).node].how == "adopted")
     await press(pilot, "space")
     await until(pilot, lambda: state(pilot).status == "finished")
     await take(pilot, "finished")
 
 
-async def export(pilot: Pilot, run: Path) -> None:
+async def export(pilot: Pilot[int], run: Path) -> None:
     await press(pilot, "L")
     await take(pilot, "log")
     await press(pilot, "2", "E", "ctrl+s")
@@ -200,13 +201,13 @@ async def export(pilot: Pilot, run: Path) -> None:
     await press(pilot, "escape")
 
 
-async def branch(pilot: Pilot) -> None:
-    """Back to the first reduction, on in another way, and both ends side by side."""
+async def branch(pilot: Pilot[int]) -> None:
+    """Back to the first reduction, on by another method, and both ends side by side."""
     await press(pilot, "h", *["up"] * 9, "down", "enter", "y")
     await until(pilot, lambda: state(pilot).node == 1 and state(pilot).paused)
     await press(pilot, "c")
     await take(pilot, "change")
-    pilot.app.screen.query_one("#partitioning").value = "timeseg"
+    pilot.app.screen.query_one("#partitioning", Select).value = "timeseg"
     await press(pilot, "ctrl+s")
     await until(pilot, lambda: state(pilot).scenario["reduction"]["pair"].startswith("timeseg"))
     nodes = len(state(pilot).nodes)
@@ -229,7 +230,7 @@ async def branch(pilot: Pilot) -> None:
 
 
 async def list_runs() -> None:
-    """One run of which the engine is gone, and one at work."""
+    """One run whose engine was killed, and one at work."""
     lost = new_run("friction")
     engine = start_engine(lost, 1)
     await asyncio.to_thread(wait_for_tests, lost, 12)
@@ -269,19 +270,19 @@ async def set_up() -> None:
 @asynccontextmanager
 async def opened(
     run: Path | None, size: tuple[int, int] = MIDDLE, theme: str = "", *, watch: bool = False
-) -> AsyncIterator[Pilot]:
+) -> AsyncIterator[Pilot[int]]:
     app = Workbench(run, watch=watch, config=Config(theme=theme))
     async with app.run_test(size=size, notifications=True) as pilot:
         await until(pilot, lambda: not pilot.app.screen.query_one(WorldMap).notice)
         yield pilot
 
 
-async def press(pilot: Pilot, *keys: str) -> None:
+async def press(pilot: Pilot[int], *keys: str) -> None:
     await pilot.press(*keys)
     await pilot.pause(0.2)
 
 
-async def until(pilot: Pilot, is_so: Callable[[], bool]) -> None:
+async def until(pilot: Pilot[int], is_so: Callable[[], bool]) -> None:
     """Raises TimeoutError."""
     deadline = time.monotonic() + PATIENCE
     while not is_so():
@@ -292,7 +293,7 @@ async def until(pilot: Pilot, is_so: Callable[[], bool]) -> None:
     await pilot.pause(0.2)
 
 
-async def take(pilot: Pilot, name: str, *, at_once: bool = False) -> None:
+async def take(pilot: Pilot[int], name: str, *, at_once: bool = False) -> None:
     # Words that fade after a while would hide what is below them.
     pilot.app.clear_notifications()
     await pilot.pause(0.0 if at_once else 0.6)
@@ -303,8 +304,8 @@ async def take(pilot: Pilot, name: str, *, at_once: bool = False) -> None:
     print(f"wrote {name}", file=sys.stderr)
 
 
-async def take_live(pilot: Pilot, name: str, guiding: Pilot) -> None:
-    """While a robot moves, also after the picture was drawn; `guiding` accepts what waits meanwhile."""
+async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
+    """A picture while a robot moves, also at its end; `guiding` accepts what waits meanwhile."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         await accept_if_waiting(guiding)
@@ -316,12 +317,12 @@ async def take_live(pilot: Pilot, name: str, guiding: Pilot) -> None:
     raise TimeoutError(name)
 
 
-async def accept_if_waiting(pilot: Pilot) -> None:
+async def accept_if_waiting(pilot: Pilot[int]) -> None:
     if state(pilot).status == "waiting":
         await press(pilot, "a")
 
 
-def is_under_way(pilot: Pilot, tests: int = 0) -> bool:
+def is_under_way(pilot: Pilot[int], tests: int = 0) -> bool:
     snapshot = run_screen(pilot).snapshot
     judged = snapshot.state.round is None or any(one.verdict for one in snapshot.state.round.candidates)
     return judged and snapshot.state.tests_done >= tests and any(row.time > UNDER_WAY for row in snapshot.live)
@@ -335,11 +336,11 @@ def others(now: RunState) -> list[int]:
     return [one.index for one in judged if nearest_other(now, one) is not None]
 
 
-def run_screen(pilot: Pilot) -> RunScreen:
+def run_screen(pilot: Pilot[int]) -> RunScreen:
     return next(screen for screen in pilot.app.screen_stack if isinstance(screen, RunScreen))
 
 
-def state(pilot: Pilot) -> RunState:
+def state(pilot: Pilot[int]) -> RunState:
     return run_screen(pilot).snapshot.state
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A simulator in sixty lines: a round robot, seen from above, heads for its goal and slides along what is in its way.
 
-drive.py WORLD SEED; the rest is told by the environment. Prints the pose log. Exit codes: 0 goal reached, 1 time is up.
+drive.py WORLD SEED; the rest is in environment variables. Prints the pose log. Exit codes: 0 goal reached, 1 time is up.
 """
 
 import math

@@ -10,7 +10,7 @@ AHEAD = 0.7  # rad, to either side
 
 
 class Timid:
-    """Turns away from what is near, goes straight on for a while, and then has forgotten it."""
+    """Turns away from what is near, goes straight for a while, and forgets it."""
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
