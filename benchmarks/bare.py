@@ -1,4 +1,4 @@
-"""A table of Textual and nothing else: what any such program takes from a key to its answer. `workbench.py` runs it beside ours."""
+"""A bare Textual table: how long any such program takes from a key to its answer. `workbench.py` runs it beside ours."""
 
 from textual.app import App, ComposeResult
 from textual.widgets import DataTable

@@ -1,9 +1,9 @@
-"""Runs the robot in random parts of a world, each seed twice: to the end, and ended early where it is stuck for good.
+"""Runs the robot in random parts of a world, each seed twice: to the end, and with early stop.
 
     python benchmarks/early_stop.py [--scenario ditch] [--environments N] [--seeds S] [--jobs N]
 
-f is fixed from the scenario's baseline, as a reduction does it. A verdict differs where early stop makes another outcome of a run:
-similar, other or pass. The parts are of all sizes, from a single model to all but one.
+f is fixed from the scenario's baseline, as a reduction does it. A verdict differs if early stop changes the
+outcome of a run: similar, other or pass. The parts are of all sizes, from a single model to all but one.
 """
 
 import argparse
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def tests(elements: tuple[str, ...], environments: int, seeds: int, first: int) -> list[Asked]:
-    """Random parts of all sizes, each with so many seeds from `first` on."""
+    """Random parts of all sizes, each with some seeds from `first` on."""
     chance = random.Random(0)
     parts = [frozenset(chance.sample(elements, chance.randrange(1, len(elements)))) for _ in range(environments)]
     return [(part, first + run) for part in parts for run in range(seeds)]
@@ -96,7 +96,7 @@ def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
 
 
 def differs(pair: Both, failure: Failure) -> bool:
-    """Whether early stop makes another outcome of it, with either similarity."""
+    """Whether early stop changes its outcome, with either similarity."""
     ways = [replace(failure, similarity=similarity) for similarity in ("end-pose", "trajectory")]
     return any(judge(pair.full, way).outcome != judge(pair.early, way).outcome for way in ways)
 
@@ -115,7 +115,7 @@ def row(name: str, pairs: list[Both], failure: Failure) -> str:
 
 
 def saved(pairs: list[Both], what: str) -> str:
-    """Time of all full runs, of all that may end early, and how much less that is."""
+    """The time of all full runs, of all runs with early stop, and how much shorter that is."""
     full, early = (np.sum([getattr(getattr(pair, kind), what) for pair in pairs]) for kind in ("full", "early"))
     return f"{full:.0f} -> {early:.0f} ({1 - early / full:.0%} less)"
 

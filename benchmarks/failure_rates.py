@@ -2,8 +2,9 @@
 
     python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
 
-Repaired are: the ditch filled, the cinder blocks of the rubble gone, all patches as rough as the asphalt. Failed is every run that
-does not reach the goal, f those that end within epsilon of the medoid of all that failed. Intervals are Wilson's, 95 %.
+Repaired worlds: the ditch is filled, the cinder blocks of the rubble are gone, all patches are as rough as the asphalt. A run
+failed if it did not reach the goal; it shows f if it ended within epsilon of the medoid of all failed runs. Intervals are
+Wilson's, 95 %.
 """
 
 import argparse

@@ -35,7 +35,7 @@ def main() -> None:
 
 
 def row(what: str, happened: list[Happened], before: RunState | None = None) -> str:
-    """The best of some repeats: what else the machine does only adds."""
+    """The best of some repeats: other work of the machine only adds time."""
     lines = texts(happened)
     parse = min(seconds(lambda: [json.loads(data) for _, data in lines]) for _ in range(REPEATS))
     events = read(lines)
@@ -50,7 +50,7 @@ def seconds(work) -> float:
 
 
 def texts(happened: Iterable[Happened]) -> list[tuple[str, str]]:
-    """Kind and data of each event as they are in a run file."""
+    """Kind and data of each event, as in a run file."""
     return [(kind, json.dumps(data, separators=(",", ":"))) for kind, data in happened]
 
 
@@ -63,7 +63,7 @@ def created() -> Happened:
 
 
 def long_run(tests: int) -> Iterator[Happened]:
-    """Rounds of 50 partitions of neighbours, one after another, until there were so many tests."""
+    """Rounds of 50 partitions of neighbours, until `tests` are made."""
     partitions = [list(range(first, first + 10)) for first in range(0, 500, 10)]
     for first in range(0, tests, 2 * RUNS * len(partitions)):
         number = first // (2 * RUNS * len(partitions)) + 1

@@ -1,8 +1,8 @@
-"""How long one scan of the lidar takes, on a drive across worlds of simple shapes; no simulator is needed for that.
+"""How long one scan of the lidar takes, on a drive across worlds of simple shapes, without a simulator.
 
     python benchmarks/lidar.py
 
-A scan that nobody looks at is only worked out where it may show something for the first time. Times are CPU times.
+A scan that is not read is only computed where it may show a model for the first time. Times are CPU times.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ddenv.world.pose import Pose
 
 SCANS = 300
 REPEATS = 5
-# How high the robot's first link is on flat ground, and how far it pitches and rolls on its way, m and rad.
+# The height of the robot's first link on flat ground, and how far it pitches and rolls, m and rad.
 HEIGHT = 0.13
 TILT = 0.03
 # How far it drives, m.
@@ -39,7 +39,7 @@ def ground() -> Model:
 
 
 def around(random: np.random.Generator, nearest: float, farthest: float) -> tuple[float, float]:
-    """A place so far from the middle of the way."""
+    """A place at this distance from the middle of the path."""
     distance, angle = random.uniform(nearest, farthest), random.uniform(-math.pi, math.pi)
     return WAY / 2 + distance * math.cos(angle), distance * math.sin(angle)
 
@@ -82,13 +82,13 @@ def boxes(random: np.random.Generator, count: int = 200) -> tuple[Model, ...]:
 
 
 def rubble(random: np.random.Generator) -> tuple[Model, ...]:
-    """5,000 low boxes on the ground, over which the beams go."""
+    """5,000 low boxes on the ground, below the beams."""
     poses = [Pose((*around(random, 0.0, 20.0), 0.05)) for _ in range(5000)]
     return ground(), *(model(f"stone {number}", Box((0.4, 0.4, 0.1)), pose) for number, pose in enumerate(poses))
 
 
 def measure(models: tuple[Model, ...]) -> tuple[float, float, float]:
-    """ms a scan that is looked at, ms one that is not, and the part of all beams that met something."""
+    """ms for a scan that is read, ms for one that is not, and the share of beams that hit something."""
     world = World(Path("world.sdf"), "world", b"", (0.0, 0.0, -9.81), models)
     moving = [one for one in models if not one.static]
     places = np.array([one.pose.position for one in moving]).reshape(-1, 3)
@@ -101,7 +101,7 @@ def measure(models: tuple[Model, ...]) -> tuple[float, float, float]:
         poses.append((*pose.position, *pose.quaternion))
 
     def drive(looked_at: bool) -> tuple[float, int]:
-        """ms a scan, and how many beams met something."""
+        """ms for a scan, and how many beams hit something."""
         lidar = Lidar(scenario.Lidar(), obstacles, names, moving, np.random.default_rng(0))
         start, met = time.process_time(), 0
         for number, pose in enumerate(poses):

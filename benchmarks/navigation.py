@@ -66,7 +66,7 @@ def main() -> None:
 
 
 def row(name: str, ground: Ground, goal: tuple[float, float]) -> str:
-    """The best of some repeats: what else the machine does only adds."""
+    """The best of some repeats: other work of the machine only adds time."""
     best, plans, ended = None, 0, 0.0
     for _ in range(REPEATS):
         timed = Timed(setup(goal))

@@ -4,16 +4,16 @@
         [--shuffle N] [--early-stop]
 
 All ask the same oracle: the same simulator, the same f from the same baseline runs, the same seeds for the first run and the
-re-runs of a candidate, as many tests at the same time. All that a reducer does counts: the time from the start of its program on,
-with the building of the simulator; the baseline; what was run ahead of time and not needed after all. "+ n stopped" are tests
-that were ended halfway. 1-minimal: each model that is left was left out once, with all re-runs, and f did not show; what a
-reducer did not test of that is tested after its time was taken.
+re-runs of a candidate, the same number of parallel tests. Everything counts: the time from the start of the program, with
+building the simulator; the baseline; tests that were made ahead and not needed. "+ n stopped" are tests that were ended halfway.
+1-minimal: each model that is left was left out once, with all re-runs, and f did not show; what a reducer did not test of this is
+tested after its time was measured.
 
-ddenv searches as in a study (n grows steadily, what is implied is skipped). What is not the same: it writes a run file that can be
-watched and resumed, ends a test that takes too long, and with --early-stop makes full runs of what is left, which the others do
-not. It knows where the models stand and where the robot drove; the others know the names alone, in the order of the file. How
-many tests they need hangs on that order: in the ditch the two models that are needed stand first. With --shuffle they get a random
-order; N is its seed. Needs `pip install '.[bench]'`.
+ddenv searches as in a study (n grows steadily, what is implied is skipped). Unlike the others it writes a run file that can be
+watched and resumed, ends a test that takes too long, and with --early-stop makes full runs of what is left. It knows where the
+models stand and where the robot drove; the others only know the names, in the order of the file. Their number of tests depends on
+that order: in the ditch the two needed models stand first. With --shuffle they get a random order; N is its seed. Needs `pip
+install '.[bench]'`.
 """
 
 from __future__ import annotations
@@ -50,16 +50,16 @@ SEARCH = [word for key, value in FEWER_TESTS.items() for word in (f"--{key}", va
 OURS = {f"ddenv, {pair}": ["--pair", pair, *SEARCH] for pair in PAIRS} | {
     "ddenv, splitting": ["--algorithm", "splitting"]
 }
-# So many of the models that are left are named.
+# Maximum number of models named in a cell.
 MOST_NAMES = 6
-# How often is told how many tests there are, and how long ddenv may take to stop, s.
+# Time between two lines of progress, and the maximum time for ddenv to stop, s.
 LOOK = 1.0
 STOP = 20.0
 
 
 @dataclass(frozen=True)
 class Asked:
-    """One scenario as its name and as it is reduced, and where what is written goes."""
+    """One scenario with its name and its settings, and the folder for what is written."""
 
     name: str
     scenario: Scenario
@@ -126,7 +126,7 @@ def table(asked: Asked, reducers: list[str]) -> None:
 
 
 def cells(asked: Asked, reducer: str) -> list[str]:
-    """What is told of one reduction; what went wrong if there was none."""
+    """The cells of one reduction, or of its error."""
 
     def tell(tests: int) -> None:
         print(f"\r{asked.name}: {reducer}: {tests} tests  ", end="", file=sys.stderr, flush=True)
@@ -224,7 +224,7 @@ def theirs(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
 
 
 def _kill(pid: int) -> None:
-    """Ends a process with all that it has started: picire's tests are process groups of their own."""
+    """Ends a process and everything that it started: picire's tests are process groups of their own."""
     with suppress(psutil.NoSuchProcess):
         first = psutil.Process(pid)
         for process in [*first.children(recursive=True), first]:

@@ -54,8 +54,8 @@ def _test(shown: Callable[[frozenset[str]], bool]) -> Callable[[Sequence[str], t
 def one_by_one(elements: tuple[str, ...], jobs: int) -> list[str]:
     """Leaves out one model after another, round and round, until none can be left out.
 
-    After a model that could be left out the next ones are tested ahead of time as if they could, too; after one that could
-    not, re-runs and the next ones alone.
+    After a success the next models are tested ahead as if they could be left out, too; after a miss, re-runs and the next models
+    singly.
     """
     bench, kept, position, hopeful = Bench(jobs), list(elements), 0, True
     while kept:
@@ -82,13 +82,13 @@ REDUCERS: dict[str, Reduce] = {
 def reduce_in_process(
     name: str, scenario: Scenario, record: Path, jobs: int, shuffle: int | None, answer: Connection
 ) -> None:
-    """Sends what is left and the `Counts`, and later whether that is 1-minimal; or only a line that says what is wrong.
+    """Sends what is left and the `Counts`, and later whether that is 1-minimal; or only an error in one line.
 
     With `shuffle`, the seed of a random order, the reducer does not see the models in the order of the file.
     """
-    # The process that waits for the answer gets Ctrl+c, too, and kills this one with all that it has started.
+    # The waiting process gets Ctrl+c, too, and kills this one with everything that it started.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # As the engine's workers: on a busy machine all have the same share.
+    # Like the engine's workers: on a busy machine all get the same share.
     os.nice(NICENESS)
     try:
         elements = prepare(scenario, record, jobs)

@@ -27,7 +27,7 @@ BEGUN, SIMILAR, WITHOUT = "begun", "similar", "without"
 
 @dataclass(frozen=True)
 class Counts:
-    """Tests that came to their end, how many of them were re-runs of candidates, and tests that were stopped before."""
+    """Finished tests, how many of them were re-runs of candidates, and tests that were stopped."""
 
     tests: int = 0
     reruns: int = 0
@@ -90,7 +90,7 @@ def _write(keep: Keep, run: int, outcome: str) -> None:
 
 
 def counts(record: Path) -> Counts:
-    """What was made so far, from the record."""
+    """The tests so far, from the record."""
     lines = [line.split(" ") for line in record.read_text().splitlines()] if record.exists() else []
     # The baseline comes first, and no candidate has all its models.
     everything = lines[0][2] if lines else ""
@@ -100,7 +100,7 @@ def counts(record: Path) -> Counts:
 
 
 def _judged_without() -> set[Keep]:
-    """What was judged to be without f: all its runs were made, and did not show it."""
+    """The sets judged to be without f: all their runs were made, and none showed it."""
     lines = [line.split(" ") for line in _record.read_text().splitlines()]
     runs = {(keep, run) for outcome, run, keep in lines if outcome == WITHOUT}
     asked = [str(run) for run in range(1 + _scenario.reduction.iterations)]
@@ -117,7 +117,7 @@ def is_minimal(kept: Keep, jobs: int) -> bool:
 
 
 class Bench:
-    """Makes tests in `jobs` processes: what comes next in line, and on those that are free what may be asked next."""
+    """Makes tests in `jobs` processes: the next in line, and on free ones those that may be asked for next."""
 
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs

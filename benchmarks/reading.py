@@ -1,4 +1,4 @@
-"""How long it takes to read worlds, and how much memory, beside parsing the same XML with the standard library alone.
+"""How much time and memory it takes to read worlds, compared with only parsing their XML with the standard library.
 
 python benchmarks/reading.py
 """
@@ -20,7 +20,7 @@ REPEATS = 5
 
 
 def model(number: int) -> str:
-    """A box in a row of a hundred, with what Gazebo writes of it."""
+    """A box in a row of a hundred, as Gazebo writes it."""
     x, y = number % 100, number // 100
     shape = "<geometry><box><size>0.5 0.5 0.5</size></box></geometry>"
     surface = "<surface><friction><ode><mu>0.8</mu><mu2>0.8</mu2></ode></friction><bounce/><contact><ode/></contact></surface>"
@@ -44,7 +44,7 @@ def crates(count: int) -> str:
 
 
 def measure(path: Path) -> tuple[int, int, float, float, float]:
-    """Models, collisions, s to read, s to parse the XML alone, and the process's greatest memory in MB before parsing alone."""
+    """Models, collisions, s to read, s to parse only the XML, and the process's maximum memory in MB before that."""
     from ddenv.world.read import read_world
 
     times = []
@@ -71,7 +71,7 @@ def main() -> None:
         generated = Path(folder) / "crates.sdf"
         generated.write_text(crates(MODELS))
         for path in (SDF / "worlds" / "ditch.sdf", generated):
-            # A process of its own, so that its memory is that of this world alone.
+            # A process of its own, so that its memory is that of this world only.
             done = subprocess.run([sys.executable, __file__, path], capture_output=True, text=True, check=True)
             models, shapes, read, alone, memory = done.stdout.split()
             times = f"{float(read):.2f} | {float(alone):.2f} | {float(read) / float(alone):.1f}"

@@ -2,8 +2,8 @@
 
     python benchmarks/reduction.py [--scenario ditch] [--pairs paper|all|A/B,C/D] [--algorithms ddenv|all|X,Y] [--jobs N]
 
-"faster than one after another" is the sum of all tests' own times over the time the reduction took: what the workers gain, with
-everything that the engine, the run file and the building of the world cost.
+"faster than one after another" is the sum of all tests' own times divided by the time of the reduction: the gain by the workers,
+after the costs of the engine, the run file and building the world.
 """
 
 import argparse
@@ -32,7 +32,7 @@ HEADER = (
     "minimal",
     "left",
 )
-# So many of the models that are left are named.
+# Maximum number of models named in a cell.
 MOST_NAMES = 4
 
 
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def row(scenario: str, method: Method, jobs: int, path: Path) -> list[str]:
-    """The cells of one reduction; what went wrong if there was none."""
+    """The cells of one reduction, or of its error."""
     words = ["run", scenario, "--algorithm", method.algorithm, "--pair", method.pair]
     words += ["--jobs", str(jobs), "--output", str(path), "--json"]
     done = subprocess.run([sys.executable, "-m", "ddenv", *words], capture_output=True, text=True)

@@ -1,11 +1,10 @@
-"""Writes the events of a run that was made before into a new run file, at the pace they came, as an engine would.
+"""Writes the events of an earlier run into a new run file, at their own pace, as an engine would.
 
     python benchmarks/replay.py SOURCE TARGET [--speed X] [--until TESTS] [--minutes M]
 
-It holds the run's lock, and ten times a second, whatever the speed, it writes where the robots of the running tests are. `--until`
-writes the events of so many tests at once before it begins. `--minutes` is for how long the run then goes on, by its own clock:
-when its events are used up, its rounds begin again, as new tests. Of the paths, only those are copied that a view reads.
-It says "ready" when it begins.
+It holds the run's lock, and writes ten times a second, at any speed, where the robots of the running tests are. `--until` first
+writes the events of this many tests at once. `--minutes` is how long the run then goes on, by its own clock: when its events are
+used up, its rounds begin again, as new tests. Only the paths that a view reads are copied. It says "ready" when it begins.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Way:
-    """The path of a test that runs, and from when to when it runs, s."""
+    """The path of a running test, with its start and end, s."""
 
     path: array
     begins: float
@@ -96,7 +95,7 @@ def main() -> None:
 
 
 def at_once(source: Source, target: RunFile, script: Iterator[Told], tests: int) -> Told:
-    """Writes all that came before the first test after so many tests; returns this test's start."""
+    """Writes everything before test number `tests` + 1; returns that test's start."""
     for told in script:
         if told.kind == "test_started" and told.data["test"] > tests:
             return told
@@ -105,7 +104,7 @@ def at_once(source: Source, target: RunFile, script: Iterator[Told], tests: int)
 
 
 def play(source: Source, target: RunFile, script: Iterator[Told], speed: float, until: float) -> None:
-    """Writes the rest as time goes by, up to this time of the run's clock, s."""
+    """Writes the rest at its pace, up to this time of the run's clock, s."""
     running: dict[int, Way] = {}
     first = next(script)
     started = looked = time.monotonic()

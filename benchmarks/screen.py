@@ -1,4 +1,4 @@
-"""What a terminal shows: just as much of one as is needed to tell when an answer to a key is on the screen."""
+"""What a terminal shows: only as much as is needed to see when the answer to a key is on the screen."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from rich.cells import cell_len
 
 # Numbers and a letter; a title or another string up to its end; one letter; or text.
 TOKEN = re.compile(r"\x1b\[([0-9;:<=>?$ ]*)([@-~])|\x1b[\]P_][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b[^\[\]P_]|([^\x1b]+)")
-# A sequence whose rest has not come yet.
+# An incomplete sequence.
 BEGUN = re.compile(r"\x1b(?:\[[0-9;:<=>?$ ]*|[\]P_][^\x07\x1b]*\x1b?)?$")
 BLANK = (" ", "")
 Cell = tuple[str, str]
 
 
 class Screen:
-    """Cells of (character, style) in rows; a style is what was last asked for in so many words."""
+    """Cells of (character, style) in rows; a style is the text of the last sequence that set it."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self.columns = columns
@@ -25,7 +25,7 @@ class Screen:
         self._rest = ""
 
     def feed(self, text: str) -> None:
-        """Takes what a program wrote; a sequence that is cut off waits for its rest."""
+        """Adds what a program wrote; an incomplete sequence waits for its rest."""
         text = self._rest + text
         begun = BEGUN.search(text)
         self._rest = begun.group() if begun else ""
@@ -67,7 +67,7 @@ class Screen:
         return [row[:] for row in self.cells]
 
     def changed(self, before: list[list[Cell]], columns: slice) -> int:
-        """How many cells between these columns are not as they were."""
+        """How many cells between these columns changed."""
         return sum(
             now != then
             for row, old in zip(self.cells, before, strict=True)

@@ -4,9 +4,9 @@
 
 Each scenario runs in its whole world, and in one with every second model removed. Everything on means sensors, filter,
 controller, recording, and what the robot notices; where there is a lidar, also that and the map it makes. Bare is
-`Simulator.AdvanceTo` in the same context with the same wheel speeds at the same times, and nothing else. Loose models then are
-never at rest: it has no such thing as sleep, which is why it is slower where there are many. Seconds are CPU seconds of one core;
-the first run in a world, which works out how loose piles settle, is left out.
+`Simulator.AdvanceTo` in the same context with the same wheel speeds at the same times, and nothing else. Loose models then never
+rest, so it is slower where there are many. Seconds are CPU seconds of one core; the first run in a world, which works out how
+loose piles settle, is left out.
 """
 
 import argparse
@@ -27,7 +27,7 @@ TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}
 
 @dataclass
 class Told:
-    """A drive that remembers what it told the wheels."""
+    """A drive that remembers the speeds it commanded."""
 
     drive: Any
     speeds: list[np.ndarray] = field(default_factory=list)
@@ -71,7 +71,7 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
 
 
 def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
-    """CPU time (s) of simulating a run whose wheels were told `speeds`."""
+    """CPU time (s) of simulating a run with these wheel speeds."""
     built, context, period = template._built, template._plant_context, template._clock.command_period
     present = keep | template._always
     kept = [body for name, body in built.moving.items() if name in present]
@@ -93,7 +93,7 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
 
 
 def cpu(work: Callable[[], Any]) -> tuple[float, Any]:
-    """How long `work` takes on the processor, s, and what it gives."""
+    """CPU time of `work`, s, and its result."""
     started = time.process_time()
     result = work()
     return time.process_time() - started, result

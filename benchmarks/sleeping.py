@@ -1,8 +1,8 @@
-"""Drives through a field of loose boards, with and without letting those sleep that nobody comes near.
+"""Drives through a field of loose boards, with and without sleep for the boards that nothing comes near.
 
     python benchmarks/sleeping.py [--boards N] [--seconds S]
 
-Each world has N boards (2 kg, 0.9 m long): every tenth lies across the robot's way, the others are piled up in threes beside it,
+Each world has N boards (2 kg, 0.9 m long): every tenth lies across the robot's path, the others are piled up in threes beside it,
 two with a third across them. The first run in a world also rehearses how each pile settles alone; later runs reuse that.
 """
 

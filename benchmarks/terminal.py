@@ -1,4 +1,4 @@
-"""A program in a terminal of its own (a pty), and when it wrote what."""
+"""A program in a terminal of its own (a pty), with the times of its output."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from contextlib import suppress
 from screen import Screen
 
 SIZE = (120, 36)  # columns, rows
-# What many terminals can: 16 million colours, which is the most that has to be sent.
+# As many terminals: 16 million colours, the most bytes.
 KIND = {"TERM": "xterm-256color", "COLORTERM": "truecolor"}
 
 
@@ -37,7 +37,7 @@ class Terminal:
             os.execvpe(words[0], words, environment | KIND)
 
     def look(self, seconds: float) -> float | None:
-        """Waits at most so long for output and takes it; returns when it came. Raises EOFError when the program is gone."""
+        """Waits a limited time for output and reads it; returns when it came. Raises EOFError when the program is gone."""
         if not select.select([self._handle], [], [], max(0.0, seconds))[0]:
             return None
         try:
@@ -52,7 +52,7 @@ class Terminal:
         return at
 
     def until(self, seen: Callable[[Screen], bool], seconds: float) -> float | None:
-        """When the screen showed it for the first time, or None if it did not within so many seconds."""
+        """When the screen first showed it, or None if it did not in time."""
         deadline = time.perf_counter() + seconds
         while (left := deadline - time.perf_counter()) > 0:
             at = self.look(left)
@@ -61,7 +61,7 @@ class Terminal:
         return None
 
     def watch(self, seconds: float) -> None:
-        """Takes all output for so long."""
+        """Reads all output for some seconds."""
         self.until(lambda _: False, seconds)
 
     def settle(self, quiet: float, seconds: float) -> float:
@@ -78,7 +78,7 @@ class Terminal:
         return at
 
     def memory(self) -> float:
-        """What the program has in memory (RSS), MB."""
+        """The program's memory (RSS), MB."""
         words = ["ps", "-o", "rss=", "-p", str(self.id)]
         return int(subprocess.run(words, capture_output=True, text=True, check=True).stdout) / 1024
 

@@ -1,4 +1,4 @@
-"""What is measured of one workbench in a terminal: its first paint, its answers to keys, how much it writes."""
+"""Measures one workbench in a terminal: its first paint, its answers to keys, how much it writes."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from terminal import SIZE, Terminal
 DDENV = (sys.executable, "-c", "from ddenv.cli import main; main()")
 # The map is in the left half, the table in the right one.
 LEFT, RIGHT, ALL = slice(0, SIZE[0] // 2), slice(SIZE[0] // 2, SIZE[0]), slice(0, SIZE[0])
-# Letters and digits on a screen that is more than begun.
+# Letters and digits on a screen that has really begun.
 WORDS = 150
-# A pause between two keys is as long as this, and up to twice, s: no key comes in step with anything else.
+# The pause between two keys is this long, up to twice, s: so no key comes in step with anything else.
 PAUSE = 0.08
 NO_ANSWER = 1.0  # after so long, s
 
 
 @dataclass(frozen=True)
 class Key:
-    """Two keys in turn, the second takes the first one back; their answer changes at least so many cells there at once."""
+    """Two keys in turn; the second undoes the first. Their answer changes at least this many cells at once."""
 
     name: str
     keys: tuple[str, str]
@@ -34,7 +34,7 @@ class Key:
     cells: int
 
 
-# The same key in a table of Textual and nothing else, see bare.py.
+# The same key in a bare Textual table, see bare.py.
 BARE_KEY = Key("down in a bare table", ("\x1b[B", "\x1b[A"), ALL, 40)
 KEYS = (
     Key("down in the table", ("\x1b[B", "\x1b[A"), RIGHT, 60),
@@ -58,7 +58,7 @@ class Starts:
 
 @dataclass(frozen=True)
 class Answers:
-    """Seconds from key to paint of those that were answered."""
+    """Seconds from key to paint, of the answered keys."""
 
     seconds: list[float]
     pressed: int
@@ -76,9 +76,9 @@ class Answers:
 
 
 def starts(words: list[str], environment: dict[str, str], times: int) -> Starts:
-    """Starts the workbench so often, on something that does not move, each time beside the bare import.
+    """Starts the workbench some times, on something that does not change, each time beside the bare import.
 
-    It is started once before, which compiles it.
+    One more start comes before, which compiles it.
     """
     first, whole, bare = [], [], []
     with attached(words, environment):
@@ -116,7 +116,7 @@ def _painted(terminal: Terminal) -> float:
 
 
 def answers(terminal: Terminal, key: Key, times: int) -> Answers:
-    """Presses a key and the one that takes it back in turn."""
+    """Presses a key and the one that undoes it in turn."""
     seconds = []
     for number in range(times):
         terminal.watch(random.uniform(PAUSE, 2 * PAUSE))
@@ -127,7 +127,7 @@ def answers(terminal: Terminal, key: Key, times: int) -> Answers:
 
 
 def by_itself(terminal: Terminal, key: Key, times: int, seconds: float) -> Answers:
-    """How often the screen changes as much in so many seconds though no key was pressed."""
+    """How often the screen changes as much without a key."""
     changed = []
     for _ in range(times):
         terminal.watch(PAUSE)
@@ -149,7 +149,7 @@ def _answer(terminal: Terminal, key: Key, press: str, seconds: float) -> float |
 
 
 def rate(terminal: Terminal, seconds: float) -> tuple[float, int]:
-    """Bytes that come while nothing is pressed: in a second on average, and in the second with most of them."""
+    """Bytes written while no key is pressed: in a second on average, and the maximum in a second."""
     begun = time.perf_counter()
     terminal.watch(seconds)
     each = [0] * (int(seconds) + 1)

@@ -2,16 +2,16 @@
 
     python benchmarks/workbench.py [--quick] [--hour SECONDS]
 
-What the program writes is read as a terminal shows it. The first paint is there when the screen holds words, counted from
-before the program is started, beside `python -c "import textual.app"`; all of it when no more comes. A key is answered when so
-much of the screen changed as this key changes; how often as much changes in 50 ms without a key is told as well. Times of keys
-are p50 / p95 / p99.
+The output is read as a terminal shows it. The first paint is there when the screen has words, counted from before the start of
+the program, beside `python -c "import textual.app"`; it is complete when no more comes. A key is answered when as much of the
+screen changed as this key changes; the table also has how often as much changes in 50 ms without a key. Times of keys are p50 /
+p95 / p99.
 
-Two simulations are a reduction of the ditch with two workers, and the screen is attached to it; with an idle machine the same
-events are replayed to it at the same pace (`replay.py`). The large run (`long_run.py`) has 10,000 tests in a world of 5,000
-models and goes on while it is watched, with the two simulations beside it. For the hour all events of an hour are replayed in
---hour seconds (90): all the tests of an hour, but only as many frames as these seconds have; with 3600 also its frames. Memory
-is RSS. --quick measures neither the large run nor the hour and takes less than a minute, all takes seven.
+Two simulations are a reduction of the ditch with two workers, and the screen is attached to it. On the idle machine the same
+events are replayed at the same pace (`replay.py`). The large run (`long_run.py`) has 10,000 tests in a world of 5,000 models and
+goes on while it is watched, with the two simulations beside it. For the hour all events of an hour are replayed in --hour seconds
+(90): all the tests of an hour, but only as many frames as these seconds have; with 3600 also its frames. Memory is RSS. --quick
+measures neither the large run nor the hour and takes less than a minute, all takes seven.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from watching import BARE_KEY, DDENV, KEYS, answers, attached, by_itself, rate, 
 
 HERE = Path(__file__).parent
 HEAVY = ("matplotlib", "pydrake", "scipy", "sklearn")
-# Leaves the names of all that was imported.
+# Prints the names of all imported modules.
 NAMES = "DDENV_BENCHMARK_NAMES"
 PROBE = (
     "import atexit, os, pathlib, sys; from ddenv.cli import main;"
     f"atexit.register(lambda: pathlib.Path(os.environ['{NAMES}']).write_text(' '.join(sys.modules))); main()"
 )
-# A reduction that goes on longer than all that is measured beside it.
+# A reduction that takes longer than all measurements beside it.
 SIMULATIONS = ("run", "ditch", "--jobs", "2", "--iterations", "200")
 LARGE_TESTS = 10_000
 
@@ -62,7 +62,7 @@ TARGETS = {
     f"key to paint: {BARE_KEY.name}": "",
     "as much changed without a key": "few",
     "bytes a second, on average": "4,000",
-    "bytes in a second, at most": "",
+    "bytes in a second, maximum": "",
     "memory, MB": "",
 }
 Figures = dict[str, str]
@@ -93,12 +93,12 @@ def main() -> None:
 
 
 def installed(folder: str) -> dict[str, str]:
-    """What makes a program start as an installed one does: from compiled files, also where none are to be written."""
+    """An environment in which a program starts like an installed one: from compiled files."""
     return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": f"{folder}/compiled"}
 
 
 def figures(run: Path, environment: dict[str, str], effort: Effort) -> Figures:
-    """All that is measured of a run at which an engine works."""
+    """All figures of a run with a working engine."""
     still = run.with_stem(f"{run.stem}-still")
     with closing(sqlite3.connect(run)) as source, closing(sqlite3.connect(still)) as target:
         source.backup(target)
@@ -107,7 +107,7 @@ def figures(run: Path, environment: dict[str, str], effort: Effort) -> Figures:
     with attached(["open", str(run)], environment) as terminal:
         terminal.watch(effort.settle)
         average, most = rate(terminal, effort.watch)
-        told |= {"bytes a second, on average": f"{average:,.0f}", "bytes in a second, at most": f"{most:,}"}
+        told |= {"bytes a second, on average": f"{average:,.0f}", "bytes in a second, maximum": f"{most:,}"}
         alone = [by_itself(terminal, key, effort.presses // 4, 0.05) for key in KEYS]
         changed, looks = sum(len(each.seconds) for each in alone), sum(each.pressed for each in alone)
         told["as much changed without a key"] = f"{changed} of {looks}"
