@@ -32,6 +32,7 @@ def test_of_many_candidates_the_judged_one_is_told():
 
 def ended(test: int, outcome: str, failure: str = "", **more) -> tuple[str, dict]:
     end = {"distance": None, "end_pose": None, "simulated_seconds": 1, "wall_seconds": 1}
+    end |= {"first_sensed": [], "first_touched": [], "cut": False}
     return "test_finished", {"test": test, "outcome": outcome, "failure": failure, **end, **more}
 
 

@@ -95,7 +95,7 @@ def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(reduced):
     assert done.returncode == 0
     assert "wall-1" in done.stdout
     assert "2 of 6 models" in done.stdout
-    assert "is no ddenv run file" in done.stdout
+    assert "is not a ddenv run file" in done.stdout
 
 
 def test_a_finished_run_resumes_to_its_summary(reduced):
@@ -188,7 +188,7 @@ def test_a_second_engine_is_refused(reduced):
 
     with engine_lock(Path(summary["run_file"])):
         done = ddenv("resume", summary["run_file"])
-    _is_one_line(done, "another engine works on this run")
+    _is_one_line(done, "another engine is working on this run")
 
 
 def _is_one_line(done, words):
@@ -229,7 +229,7 @@ MISTAKES = {
     "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
     "name": (["run", WALL, "--name", "../x"], "cannot be a file's name"),
     "no run": (["open", "nothing"], "no such run file"),
-    "not a run": (["resume", __file__], "is no ddenv run file"),
+    "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),

@@ -189,7 +189,7 @@ def test_a_run_that_is_still_on_says_so(run, tmp_path):
 def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
     fake_run.finished(run).write("reduced", candidate=99, environment=[77], evidence_test=1)
     text = page(run, tmp_path).text
-    assert "Not all of this run could be read." in text and "makes no sense here" in text
+    assert "Not all of this run could be read." in text and "is invalid here" in text
     assert "2 of 11 models" in text
 
 
@@ -203,7 +203,7 @@ def test_without_a_world_there_is_no_map(run, tmp_path):
 
 def test_what_is_no_run_is_refused(tmp_path):
     (tmp_path / "x.ddenv").write_text("no")
-    with pytest.raises(UserError, match="is no ddenv run file"):
+    with pytest.raises(UserError, match="is not a ddenv run file"):
         write_report(tmp_path / "x.ddenv", tmp_path / "x.html")
     assert not (tmp_path / "x.html").exists()
 
@@ -277,7 +277,8 @@ def many_rounds(run, rounds, won):
             where = {"phase": "round", "round": number, "candidate": 0}
             events.append(("test_started", {"test": test, **where, "run": run_number, "seed": 0}))
             seconds = {"simulated_seconds": 1.0, "wall_seconds": 1.0}
-            ended = {"outcome": outcome, "failure": "", "distance": None, "end_pose": None}
+            ended = {"outcome": outcome, "failure": "", "distance": None, "end_pose": None, "cut": False}
+            ended |= {"first_sensed": [], "first_touched": []}
             events.append(("test_finished", {"test": test, **ended, **seconds}))
         verdict = "similar" if number in won else "dissimilar"
         events.append(("candidate_judged", {"candidate": 0, "verdict": verdict, "tests": list(tests), "known": 0}))

@@ -71,13 +71,17 @@ class Writer:
 
     def finish_test(self, test: int, outcome: str, end: float = 3.0) -> None:
         rows, board = straight(end), straight(0.5)
-        values = {"failure": "timeout", "distance": None, "end_pose": [*rows[-1, 1:]]}
+        noticed = {"first_sensed": [], "first_touched": [], "cut": False}
+        values = {"failure": "out of time", "distance": None, "end_pose": [*rows[-1, 1:]], **noticed}
         seconds = {"simulated_seconds": 8.0, "wall_seconds": 0.1}
         motions = {"": rows.tobytes(), "board": board.tobytes()}
         self.run.append("test_finished", {"test": test, "outcome": outcome} | values | seconds, motions)
 
+    def start_engine(self) -> None:
+        self.run.append("engine_started", {"pid": 1, "jobs": 1, "version": "0", "simulator": "none"})
+
     def baseline(self) -> None:
-        self.run.append("engine_started", {"pid": 1, "jobs": 1})
+        self.start_engine()
         self.start_test(1)
         self.finish_test(1, "failed")
         numbers = {"runs": 1, "failures": 1, "rate": 1.0, "low": 0.2, "high": 1.0, "miss_chance": 0.0}

@@ -31,7 +31,7 @@ def test_before_the_first_run_the_robot_is_at_its_start(writer):
 
 
 def test_a_running_baseline_shows_the_whole_world(writer):
-    writer.run.append("engine_started", {"pid": 1, "jobs": 1})
+    writer.start_engine()
     writer.start_test(1)
     found = shot(state_of(writer), [live(1)])
     assert (found.kind, found.test, len(found.models)) == ("live", 1, 4)

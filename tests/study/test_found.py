@@ -91,6 +91,7 @@ def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
     run.created().baseline()
     test = run.start_round(2) or run.start(0)
     data = {"outcome": "similar", "failure": "stuck", "distance": 0.1, "end_pose": None, "simulated_seconds": 1.0}
+    data |= {"first_sensed": [], "first_touched": [], "cut": False}
     run.write("test_finished", test=test, **data, wall_seconds=5.0, taken="another")
     run.judge(0, "similar", [test])
     found = read_cell(tmp_path, cell)
@@ -128,7 +129,7 @@ def test_what_is_no_run_file_is_a_problem(tmp_path, cell):
     run_path(tmp_path, cell).parent.mkdir()
     run_path(tmp_path, cell).write_text("no run file")
     found = read_cell(tmp_path, cell)
-    assert not found.minimal and "is no ddenv run file" in found.problem
+    assert not found.minimal and "is not a ddenv run file" in found.problem
 
 
 DAMAGED = {

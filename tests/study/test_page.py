@@ -150,8 +150,8 @@ def test_files_that_are_damaged_hide_no_other_cell(tmp_path):
     reduced(tmp_path, two)
     checked(tmp_path, two, 4, {"crate_00": 0, "crate_01": 0})
     page, _, rows = written(plan, tmp_path)
-    assert "is no ddenv run file" in rows[0]["problem"] and rows[1]["minimal"] == "True"
-    assert "is no ddenv run file" in page.text and "1 of 2 worlds are minimal" in page.text
+    assert "is not a ddenv run file" in rows[0]["problem"] and rows[1]["minimal"] == "True"
+    assert "is not a ddenv run file" in page.text and "1 of 2 worlds are minimal" in page.text
 
 
 def evil(folder: Path) -> Path:

@@ -92,7 +92,7 @@ class FakeRun:
 
     def created(self) -> FakeRun:
         self.write("created", scenario=self.data, elements=self.elements)
-        self.write("engine_started", pid=1, jobs=2, version=__version__)
+        self.write("engine_started", pid=1, jobs=2, version=__version__, simulator="none")
         return self
 
     def start(self, candidate: int | None = None, run: int = 0) -> int:
@@ -115,6 +115,9 @@ class FakeRun:
             "end_pose": pose,
             "simulated_seconds": 45.0,
             "wall_seconds": wall,
+            "first_sensed": [],
+            "first_touched": [],
+            "cut": False,
         }
         self.file.append("test_finished", event, {ROBOT: path_samples().tobytes()})
 

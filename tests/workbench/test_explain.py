@@ -406,7 +406,7 @@ def test_a_file_that_is_gone_and_another_engine_are_told(run):
 @pytest.mark.parametrize("scenario", [{}, {"reduction": 3, "failure": {"epsilon": "x"}}])
 def test_settings_that_make_no_sense_do_no_harm(run, scenario):
     run.write("created", scenario=scenario, elements=run.elements)
-    run.write("engine_started", pid=1, jobs=1)
+    run.write("engine_started", pid=1, jobs=1, version="0", simulator="none")
     assert told(run)[0] == 0
 
 

@@ -184,7 +184,7 @@ def test_a_run_is_made_once_and_rounds_go_on(run):
     made = {"scenario": run.data, "elements": ["other"]}
     again = {"round": 2, "n_partitions": 2, "environment": [0, 1], "partitions": [[0], [1]], "candidates": []}
     for kind, data in (("created", made), ("round_started", again), ("accept_mode", {"mode": "\x1b"})):
-        with pytest.raises(UserError, match="makes no sense"):
+        with pytest.raises(UserError, match="is invalid"):
             apply(state, Event(99, 0.0, kind, data))
 
 
@@ -193,7 +193,7 @@ def test_times_that_no_calendar_has_are_damage(run, time):
     run.created().close()
     with sqlite3.connect(run.path) as database:
         database.execute(f"UPDATE event SET time = {time} WHERE id = 2")
-    with RunFile(run.path) as file, pytest.raises(UserError, match="makes no sense"):
+    with RunFile(run.path) as file, pytest.raises(UserError, match="is invalid"):
         file.events()
     assert RunsFolder(run.path.parent).look()[0].trouble
     assert moment(1e15) == "?"

@@ -122,7 +122,7 @@ def test_a_run_that_comes_to_life_is_followed(run, runs):
     assert look(watching).status == "lost"
     engine = fake_run.RunFile(run.path)
     engine.own()
-    engine.append("engine_started", {"pid": 1, "jobs": 2})
+    engine.append("engine_started", {"pid": 1, "jobs": 2, "version": "0", "simulator": "none"})
     with run.engine():
         assert look(watching).status in ("running", "baseline")
     engine.close()
@@ -194,9 +194,9 @@ async def test_a_watched_run_is_sent_nothing(run):
 def test_an_engine_of_another_version_is_told(run, poll):
     run.hold()
     assert look(poll).older_engine == ""
-    run.write("engine_started", pid=1, jobs=2, version="0.0.1")
+    run.write("engine_started", pid=1, jobs=2, version="0.0.1", simulator="none")
     assert look(poll).older_engine == "0.0.1"
-    run.write("engine_started", pid=1, jobs=2, version=__version__)
+    run.write("engine_started", pid=1, jobs=2, version=__version__, simulator="none")
     assert look(poll).older_engine == ""
 
 

@@ -88,7 +88,7 @@ async def test_every_run_says_how_it_stands(several):
             "broken": ["✗ cannot be read", "", ""],
         }
         await listed.choose("broken")
-        assert "is no ddenv run file" in listed.about()
+        assert "is not a ddenv run file" in listed.about()
         await listed.choose("done")
         assert "2 of 11 models left" in listed.about() and "crate_00" in listed.about()
 
@@ -139,7 +139,7 @@ async def test_what_cannot_be_done_says_why(several):
         for key in ("enter", "w", "c"):
             await listed.press(key)
             assert isinstance(listed.app.screen, RunsScreen)
-        assert "is no ddenv run file" in listed.notices()[-1]
+        assert "is not a ddenv run file" in listed.notices()[-1]
         await listed.choose("crates-1")
         await listed.press("d")
         assert isinstance(listed.app.screen, RunsScreen)

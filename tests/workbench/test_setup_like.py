@@ -64,7 +64,7 @@ async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, run
 async def test_a_damaged_run_is_told_in_the_preview(runs):
     (runs / "bad.ddenv").write_text("no run")
     async with Opened(screen=lambda: SetupScreen(like=runs / "bad.ddenv")) as session:
-        assert "is no ddenv run file" in session.notice()
+        assert "is not a ddenv run file" in session.notice()
 
 
 def test_what_does_not_fit_is_refused_before_anything_is_written(made, runs):

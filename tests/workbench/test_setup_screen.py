@@ -364,7 +364,7 @@ async def test_a_damaged_run_is_not_opened(scenarios, runs):
     async with Opened() as session:
         session.screen.query_one("#run-list").focus()
         await session.press("down", "enter")
-        assert "is no ddenv run file" in session.wrong()
+        assert "is not a ddenv run file" in session.wrong()
 
 
 async def test_help_and_quit(scenarios):

@@ -1,4 +1,4 @@
-"""Events to state: `apply(state, event)` gives the next state and touches nothing else."""
+"""Folds events into the state of a run. Pure: `apply(state, event)` returns the next state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile import fold_decisions
-from ddenv.runfile.events import Changes, Data, as_now, chance, moments, names, number, one_of, vector
+from ddenv.runfile.events import Changes, Data, chance, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, waits_no_more, with_outcomes, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Baseline, Candidate, Node, Point, Round, RunState, Split, Test, Trial, many
@@ -16,7 +16,7 @@ from ddenv.runfile.store import Event
 
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
-    """The state after `events`, from the beginning or from an earlier `state`. Raises UserError for events that make no sense."""
+    """The state after `events`, from the beginning or from an earlier `state`. Raises UserError for invalid events."""
     state = state or RunState()
     for event in events:
         state = apply(state, event)
@@ -24,7 +24,7 @@ def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
 
 
 def apply(state: RunState, event: Event) -> RunState:
-    """The state after one more event. Raises UserError for an event that makes no sense here."""
+    """The state after one more event. Raises UserError if the event is not valid in this state."""
     handler = _HANDLERS.get(event.kind)
     if handler is None:
         raise UserError(f"damaged run file: event {event.id} is of an unknown kind {event.kind[:40]!a}")
@@ -33,13 +33,13 @@ def apply(state: RunState, event: Event) -> RunState:
         if (command := event.data.get("command")) is not None:
             changes["last_command"] = max(state.last_command, int(command))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
-        raise UserError(f"damaged run file: event {event.id} ({event.kind}) makes no sense here") from None
+        raise UserError(f"damaged run file: event {event.id} ({event.kind}) is invalid here") from None
     return state.changed(revision=event.id, updated_at=event.time, **changes)
 
 
 def _created(state: RunState, data: Data, _: float) -> Changes:
     if state.tests or len(state.nodes) > 1 or state.round is not None:
-        raise ValueError("it was made before")
+        raise ValueError("a second created")
     elements = tuple(str(name) for name in data["elements"])
     return {
         "scenario": dict(data["scenario"]),
@@ -51,7 +51,7 @@ def _created(state: RunState, data: Data, _: float) -> Changes:
 
 
 def _engine_started(state: RunState, data: Data, at: float) -> Changes:
-    # An engine that was killed told no end: it worked at least until its last event.
+    # A killed engine wrote no end: it worked at least until its last event.
     spent = 0.0 if state.started_at is None else max(0.0, state.updated_at - state.started_at)
     return {
         "status": "baseline" if state.baseline is None else "running",
@@ -60,8 +60,8 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "waiting_candidate": None,
         "confirming": False,
         "jobs": int(data["jobs"]),
-        "engine_version": str(data.get("version", "")),
-        "simulator": str(data.get("simulator", "")),
+        "engine_version": str(data["version"]),
+        "simulator": str(data["simulator"]),
         "started_at": at,
         "working_seconds": state.working_seconds + spent,
     }
@@ -145,7 +145,7 @@ def test_started(state: RunState, data: Data, _: float) -> Changes:
         return changes | {"trials": _with_test_of_trial(state, test)}
     if round is None:
         return changes
-    if round != state.round.number:
+    if round != _current(state).number:
         raise ValueError(round)
     one = tried(state, candidate)
     return changes | with_candidate(state, replace(one, tests=(*one.tests, test.id)))
@@ -155,15 +155,15 @@ def test_finished(state: RunState, data: Data, _: float) -> Changes:
     distance, pose = data["distance"], data["end_pose"]
     values = {
         "outcome": str(data["outcome"]),
-        "failure": as_now(str(data["failure"])),
+        "failure": str(data["failure"]),
         "distance": None if distance is None else number(distance),
         "end_pose": None if pose is None else vector(pose, 7),
         "simulated_seconds": number(data["simulated_seconds"]),
         "wall_seconds": number(data["wall_seconds"]),
-        "first_sensed": moments(state.elements, data.get("first_sensed", ())),
-        "first_touched": moments(state.elements, data.get("first_touched", ())),
-        "cut": bool(data.get("cut", False)),
-        "taken": bool(data.get("taken", "")),
+        "first_sensed": moments(state.elements, data["first_sensed"]),
+        "first_touched": moments(state.elements, data["first_touched"]),
+        "cut": bool(data["cut"]),
+        "taken": "taken" in data,
     }
     return with_test(state, int(data["test"]), values)
 
@@ -173,6 +173,7 @@ def test_lost(state: RunState, data: Data, _: float) -> Changes:
 
 
 def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
+    x, y, z = vector(data["position"], 3)
     baseline = Baseline(
         runs=int(data["runs"]),
         failures=int(data["failures"]),
@@ -180,7 +181,7 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
         low=chance(data["low"]),
         high=chance(data["high"]),
         failure_test=int(data["failure_test"]),
-        position=vector(data["position"], 3),
+        position=(x, y, z),
         miss_chance=chance(data["miss_chance"]),
         iterations_95=int(data["iterations_95"]),
     )
@@ -225,7 +226,7 @@ def round_started(state: RunState, data: Data, _: float) -> Changes:
 
 
 def _check(split: Split, candidates: list[Any]) -> None:
-    """Partitions are disjoint and within the environment, and each makes at most two candidates: there are not many."""
+    """Raises ValueError unless partitions are disjoint and inside the environment, and candidates unique."""
     models = [*(name for partition in split.partitions for name in partition), *split.pinned]
     environment = set(split.environment)
     if len(set(models)) != len(models) or not environment.issuperset(models) or not all(split.partitions):
@@ -248,10 +249,10 @@ def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
         tests=tuple(map(int, data["tests"])),
         known=int(data["known"]),
     )
-    round = with_candidate(state, candidate)["round"]
+    round = _with(_current(state), candidate)
     if candidate.verdict != "dissimilar":
         return {"round": round}
-    # What it leaves out is needed in part; what different complements leave out has nothing in common.
+    # Something in the part that it leaves out is needed, and these parts are disjoint.
     apart = candidate.kind == "complement" or len(round.partitions) == 2
     round = replace(round, missed=round.missed + apart)
     needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
@@ -267,16 +268,16 @@ def vetoed(state: RunState, data: Data, at: float) -> Changes:
     changes = with_candidate(state, candidate)
     if data.get("again"):
         return changes
-    return changes | decision(state, at, "veto", f"vetoed {_told(state, candidate)}")
+    return changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
 
 
 def unvetoed(state: RunState, data: Data, at: float) -> Changes:
     candidate = tried(state, data["candidate"])
-    words = f"took back the veto of {_told(state, candidate)}"
+    words = f"took back the veto of {_described(state, candidate)}"
     if candidate.verdict == "rejected":
-        words = f"took back the rejection of {_told(state, candidate)}"
+        words = f"took back the rejection of {_described(state, candidate)}"
     changes = with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
-    # The first similar one wins: what waits behind this one has to wait for its verdict.
+    # The first similar candidate wins: a later one must wait for the verdict of this one.
     if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
         changes |= waits_no_more(state)
     return changes
@@ -289,7 +290,7 @@ def waiting(state: RunState, data: Data, _: float) -> Changes:
 def decided(state: RunState, data: Data, at: float) -> Changes:
     changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
     candidate = tried(state, data["candidate"])
-    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_told(state, candidate)}"
+    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_described(state, candidate)}"
     changes |= decision(state, at, str(data["decision"]), said)
     if data["decision"] == "accept":
         return changes
@@ -298,35 +299,46 @@ def decided(state: RunState, data: Data, at: float) -> Changes:
 
 def reduced(state: RunState, data: Data, at: float) -> Changes:
     winner = tried(state, data["candidate"])
-    # One part alone shows f, and yet others seemed to be needed: what was known is not so.
-    if winner.kind == "partition" and state.round.missed > 1:
+    # One part alone shows f although several seemed to be needed: the lower bound was wrong.
+    if winner.kind == "partition" and _current(state).missed > 1:
         state = state.changed(lower_bound=0)
     changes = arrived(state, data, at, "reduced", winner.label)
-    return changes | {"round": replace(state.round, winner=winner.index)}
+    return changes | {"round": replace(_current(state), winner=winner.index)}
 
 
-def _told(state: RunState, candidate: Candidate) -> str:
-    return f"{candidate.label} of round {state.round.number} ({many(candidate.size)})"
+def _described(state: RunState, candidate: Candidate) -> str:
+    return f"{candidate.label} of round {_current(state).number} ({many(candidate.size)})"
 
 
 def round_finished(state: RunState, _: Data, __: float) -> Changes:
-    return {"round": replace(state.round, done=True), "rounds_done": state.round.number}
+    round = _current(state)
+    return {"round": replace(round, done=True), "rounds_done": round.number}
 
 
 def tried(state: RunState, index: int) -> Candidate:
-    """A candidate of the current round. Raises IndexError if there is none with this index."""
+    """The candidate of the current round with this index. Raises IndexError or ValueError if there is none."""
     if index < 0:
         raise IndexError(index)
-    return state.round.candidates[index]
+    return _current(state).candidates[index]
 
 
 def with_candidate(state: RunState, candidate: Candidate) -> Changes:
-    """The round with another candidate in the place of the one with the same index."""
-    candidates = state.round.candidates.changed(candidate.index, candidate)
-    return {"round": replace(state.round, candidates=candidates)}
+    """The current round with `candidate` in place of the one with the same index."""
+    return {"round": _with(_current(state), candidate)}
 
 
-# Each tells the fields that get other values, so that the state is copied once an event.
+def _with(round: Round, candidate: Candidate) -> Round:
+    return replace(round, candidates=round.candidates.changed(candidate.index, candidate))
+
+
+def _current(state: RunState) -> Round:
+    """The current round. Raises ValueError if none was started."""
+    if state.round is None:
+        raise ValueError("no round")
+    return state.round
+
+
+# Each returns only the changed fields, so that the state is copied once per event.
 _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "created": _created,
     "engine_started": _engine_started,

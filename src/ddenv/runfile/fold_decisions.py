@@ -1,4 +1,4 @@
-"""What the user's decisions change in a run's state: pins, selections tried by hand, other settings, the way back and branches."""
+"""Folds the user's decisions: pins, selections tried by hand, changed settings, going back and branches."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from ddenv.runfile.events import Changes, Data, names, number, one_of
 from ddenv.runfile.state import Decision, Node, Point, RunState, Test, Trial, many
 
-# A decision names so many models, each with so many letters.
+# Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40
 
 
@@ -52,9 +52,9 @@ def adopted(state: RunState, data: Data, at: float) -> Changes:
 
 
 def accepted_other(state: RunState, data: Data, at: float) -> Changes:
-    """Another failure counts as f from here on, and where it showed becomes the environment."""
+    """Another failure counts as f from now on, and the environment that showed it becomes the current one."""
     test = state.tests[_index(data["test"])]
-    # A trial that led there is known by its number; else it was a candidate.
+    # A trial has a number; otherwise `what` names the candidate.
     trial = None if data.get("trial") is None else tried(state, data["trial"])
     what = trial.label if trial else str(data["what"])
     judged = with_outcomes(state, data)
@@ -65,7 +65,7 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
         "failures": (*state.failures, test.id),
         **changes,
         **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
-        **decision(state, at, "accept_other", f"took another failure for as good: {what}, test {test.id}"),
+        **decision(state, at, "accept_other", f"accepted another failure: {what}, test {test.id}"),
     }
 
 
@@ -80,11 +80,11 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         last = nodes[_node(state, undone)]
         nodes[last.number] = replace(last, rejected=True)
         words = f"took back {last.what}: {many(len(node.environment))} again"
-    # What is not there cannot stay.
+    # Models that are not in this environment cannot stay pinned.
     gone = state.pinned.difference(node.environment)
     if gone:
         words += f"; unpinned {told([name for name in state.elements if name in gone])}"
-    # Where another failure was accepted in between, it counts there alone.
+    # A failure accepted after this node does not count as f here.
     judged = with_outcomes(state, data) if "outcomes" in data else state
     return {
         **left_round(state),
@@ -108,13 +108,13 @@ def changed(state: RunState, data: Data, at: float) -> Changes:
     before = dict(state.scenario["reduction"])
     words = ", ".join(f"{key} {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
     scenario = {**state.scenario, "reduction": before | settings}
-    # A search goes the same way whatever its budget is.
+    # The budget does not affect the search.
     anew = {} if set(settings) == {"budget"} else searched_anew(state)
     return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
 
 
 def leg_started(state: RunState, data: Data, _: float) -> Changes:
-    """A new search begins from the environment as it is."""
+    """A new search starts from the current environment."""
     n_partitions = data["n_partitions"]
     if type(data["round"]) is not int or not (n_partitions is None or (type(n_partitions) is int and n_partitions > 0)):
         raise ValueError(data)
@@ -126,7 +126,7 @@ def command_refused(state: RunState, data: Data, _: float) -> Changes:
 
 
 def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Changes:
-    """The run comes to another environment, a new node below the current one."""
+    """The run moves to another environment, a new node below the current one."""
     environment = names(state.elements, data["environment"])
     reduction = state.scenario.get("reduction", {})
     node = Node(
@@ -142,7 +142,7 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Chan
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
     )
     inside = set(environment) <= set(state.environment)
-    # What the other failure needs is not known yet.
+    # Nothing is known yet about what another failure needs.
     needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
     changes = {} if how == "reduced" else left_round(state)
     return changes | {
@@ -163,17 +163,18 @@ def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
-    """The tests whose ends count as f in a node: f's own, and those of other failures that were accepted on the way there."""
-    accepted, node = [], state.nodes[number]
+    """The tests whose ends count as f in a node: that of f, and those of failures accepted on the path to it."""
+    accepted: list[int] = []
+    node = state.nodes[number]
     while node.parent is not None:
-        if node.how == "accepted":
+        if node.how == "accepted" and node.evidence_test is not None:
             accepted.append(node.evidence_test)
         node = state.nodes[node.parent]
     return (*state.failures[:1], *reversed(accepted))
 
 
 def left_round(state: RunState) -> Changes:
-    """The search that was on is over, and so is its round."""
+    """The current search and its round are over."""
     changes: Changes = {"confirming": False, **waits_no_more(state)}
     if state.round is not None and not state.round.done:
         changes["round"] = replace(state.round, done=True)
@@ -187,14 +188,14 @@ def waits_no_more(state: RunState) -> Changes:
 
 
 def searched_anew(state: RunState) -> Changes:
-    """The search that was on is over; whether a model can be removed is open again."""
+    """The current search is over; whether a model can be removed is open again."""
     here = state.nodes[state.node]
     nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
     return {**left_round(state), "minimal": False, "nodes": nodes}
 
 
 def with_outcomes(state: RunState, data: Data) -> RunState:
-    """The state with what tests turned out to be, now that f is known, or that another failure counts as f."""
+    """The state with the outcomes of tests updated, after f was fixed or another failure began to count as f."""
     for test, outcome in data["outcomes"].items():
         distance = data["distances"].get(test)
         values = {"outcome": str(outcome), "distance": None if distance is None else number(distance)}
@@ -212,7 +213,7 @@ def with_test(state: RunState, id: int, values: Data) -> Changes:
 
 def counts(state: RunState, before: Test | None, after: Test) -> Changes:
     tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
-    # An outcome that nobody knows has no entry: a KeyError, and a tally that no file can make long.
+    # An unknown outcome is a KeyError, so no file can make the tally long.
     tally[after.outcome] += 1
     if before is not None:
         tally[before.outcome] -= 1
@@ -227,19 +228,19 @@ def place(node: Node) -> str:
 
 
 def told(models: Sequence[str]) -> str:
-    """The first names of some models."""
+    """The first few names of `models`."""
     shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
     more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
     return ", ".join(shown) + more
 
 
 def tried(state: RunState, number: int) -> Trial:
-    """The trial of this number. Raises IndexError if there is none."""
+    """The trial with this number. Raises IndexError if there is none."""
     return state.trials[_index(number)]
 
 
 def _limit(value: object) -> object:
-    """A setting in words: a budget may be none."""
+    """A setting in words; a budget may be None."""
     return "no limit" if value is None else value
 
 

@@ -1,10 +1,11 @@
-"""One engine works on a run: a lock file beside it, which the system lets go of when the engine dies in any way."""
+"""Lets only one engine work on a run: a lock on a file beside it, which the system releases however the engine ends."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,22 +17,22 @@ def _lock_path(run: Path) -> Path:
 
 
 @contextmanager
-def engine_lock(run: Path):
-    """Holds the run's lock. Raises UserError while another engine has it."""
-    taken = f"{run}: another engine works on this run; attach to it with 'ddenv open {run}'"
-    with held(_lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder of yours"):
+def engine_lock(run: Path) -> Iterator[None]:
+    """Holds the run's lock. Raises UserError if another engine holds it."""
+    taken = f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
+    with held(_lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder that you can write to"):
         yield
 
 
 @contextmanager
-def held(lock: Path, taken: str, refused: str, instead: str):
-    """Holds the file `lock`. Raises UserError: `taken` while another process has it, `refused` where it cannot be made."""
+def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
+    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` and `instead` if it cannot be created."""
     try:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise UserError(f"{refused}: {error.strerror}; {instead}") from None
     try:
-        # A viewer that looks whether an engine is at work holds the lock for an instant.
+        # A viewer that checks for an engine holds the lock for an instant.
         deadline = time.monotonic() + 1.0
         while not _try(handle, fcntl.LOCK_EX):
             if time.monotonic() > deadline:
@@ -43,7 +44,7 @@ def held(lock: Path, taken: str, refused: str, instead: str):
 
 
 def engine_is_alive(run: Path) -> bool:
-    """Whether an engine works on the run now."""
+    """Whether an engine is working on the run now."""
     try:
         handle = os.open(_lock_path(run), os.O_RDONLY)
     except OSError:

@@ -1,13 +1,13 @@
-"""A tuple that a changed copy can be made of at the price of one small part of it, not of all."""
+"""A tuple with cheap changed copies: a copy shares all but one small part with the original."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import TypeVar
+from typing import TypeVar, overload
 
-# A change copies one chunk and the list of chunks: with 256 both are about as long for the longest runs (60,000 tests).
+# Items in a chunk. A change copies one chunk and the list of chunks; for the longest runs (60,000 tests) both are about as long.
 CHUNK = 256
 
 Item = TypeVar("Item")
@@ -15,37 +15,37 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True)
 class PersistentTuple(Sequence[Item]):
-    """Read like a tuple, and never changed: `added` and `changed` give a new one that shares all other chunks with it.
+    """An immutable sequence: `added` and `changed` return a new one that shares all unchanged chunks.
 
-    A slice is a plain tuple. It equals another one with equal items, and no plain tuple. All chunks but the last hold
-    `CHUNK` items, so that equal items are always in equal chunks.
+    A slice is a plain tuple. It equals other ones with equal items, but no plain tuple. All chunks but the last hold
+    `CHUNK` items, so equal items are always in equal chunks.
     """
 
     chunks: tuple[tuple[Item, ...], ...] = ()
 
     @classmethod
     def of(cls, items: Iterable[Item]) -> PersistentTuple[Item]:
-        """One that holds `items`, in their order."""
+        """One that holds `items`, in order."""
         every = tuple(items)
         return cls(tuple(every[start : start + CHUNK] for start in range(0, len(every), CHUNK)))
 
     def added(self, item: Item) -> PersistentTuple[Item]:
-        """One that has `item` behind the last of this one."""
+        """One with `item` appended."""
         if not self.chunks or len(self.chunks[-1]) == CHUNK:
             return PersistentTuple((*self.chunks, (item,)))
         return PersistentTuple((*self.chunks[:-1], (*self.chunks[-1], item)))
 
     def changed(self, index: int, item: Item) -> PersistentTuple[Item]:
-        """One that has `item` at `index`; negative ones count from the end. Raises IndexError if nothing is there."""
+        """One with `item` at `index`, which may be negative. Raises IndexError if there is no such index."""
         number, place = divmod(self._position(index), CHUNK)
-        # Slices put together would be copied twice.
+        # Joined slices would be copied twice.
         chunk, chunks = list(self.chunks[number]), list(self.chunks)
         chunk[place] = item
         chunks[number] = tuple(chunk)
         return PersistentTuple(tuple(chunks))
 
     def changed_since(self, earlier: PersistentTuple[Item]) -> Iterator[Item]:
-        """The items that `earlier` does not have at the same place, in order; chunks that both share cost nothing."""
+        """The items that differ from `earlier` at their index, in order; shared chunks cost nothing."""
         for number, chunk in enumerate(self.chunks):
             before = earlier.chunks[number] if number < len(earlier.chunks) else ()
             if chunk is not before:
@@ -54,7 +54,13 @@ class PersistentTuple(Sequence[Item]):
     def __len__(self) -> int:
         return CHUNK * (len(self.chunks) - 1) + len(self.chunks[-1]) if self.chunks else 0
 
-    def __getitem__(self, index):
+    @overload
+    def __getitem__(self, index: int) -> Item: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Item, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Item | tuple[Item, ...]:
         if isinstance(index, slice):
             return tuple(self[place] for place in range(*index.indices(len(self))))
         number, place = divmod(self._position(index), CHUNK)
@@ -67,7 +73,7 @@ class PersistentTuple(Sequence[Item]):
         return chain.from_iterable(map(reversed, reversed(self.chunks)))
 
     def _position(self, index: int) -> int:
-        """The place of `index` from the beginning. Raises IndexError if nothing is there."""
+        """`index` counted from the beginning. Raises IndexError if there is no such index."""
         length = len(self)
         position = index + length if index < 0 else index
         if not 0 <= position < length:

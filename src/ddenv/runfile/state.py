@@ -1,4 +1,4 @@
-"""What a run looks like at one moment: plain frozen data, made by `ddenv.runfile.fold` from the run's events."""
+"""The state of a run at one moment: plain frozen data, folded from the run's events by `ddenv.runfile.fold`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from ddenv.runfile.persistent import PersistentTuple
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
-# Besides these a test may run still or be lost, and a baseline run may have failed when f was not fixed yet.
+# Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 
@@ -21,21 +21,21 @@ class RunState:
     created    no engine has worked on it yet
     baseline   the whole world is being run
     running    rounds are being tested
-    paused     nothing new is started
+    paused     no new tests are started
     waiting    a reduction (`waiting_candidate` of the current round) waits for accept or reject
-    finished   ended by itself: `minimal` says whether no model can be removed; `reason` says why it ended
-    stopped    the engine was stopped; it can be resumed
-    failed     the engine could not go on: `reason` says why
+    finished   the run ended by itself: `minimal` says whether no model can be removed, `reason` why it ended
+    stopped    the engine was stopped and can be resumed
+    failed     the engine could not continue: `reason` says why
 
-    `confirming` says that the rounds are over, and that what is left is run in full because tests were cut.
-    `pinned` models stay. `nodes` are the environments that the run came to, `node` is the number of the current one.
-    `trials` are the user's own selections, `decisions` all that the user decided. The ends of `failures`
-    (tests) count as f in this node.
-    `lower_bound`: at least so many models are needed, as far as f shows wherever all that it needs is there.
-    `engine_version` is that of the ddenv that worked on it last, `simulator` what it computed with.
-    `refusal` is the last command that the engine could not obey, with its reason.
-    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is how
-    long engines have worked on it up to their ends, s; `started_at` (Unix time, s) is set while one works.
+    `confirming`: the rounds are over, and what is left is run in full because tests were cut.
+    `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the number of the current one.
+    `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
+    as f in the current node.
+    `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
+    `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with.
+    `refusal` is the last command that the engine could not obey, with the reason.
+    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is the time
+    that ended engines have worked, s; `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -74,51 +74,52 @@ class RunState:
     updated_at: float = 0.0
 
     def changed(self, **values: Any) -> RunState:
-        """One that differs in the values of these fields."""
-        # `dataclasses.replace` passes all the many fields through the constructor: half of what an event would cost.
+        """A copy with new values of these fields."""
+        # `dataclasses.replace` would pass all fields through the constructor, and double the cost of an event.
         state = object.__new__(RunState)
         state.__dict__.update(self.__dict__, **values)
         return state
 
     @property
     def failure(self) -> str:
-        """How the robot failed in f, in a word; "" where that is not known."""
+        """How the robot failed in f, in a word; "" if unknown."""
         if self.baseline is None or not 0 < self.baseline.failure_test <= len(self.tests):
             return ""
-        return self.tests[self.baseline.failure_test - 1].failure
+        test: Test = self.tests[self.baseline.failure_test - 1]
+        return test.failure
 
     @property
     def other_failures(self) -> int:
-        """How many baseline runs failed, but not as f did; 0 until f is fixed."""
+        """How many baseline runs failed differently from f; 0 until f is fixed."""
         baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
         return sum(test.outcome == "other" for test in baseline)
 
     @property
     def broken_runs(self) -> int:
-        """How many baseline runs broke, and count as runs without f."""
+        """How many baseline runs broke; they count as runs without f."""
         baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
         return sum(test.outcome in ("error", "timeout") for test in baseline)
 
     @property
     def cut_tests(self) -> int:
-        """How many tests were ended before their time."""
+        """How many tests were ended early."""
         return sum(test.cut for test in self.tests)
 
     @property
     def budget(self) -> int | None:
-        """The most tests in all, None for any number."""
+        """The maximum number of tests, None for no limit."""
         reduction = self.scenario.get("reduction")
         most = reduction.get("budget") if isinstance(reduction, dict) else None
         return most if isinstance(most, int) and most > 0 else None
 
     @property
     def here(self) -> Node | None:
-        """The current node; None before the run was made."""
+        """The current node; None before the first event."""
         return self.nodes[self.node] if self.nodes else None
 
     @property
     def finished_tests(self) -> tuple[Test, ...]:
-        """Gathered at each call: ask for `tests_done` where their number is enough."""
+        """All finished tests, collected at each call; use `tests_done` for their number."""
         return tuple(test for test in self.tests if test.is_finished)
 
     @property
@@ -129,13 +130,13 @@ class RunState:
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The full runs of what is left, in the order they were started."""
-        # Nothing but them is started after the rounds.
+        # They are the last tests of the run.
         return tuple(takewhile(lambda test: test.phase == "confirm", reversed(self.tests)))[::-1]
 
     @property
     def running_tests(self) -> tuple[Test, ...]:
-        """The tests that are not known to have ended, in the order they were started."""
-        # They are among the last ones: the many before them need not be looked at.
+        """The running tests, in the order they were started."""
+        # They are among the last ones, so the search starts from the end.
         latest = (test for test in reversed(self.tests) if test.outcome == "running")
         return tuple(islice(latest, self.tally["running"]))[::-1]
 
@@ -151,12 +152,12 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """An environment that a run came to, in the tree of its reductions; number 0 is the whole world, without a parent.
+    """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
 
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did) or "accepted" (another failure was taken for as
-    good); `what` names the candidate or the trial. `tests` is how many tests were finished then, `time` is Unix time, s, and
-    `round` the round that ended in it. `evidence_test` is the run in it that the next rounds look at, None before f is known.
-    `method` is what it was found by. `minimal` says that the reduction ended in it, `rejected` that it was taken back.
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did) or "accepted" (the user accepted another
+    failure); `what` names the candidate or trial. `tests` is the number of tests finished by then, `time` is Unix time, s,
+    `round` the round that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known.
+    `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back.
     """
 
     number: int
@@ -175,7 +176,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One turn of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
+    """One round of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
 
     `missed` counts the parts without which f did not show.
     """
@@ -199,9 +200,9 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """An environment and its disjoint parts: what all candidates of a round share instead of lists of their own.
+    """An environment and its disjoint parts, shared by all candidates of a round.
 
-    `pinned` models of the environment are in no part: they are in every candidate.
+    `pinned` models of the environment are in no part, but in every candidate.
     """
 
     environment: tuple[str, ...]
@@ -213,9 +214,9 @@ class Split:
 class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
-    `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user said no).
-    `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
-    ids of its tests so far, re-runs included, known ones of earlier rounds too (then `known` counts them).
+    `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user rejected
+    it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
+    ids of its tests so far, including re-runs and `known` tests of earlier rounds.
     """
 
     index: int
@@ -229,7 +230,7 @@ class Candidate:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """The models' names. They are gathered at each call: ask for `size` where their number is enough."""
+        """The names of its models, collected at each call; use `size` for their number."""
         part = self.split.partitions[self.partition]
         if self.kind == "partition":
             return (*part, *self.split.pinned)
@@ -251,9 +252,9 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A sub-environment of the user's own making. `models` are those kept in it, of the whole world; `node` is where it was tried.
+    """A sub-environment selected by the user. `models` are the ones it keeps of the whole world; it was tried in `node`.
 
-    `verdict`, `tests` and `known` are as a candidate's. `adopted` says that it became the environment.
+    `verdict`, `tests` and `known` are as in a candidate. `adopted`: it became the environment.
     """
 
     number: int
@@ -279,12 +280,12 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
-    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the model
-    `without`. `run` is i of seed = base + i: above 0 in a round it is a re-run (deflaking). `distance` is how far from f's end
-    the robot ended, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended otherwise than at the goal, see
-    `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, each with the
-    simulated time it was first so, s; empty in files of version 1. `cut` says that it was ended before its time because the
-    robot was stuck for good, `taken` that it was taken over from another run that had made it.
+    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the
+    model `without`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the
+    robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see
+    `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, with the
+    simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `taken`: its result was
+    copied from another run.
     """
 
     id: int
@@ -318,10 +319,10 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """The whole world, run several times. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
+    """The runs of the whole world. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
 
-    `miss_chance` is (1-p)^(1+iterations), the chance that a candidate's tests all miss f; `iterations_95` is how many
-    iterations a 95 % chance of seeing f needs. `position` is f's end, x, y, z m.
+    `miss_chance` is (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of
+    iterations for a 95 % chance of seeing f. `position` is f's end, x, y, z m.
     """
 
     runs: int
@@ -337,7 +338,7 @@ class Baseline:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """The size of the environment after so many finished tests; at least `needed` of its models were known to be needed."""
+    """The size of the environment after `tests` finished tests; at least `needed` of its models were known to be needed."""
 
     tests: int
     models: int
@@ -346,7 +347,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """Something the user decided: `kind` is the event's, `words` say it; at Unix `time`, s, after so many `tests`, in `node`."""
+    """A decision of the user: `kind` is the event's, `words` describe it; at Unix `time`, s, after `tests` tests, in `node`."""
 
     time: float
     tests: int

@@ -1,7 +1,7 @@
 """Reading and writing a run file (`NAME.ddenv`, SQLite in WAL mode).
 
-The engine is the only writer of events; viewers append commands and read. Nothing in the file is ever executed: documents
-are text, event data is JSON, trajectories are little-endian float64 rows.
+The engine is the only writer of events; viewers read, and append commands. Nothing in the file is ever executed: documents
+are text, event data is JSON, trajectories are rows of little-endian float64.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from array import array
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,10 +24,9 @@ from ddenv.errors import UserError
 from ddenv.runfile.events import moment
 
 APPLICATION_ID = 0x64644531
-# The tables are those of version 1; documents and events may hold what a reader of an earlier version does not know.
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 4  # the format of the file; formats before 4 were never released
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
-# How long to wait for another's write: a screen must not stand still, an engine must not give up. s
+# Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
 
 _SCHEMA = """
@@ -42,7 +42,7 @@ ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened (or, in the command table, that a viewer asks for). `time` is Unix time, s."""
+    """An event, or an entry of the command table: a viewer's request. `time` is Unix time, s."""
 
     id: int
     time: float
@@ -52,7 +52,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """A test that is running now: simulated `time` s and the robot's pose (x, y, z, qw, qx, qy, qz)."""
+    """A running test: simulated `time`, s, and the robot's pose (x, y, z m, qw, qx, qy, qz)."""
 
     slot: int
     test: int
@@ -61,7 +61,7 @@ class Live:
 
 
 def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> None:
-    """Makes a new run file, whole or not at all, with `created` as its first event.
+    """Creates a run file atomically, with `created` as the data of its first event.
 
     Raises UserError if it exists or cannot be written.
     """
@@ -73,7 +73,7 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
     os.close(handle)
     try:
         connection = sqlite3.connect(name, isolation_level=None)
-        # It has another name until all of it is on the disk: no step on the way has to be.
+        # The file gets its name once all of it is on disk, so no earlier step needs syncing.
         connection.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
         connection.executescript(_SCHEMA)
         connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
@@ -84,7 +84,7 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         connection.close()
         with Path(name).open("rb") as file:
             os.fsync(file.fileno())
-        # As any new file: temporary ones are for their owner alone.
+        # The usual permissions of a new file; a temporary one is only for its owner.
         os.umask(mask := os.umask(0))
         Path(name).chmod(0o666 & ~mask)
         os.link(name, path)
@@ -97,7 +97,7 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
 
 
 class RunFile:
-    """An open run file. Raises UserError for a file that is missing, no run file, or of a newer version."""
+    """An open run file. Raises UserError for a file that is missing, not a run file, or of another format."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -111,7 +111,7 @@ class RunFile:
         self._check()
 
     def _check(self) -> None:
-        """Raises UserError if what is open is no run file that can be read."""
+        """Raises UserError unless the open file is a readable run file."""
         path = self.path
         try:
             application = self._db.execute("PRAGMA application_id").fetchone()[0]
@@ -119,16 +119,17 @@ class RunFile:
         except sqlite3.OperationalError as error:
             raise UserError(f"{path}: cannot be read: {error}") from None
         except sqlite3.Error as error:
-            raise UserError(f"{path}: is no ddenv run file ({error})") from None
+            raise UserError(f"{path}: is not a ddenv run file ({error})") from None
         if application != APPLICATION_ID:
-            raise UserError(f"{path}: is no ddenv run file")
-        if version > SCHEMA_VERSION:
+            raise UserError(f"{path}: is not a ddenv run file")
+        if version != SCHEMA_VERSION:
+            which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
             raise UserError(
-                f"{path}: was written by a newer ddenv (format {version}); this one reads up to {SCHEMA_VERSION}"
+                f"{path}: was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
             )
-        # A view or a trigger in the place of a table could compute without end.
+        # A view or trigger in place of a table could run forever.
         if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
-            raise UserError(f"{path}: damaged run file: its tables are not ours")
+            raise UserError(f"{path}: damaged run file: its tables are not those of a run file")
 
     def __enter__(self) -> RunFile:
         return self
@@ -151,54 +152,50 @@ class RunFile:
         return {name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)}
 
     def events(self, after: int = 0, most: int = -1) -> list[Event]:
-        """All events with an id above `after`, in order; not more than `most` of them where that is not negative."""
+        """All events with an id above `after`, in order; at most `most` unless that is negative."""
         return self._entries("event", after, most)
 
     def commands(self, after: int = 0) -> list[Event]:
-        """What viewers asked for, in order."""
+        """The requests of viewers with an id above `after`, in order."""
         return self._entries("command", after)
 
     def send(self, kind: str, **data: Any) -> int:
-        """Asks the engine for something; returns the command's id. See `ddenv.runfile.commands`."""
+        """Sends a command to the engine; returns its id. Raises UserError."""
         with self._writing() as db:
             return self._insert(db, "command", kind, data)
 
-    def motion(self, test: int, model: str = ROBOT) -> array | None:
+    def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
         row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, model))
         return None if row is None else _floats(row[0], self.path)
 
-    def trajectory(self, test: int) -> array:
-        """Samples of the robot in a test that must have some, flat rows of `COLUMNS` floats."""
+    def trajectory(self, test: int) -> array[float]:
+        """Samples of the robot in a finished test, flat rows of `COLUMNS` floats. Raises UserError if there are none."""
         samples = self.motion(test)
         if not samples or not all(map(math.isfinite, samples)):
             raise UserError(f"{self.path}: damaged run file: test {test} has no trajectory")
         return samples
 
-    def motions(self, test: int) -> dict[str, array]:
+    def motions(self, test: int) -> dict[str, array[float]]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
         rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (test,))
         return {model: _floats(samples, self.path) for model, samples in rows}
 
     def live(self) -> list[Live]:
-        """The tests that run now, by worker slot."""
+        """The running tests, by worker slot."""
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
             return [Live(int(slot), int(test), float(at), tuple(json.loads(pose))) for slot, test, at, pose in rows]
         except (ValueError, TypeError, RecursionError):
-            raise UserError(f"{self.path}: damaged run file: a running test's pose makes no sense") from None
+            raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
-    # What follows is for the engine alone.
+    # The methods below are for the engine alone.
 
     def own(self) -> None:
-        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event.
-
-        A file of an older version becomes one of this version, as its next events may be.
-        """
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event."""
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
-            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
@@ -223,54 +220,54 @@ class RunFile:
             db.execute("COMMIT")
 
     def settle(self) -> None:
-        """Folds the write-ahead log back, so that the run is one file again."""
+        """Merges the write-ahead log into the run file, so that the run is one file again."""
         with self._writing() as db:
             db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def _insert(self, db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
         text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-        return db.execute(
-            f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text)
-        ).lastrowid
+        cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text))
+        assert cursor.lastrowid is not None
+        return cursor.lastrowid
 
     def _entries(self, table: str, after: int, most: int = -1) -> list[Event]:
         rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
         try:
             entries = [Event(id, moment(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
         except (ValueError, TypeError, RecursionError):
-            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' makes no sense") from None
+            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is invalid") from None
         if not all(isinstance(entry.data, dict) for entry in entries):
-            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is no JSON object")
+            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is not a JSON object")
         return entries
 
-    def _one(self, query: str, values: tuple = ()) -> tuple | None:
+    def _one(self, query: str, values: tuple[Any, ...] = ()) -> tuple[Any, ...] | None:
         rows = self._all(query, values)
         return rows[0] if rows else None
 
-    def _all(self, query: str, values: tuple = ()) -> list[tuple]:
+    def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         try:
             return self._db.execute(query, values).fetchall()
         except (sqlite3.Error, OverflowError) as error:
             raise UserError(f"{self.path}: damaged run file: {error}") from None
 
     @contextmanager
-    def _writing(self):
+    def _writing(self) -> Iterator[sqlite3.Connection]:
         try:
             yield self._db
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
-            raise UserError(f"{self.path}: cannot be written: {error}; what is in it is intact") from None
+            raise UserError(f"{self.path}: cannot be written: {error}; its content is intact") from None
 
 
 def _address(path: Path) -> str:
-    """Where SQLite finds the file; read only where nothing can be written and nothing is left to fold back."""
+    """SQLite's URI of the file; read-only if the folder is not writable and there is no write-ahead log to merge."""
     address = path.resolve().as_uri()
     settled = not path.with_name(f"{path.name}-wal").exists()
     return f"{address}?immutable=1" if settled and not os.access(path.parent, os.W_OK) else address
 
 
-def _floats(samples: object, path: Path) -> array:
+def _floats(samples: object, path: Path) -> array[float]:
     values = array("d")
     if not isinstance(samples, bytes) or len(samples) % (8 * COLUMNS):
         raise UserError(f"{path}: damaged run file: a trajectory is cut short")

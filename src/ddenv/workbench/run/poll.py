@@ -249,7 +249,7 @@ class Poll:
             rows = self.file.live()
             return tuple(row for row in rows if 0 < row.test <= len(state.tests) and _finite(row))
         except (TypeError, ValueError):
-            raise UserError(f"{self.path}: damaged run file: a running test's pose makes no sense") from None
+            raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
     def _motion(self, state: RunState) -> array | None:
         test = state.evidence_test
