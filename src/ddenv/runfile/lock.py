@@ -26,7 +26,7 @@ def engine_lock(run: Path) -> Iterator[None]:
 
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
-    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` and `instead` if it cannot be created."""
+    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made."""
     try:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
