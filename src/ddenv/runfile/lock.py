@@ -20,7 +20,9 @@ def _lock_path(run: Path) -> Path:
 def engine_lock(run: Path) -> Iterator[None]:
     """Holds the run's lock. Raises UserError if another engine holds it."""
     taken = f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
-    with held(_lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder that you can write to"):
+    with held(
+        _lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder that you can write to"
+    ):
         yield
 
 
