@@ -11,16 +11,11 @@ import yaml
 
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import SCHEMA_VERSION, RunFile
+from tests.command import ddenv, in_process
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until
 
 WALL = str(DATA / "wall.yaml")
-
-
-def ddenv(*words, **options):
-    return subprocess.run(
-        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE, **options
-    )
 
 
 @pytest.fixture(scope="module")
@@ -242,8 +237,9 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize(("words", "told"), MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_gets_one_line_and_leaves_nothing(home, words, told):
-    _is_one_line(ddenv(*words, cwd=home), told)
+def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, words, told):
+    monkeypatch.chdir(home)
+    _is_one_line(in_process(monkeypatch, capsys, *words), told)
     assert list(home.rglob("*")) == []
 
 

@@ -1,16 +1,14 @@
 """`ddenv world`: what is told of a world, and the files it writes."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from ddenv.cli.world_check import lines, report
 from ddenv.map.names import width
 from ddenv.world.read import parse_world
+from tests.command import ddenv
 from tests.conftest import DATA
-from tests.waiting import PATIENCE
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
 <model name='ground'><static>1</static><link name='l'><collision name='c'><geometry><plane/></geometry></collision></link></model>
@@ -25,12 +23,6 @@ WORLD = b"""<sdf version='1.6'><world name='hall'>
 @pytest.fixture
 def world(tmp_path):
     return parse_world(WORLD, tmp_path / "hall.world")
-
-
-def ddenv(*words):
-    return subprocess.run(
-        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE
-    )
 
 
 def test_the_table_has_a_line_for_each_model_and_its_notes_by_number(world):

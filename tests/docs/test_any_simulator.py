@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import pytest
 import yaml
@@ -14,17 +12,11 @@ from ddenv.robot.external.supervise import GRACE
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.command import PLACEHOLDERS
 from ddenv.world.load import load_scenario
+from tests.command import ddenv
 from tests.conftest import ROOT
-from tests.waiting import PATIENCE
 
 PAGE = (ROOT / "docs/any-simulator.md").read_text()
 SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
-
-
-def ddenv(*words, folder):
-    return subprocess.run(
-        [sys.executable, "-m", "ddenv", *map(str, words)], capture_output=True, text=True, timeout=PATIENCE, cwd=folder
-    )
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +24,7 @@ def reduced(tmp_path_factory):
     """The run file of the example, and what the command printed."""
     run = tmp_path_factory.mktemp("example") / "run.ddenv"
     (command,) = re.findall(r"\$ ddenv (run .*)", PAGE)
-    done = ddenv(*command.split(), "--output", run, folder=ROOT)
+    done = ddenv(*command.split(), "--output", run, cwd=ROOT)
     assert done.returncode == 0, done.stderr
     return run, done.stdout
 
@@ -44,14 +36,14 @@ def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
 
 @pytest.mark.examples
 def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(reduced, tmp_path):
-    done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", folder=tmp_path)
+    done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", cwd=tmp_path)
     assert [run["outcome"] for run in json.loads(done.stdout)["runs"]] == ["similar", "pass", "pass"]
 
 
 @pytest.mark.examples
 def test_the_same_seed_gives_the_same_run(tmp_path):
-    done = ddenv("test", SCENARIO, "--seed", 3, "--repeat", 2, "--json", folder=tmp_path)
-    again = ddenv("test", SCENARIO, "--seed", 3, "--json", folder=tmp_path)
+    done = ddenv("test", SCENARIO, "--seed", 3, "--repeat", 2, "--json", cwd=tmp_path)
+    again = ddenv("test", SCENARIO, "--seed", 3, "--json", cwd=tmp_path)
     one, other = json.loads(done.stdout)["runs"]
     assert json.loads(again.stdout)["runs"][0]["end_pose"] == one["end_pose"] != other["end_pose"]
 

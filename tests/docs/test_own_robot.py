@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 
 import pytest
 
 from ddenv.robot.protocol import Reading, Setup
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
+from tests.command import ddenv
 from tests.conftest import ROOT
-from tests.waiting import PATIENCE
 
 EXAMPLE = ROOT / "docs" / "examples" / "own_robot"
 GUIDE = (ROOT / "docs" / "own-robot.md").read_text()
@@ -32,9 +30,8 @@ def test_the_guide_tells_every_field(part):
 @pytest.mark.examples
 def test_the_example_is_reduced_to_what_the_guide_says(tmp_path):
     """On Drake, by the command that the guide shows."""
-    command = [sys.executable, "-m", "ddenv", "run", str(EXAMPLE / "scenario.yaml"), "--jobs", "2", "--json"]
     environment = os.environ | {"DDENV_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE)
+    done = ddenv("run", EXAMPLE / "scenario.yaml", "--jobs", "2", "--json", env=environment)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout.splitlines()[-1])
     assert "minimal environment: 2 of 12 models (83% smaller): locker_back, locker_left" in GUIDE

@@ -134,6 +134,7 @@ def test_its_chances_are_right_on_average():
         assert needed[inside].mean() == pytest.approx(told[inside].mean(), abs=0.15), (low, high)
 
 
+@pytest.mark.rates
 @pytest.mark.parametrize(
     "weights", [1.0 / np.arange(1, 31), np.ones(30), np.arange(30) < 12], ids=["near", "any", "ring"]
 )

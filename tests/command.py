@@ -1,0 +1,45 @@
+"""The command line, as a user starts it or in this process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from dataclasses import dataclass
+
+import pytest
+
+from ddenv.cli import main
+from tests.waiting import PATIENCE
+
+DDENV = (sys.executable, "-m", "ddenv")
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command left: its exit code and all that it printed."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def ddenv(*words: object, **options) -> Said:
+    """A process of its own. `options` are those of `subprocess.run`."""
+    done = subprocess.run(
+        [*DDENV, *map(str, words)], capture_output=True, timeout=PATIENCE, stdin=subprocess.DEVNULL, **options
+    )
+    return Said(done.returncode, done.stdout.decode(errors="replace"), done.stderr.decode(errors="replace"))
+
+
+def in_process(monkeypatch, capsys, *words: object) -> Said:
+    """Without a process of its own, which takes most of a second; a warning counts as a line, since it would be printed."""
+    monkeypatch.setattr(sys, "argv", ["ddenv", *map(str, words)])
+    with warnings.catch_warnings(record=True) as shown, pytest.raises(SystemExit) as left:
+        warnings.simplefilter("always")
+        # It would not be printed, and is of whatever garbage is collected just now.
+        warnings.simplefilter("ignore", ResourceWarning)
+        main()
+    printed = capsys.readouterr()
+    code = left.value.code or 0
+    return Said(code, printed.out, printed.err + "".join(f"{each.message}\n" for each in shown))
