@@ -5,6 +5,7 @@ import re
 import pytest
 
 from ddenv.cli.app import app
+from ddenv.schemas import names
 from ddenv.world.scenario import (
     Controller,
     FailureSpec,
@@ -70,9 +71,16 @@ def test_the_guide_has_the_defaults(key: str, section: type[Section]):
     assert float(re.match(r"[\d.]+", row.split(" | ")[-1]).group()) == default
 
 
-@pytest.mark.parametrize("name", ["run", "test", "study"])
-def test_the_guide_names_every_option(name):
+@pytest.mark.parametrize("command", ["run", "test", "study"])
+def test_the_guide_names_every_option(command):
     options = {
-        option for parameter in app.commands[name].params for option in parameter.opts if option.startswith("--")
+        option for parameter in app.commands[command].params for option in parameter.opts if option.startswith("--")
     }
     assert {option for option in options if f"`{option}" not in GUIDE} == set()
+
+
+@pytest.mark.parametrize("page", ["how-it-works.md", "glossary.md"])
+@pytest.mark.parametrize("kind", ["partitioning", "prioritization", "algorithm"])
+def test_pages_name_every_schema_and_algorithm(page, kind):
+    text = (ROOT / "docs" / page).read_text()
+    assert {name for name in names(kind) if f"`{name}`" not in text} == set()

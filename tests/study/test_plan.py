@@ -118,7 +118,7 @@ def test_the_names_of_files_are_files_names(tmp_path, name):
 WRONG = {
     "scenario": (
         {"scenarios": ("dich",)},
-        r"no scenario 'dich' \(did you mean ditch\?\); bundled are ditch, friction, rub",
+        r"no scenario 'dich' \(did you mean ditch\?\); bundled are ditch, friction",
     ),
     "no scenario": ({"scenarios": (" , ",)}, r"--scenarios: expected names separated by commas; found ' , '"),
     "missing file": ({"scenarios": ("gone.yaml",)}, r"gone.yaml: no such file"),
