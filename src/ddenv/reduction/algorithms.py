@@ -1,4 +1,4 @@
-"""The ddenv algorithm (paper, Algorithm 1)."""
+"""The algorithms: the paper's ddenv, and ddmin, probdd and binary splitting to compare it with. Each is a generator."""
 
 from __future__ import annotations
 

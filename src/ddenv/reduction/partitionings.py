@@ -1,4 +1,4 @@
-"""Partitions by the manoeuvres of the robot."""
+"""Partitionings: how the environment is split by where models stand and when the robot met them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""First sensed, first tried."""
+"""Prioritizations: which partitions are tried first. Each returns a score for each partition, the lowest first."""
 
 from __future__ import annotations
 
