@@ -59,7 +59,8 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
     assert baseline(state) == (
         "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 1 run failed in another way; "
-        "f: stuck at (1.00, 2.00, 0.50) m; 4 runs of a candidate miss it with chance 0.2; 95 % needs --iterations 7"
+        "f: stuck at (1.00, 2.00, 0.50) m; the chance that 4 runs of a candidate miss f is 0.2; "
+        "a 95 % chance to see f needs --iterations 7"
     )
 
 

@@ -1,10 +1,10 @@
 """The one kind of error a user can cause."""
 
-LONGEST = 1500
+LONGEST = 1500  # characters of a message
 
 
 class UserError(Exception):
-    """Wrong input, told in one line: what is wrong, where, and what to do.
+    """Wrong input, described in one line: what is wrong, where, and what to do.
 
     The command line prints the line and exits with code 2; the workbench shows it beside the field.
     """
@@ -14,10 +14,10 @@ class UserError(Exception):
 
 
 def shortened(text: str) -> str:
-    """`text` with its middle left out where a name or a path in it is endless."""
+    """`text` without its middle if it is longer than `LONGEST`."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 300]} ... {text[-290:]}"
 
 
 def printable(text: str) -> str:
-    """`text` without what would steer a terminal or cannot be written: names and reasons may come from anyone's file."""
+    """`text` with control characters replaced, since parts of it may come from untrusted files."""
     return "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)

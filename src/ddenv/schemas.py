@@ -1,6 +1,6 @@
-"""Partitionings, prioritizations and algorithms by name: where each is written, and what its author says of it.
+"""Partitionings, prioritizations and algorithms by name: where each is implemented, and its explanation.
 
-Nothing is imported to list or to explain them, so that views know them all without scikit-learn. Another package adds its own
+Listing and explaining them imports nothing, so views know all of them without scikit-learn. Other packages add their own
 through entry points in the groups `ddenv.partitionings`, `ddenv.prioritizations` and `ddenv.algorithms`.
 """
 
@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ddenv.errors import UserError
 
@@ -43,7 +43,7 @@ _OURS: dict[str, dict[str, str]] = {
     },
 }
 
-# Algorithms of other packages are taken to use both parts of the pair.
+# Algorithms of other packages are assumed to use both parts of the pair.
 BOTH: tuple[Kind, ...] = ("partitioning", "prioritization")
 _USES: dict[str, tuple[Kind, ...]] = {"ddmin": (), "probdd": (), "splitting": ("prioritization",)}
 
@@ -60,7 +60,7 @@ def pairs() -> tuple[str, ...]:
 
 
 def uses(algorithm: str) -> tuple[Kind, ...]:
-    """The parts of the pair that the algorithm looks at."""
+    """The parts of the pair that the algorithm uses."""
     return _USES.get(algorithm, BOTH)
 
 
@@ -68,14 +68,14 @@ def split_pair(pair: str) -> tuple[str, str]:
     """The partitioning and the prioritization of a pair, both known. Raises UserError."""
     partitioning, slash, prioritization = pair.partition("/")
     if not slash:
-        raise UserError(f"'{pair}' is no pair{nearest(pair, pairs())}; write partitioning/prioritization")
+        raise UserError(f"'{pair}' is not a pair{nearest(pair, pairs())}; write partitioning/prioritization")
     check("partitioning", partitioning)
     check("prioritization", prioritization)
     return partitioning, prioritization
 
 
 def check(kind: Kind, name: str) -> None:
-    """Raises UserError for a name that is not known, with the nearest one."""
+    """Raises UserError for an unknown name, suggesting the nearest one."""
     known = names(kind)
     if not isinstance(name, str):
         raise UserError(f"{kind}: expected a name, found {name!r}; use one of {', '.join(known)}")
@@ -83,13 +83,13 @@ def check(kind: Kind, name: str) -> None:
         raise UserError(f"no {kind} '{name}'{nearest(name, known)}; use one of {', '.join(known)}")
 
 
-def load(kind: Kind, name: str) -> Callable:
-    """The function itself. Raises UserError for an unknown name, and where another package's cannot be loaded."""
+def load(kind: Kind, name: str) -> Callable[..., Any]:
+    """The function itself. Raises UserError for an unknown name, and if another package's function cannot be loaded."""
     check(kind, name)
     entry = _known(kind)[name]
     try:
-        found = entry.load()
-    # Other packages do what they like when they are imported.
+        found: object = entry.load()
+    # Importing another package may raise anything.
     except (Exception, SystemExit) as error:
         raise UserError(f"{kind} '{name}': {entry.value} cannot be loaded: {error}") from error
     if not callable(found):
@@ -99,14 +99,16 @@ def load(kind: Kind, name: str) -> Callable:
 
 @cache
 def explanation(kind: Kind, name: str) -> str:
-    """What its author says of it: the first paragraph of the docstring, as one line; "" where there is none."""
+    """The first paragraph of its docstring, as one line; "" if there is none."""
     entry = _known(kind).get(name)
+    if entry is None:
+        return ""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             tree = ast.parse(_source(entry.module).read_bytes())
     except Exception:
-        # Another package may be half removed, or not be written in Python.
+        # Another package may be half removed, or not written in Python.
         return ""
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == entry.attr:
@@ -115,18 +117,20 @@ def explanation(kind: Kind, name: str) -> str:
 
 
 def _source(module: str) -> Path:
-    """The file of a module. Python itself would import the packages around it to find it."""
+    """The file of a module, found without importing the packages around it, as Python would. Raises ImportError."""
     top, *rest = module.split(".")
     spec = importlib.util.find_spec(top)
+    if spec is None or spec.origin is None:
+        raise ImportError(module)
     if not rest:
         return Path(spec.origin)
-    places = [Path(folder, *rest) for folder in spec.submodule_search_locations]
+    places = [Path(folder, *rest) for folder in spec.submodule_search_locations or ()]
     files = [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]
     return next(file for file in files if file.is_file())
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
-    """A question about the known word that `word` looks like, or ""."""
+    """" (did you mean ...?)" with the known word nearest to `word`, or ""."""
     match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     return f" (did you mean {match[0]}?)" if match else ""
 
@@ -135,6 +139,6 @@ def nearest(word: str, known: Sequence[str]) -> str:
 def _known(kind: Kind) -> dict[str, EntryPoint]:
     group = f"ddenv.{kind}s"
     ours = {name: EntryPoint(name, value, group) for name, value in _OURS[kind].items()}
-    # A slash would make a pair of it.
+    # A name with a slash would look like a pair.
     others = {each.name: each for each in entry_points(group=group) if each.name not in ours and "/" not in each.name}
     return ours | others

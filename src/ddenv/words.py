@@ -1,4 +1,4 @@
-"""The words for what happens in a run, one line each; and how all views word numbers."""
+"""One line of text for each event of a run, and the format of numbers in all views."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Candidate, RunState, Trial
 
 CONFIRMING = "confirming what is left with full runs"
-# Of what is always the same.
+# Events whose text is always the same.
 SAID = {
     "paused": "paused",
     "resumed": "resumed",
     "confirm_started": CONFIRMING,
 }
-# For readers who see nothing but these lines.
+# Hints for readers who see only these lines.
 HINTS = {
-    "paused": " from a workbench; it resumes from there too: attach with 'ddenv open'",
+    "paused": " from a workbench; to resume, attach with 'ddenv open'",
     "waiting": ": attach with 'ddenv open'",
 }
 
@@ -39,7 +39,7 @@ def _where(state: RunState) -> str:
 
 
 def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:
-    """What one event changed, or "" if it is not worth a line. Where the reader is `attached` already, it is not told how to be."""
+    """What one event changed, or "" if it is not worth a line; with a hint how to attach unless the reader is `attached`."""
     line = _news(kind, before, after)
     return line if attached or not line else f"{line}{HINTS.get(kind, '')}"
 
@@ -52,16 +52,15 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
             return f"engine started{resumed} with {workers}; {models} can be removed"
         case "baseline_finished":
             return baseline(after)
-        case "round_started":
-            round = after.round
+        case "round_started" if (round := after.round) is not None:
             return (
                 f"round {round.number}: {count(len(round.environment), 'model')} in "
                 f"{count(len(round.partitions), 'partition')}, {count(len(round.candidates), 'candidate')}"
             )
-        case "candidate_judged" if after.round is not None:
+        case "candidate_judged" if after.round is not None and before.round is not None:
             changed = after.round.candidates.changed_since(before.round.candidates)
             return "".join(_judged(after, one) for one in changed)
-        case "waiting":
+        case "waiting" if after.round is not None and after.waiting_candidate is not None:
             waiting = after.round.candidates[after.waiting_candidate]
             return f"  {waiting.label} shows f and waits for accept or reject"
         case "reduced":
@@ -77,7 +76,7 @@ def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
         return "".join(_judged(after, one) for one in changed)
     if kind == "command_refused":
         return f"not done: {after.refusal[1]}"
-    # Everything else that the user decided has its words already.
+    # All other decisions of the user carry their own words.
     if len(after.decisions) > len(before.decisions):
         return after.decisions[-1].words
     return SAID.get(kind, "")
@@ -85,12 +84,14 @@ def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
 
 def _judged(state: RunState, one: Candidate | Trial) -> str:
     tests = count(len(one.tests), "test")
-    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{_ways(state, one)}"
+    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{_endings(state, one)}"
 
 
 def baseline(state: RunState) -> str:
-    """What the baseline found, and how sure a re-run is to meet the failure."""
+    """The result of the baseline, and how likely re-runs are to show f; "" before it is finished."""
     found = state.baseline
+    if found is None:
+        return ""
     x, y, z = found.position
     failure, others = state.failure or "ending", state.other_failures
     also = f", {count(others, 'run')} failed in another way" if others else ""
@@ -101,19 +102,21 @@ def baseline(state: RunState) -> str:
     )
 
 
-def _ways(state: RunState, one: Candidate | Trial) -> str:
+def _endings(state: RunState, one: Candidate | Trial) -> str:
     """How a candidate's or a trial's tests ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
     tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
-    ways = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
-    return f" ({', '.join(f'{number} {way}' for way, number in ways.items())})" if ways else ""
+    endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
+    return f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""
 
 
 def iterations(state: RunState) -> str:
-    """How likely the re-runs of one candidate all miss f, and how many would be enough."""
+    """The chance that all runs of a candidate miss f, and how many are enough; "" before the baseline is finished."""
     found, given = state.baseline, state.scenario["reduction"]["iterations"]
-    line = f"{count(1 + given, 'run')} of a candidate miss it with chance {found.miss_chance:.2g}"
+    if found is None:
+        return ""
+    line = f"the chance that {count(1 + given, 'run')} of a candidate miss f is {found.miss_chance:.2g}"
     if found.iterations_95 > given:
-        line += f"; 95 % needs --iterations {found.iterations_95}"
+        line += f"; a 95 % chance to see f needs --iterations {found.iterations_95}"
     return line
 
 
@@ -123,7 +126,7 @@ def count(number: int, word: str) -> str:
 
 
 def first_of(names: Sequence[str], most: int) -> str:
-    """a, b and 3 more: not more than `most` of them by name."""
+    """a, b and 3 more: at most `most` of them by name."""
     left = len(names) - most
     return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
 

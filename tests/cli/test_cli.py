@@ -222,7 +222,7 @@ MISTAKES = {
     "spawn inside": (["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"], "inside model 'wall'"),
     "no spawn": (["run", DATA / "wall.sdf"], "needs --spawn x,y,z,yaw and --goal x,y"),
     "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
-    "name": (["run", WALL, "--name", "../x"], "cannot be a file's name"),
+    "name": (["run", WALL, "--name", "../x"], "is not a valid file name"),
     "no run": (["open", "nothing"], "no such run file"),
     "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),

@@ -124,7 +124,7 @@ WRONG = {
     "missing file": ({"scenarios": ("gone.yaml",)}, r"gone.yaml: no such file"),
     "pair": (
         {"pairs": "model2model"},
-        r"--pairs: 'model2model' is no pair \(did you mean model2model/.*or give 'paper'",
+        r"--pairs: 'model2model' is not a pair \(did you mean model2model/.*or give 'paper'",
     ),
     "part": (
         {"pairs": "paper,timeseg/failur-proximal"},

@@ -66,7 +66,7 @@ async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs
 NAMES = (
     ("x" * 300, "cannot be written"),
     ("a\0b", "cannot be"),
-    (".hidden", "cannot be a file's name"),
+    (".hidden", "is not a valid file name"),
     ("no/such", ""),
 )
 

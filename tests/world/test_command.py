@@ -82,7 +82,7 @@ def test_other_programs_may_start(words, tmp_path, content):
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     gone = {"oracle": Oracle(command="sh"), "folder": tmp_path / "gone"}
-    with pytest.raises(UserError, match=r"^folder: .*gone: no such folder"):
+    with pytest.raises(UserError, match=r"^folder: there is no folder .*gone to start"):
         command_words(load_scenario(DATA / "wall.yaml").model_copy(update=gone))
 
 

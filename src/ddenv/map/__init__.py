@@ -1,1 +1,1 @@
-"""The world from above, drawn without a screen: outlines of models, cells of characters, and SVG."""
+"""Top-down maps of a world, independent of any screen: outlines of models, character cells, and SVG."""

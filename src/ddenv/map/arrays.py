@@ -1,12 +1,16 @@
-"""numpy, which is loaded when something of it is first used: a first paint needs none of it, and it takes longest to load."""
+"""numpy, loaded on first use: the first paint of the workbench does not need it, and it is the slowest import."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from numpy import *  # noqa: F403
 
-def __getattr__(name: str) -> Any:
-    import numpy
+else:
 
-    value = globals()[name] = getattr(numpy, name)
-    return value
+    def __getattr__(name: str) -> Any:
+        import numpy
+
+        value = globals()[name] = getattr(numpy, name)
+        return value

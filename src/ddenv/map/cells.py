@@ -1,4 +1,4 @@
-"""The models of a world as cells of characters: half blocks of colour, or a letter for each model where there are no colours."""
+"""The models of a world as character cells: half blocks in colour, or one letter per model without colours."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from ddenv.map.paint import PLAIN, RGB, Canvas, blend, packed, readable
 from ddenv.map.raster import EMPTY, View, label_cells, masks, owners
 
 Cell = tuple[int, int]
-# One letter for so many cells can still be read; of more, one is left in each block of (rows, columns), and one of each group
-# unless even those are too many.
+# With fewer cells than `ROOM` per letter, one letter is kept in each `BLOCK` (rows, columns), and one of each group unless that
+# leaves fewer than `LEAST_ROOM` cells per letter.
 ROOM, LEAST_ROOM = 20, 4
 BLOCK = 3, 8
-# One for each model, the largest first: no S and G, which mark start and goal, and none that looks like another one.
+# One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS = "+", ".:"
 HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
 GREY: RGB = (120, 120, 124)
 FAINT = packed(GREY)
-# Anything darker or brighter could not be seen on some terminal; mean of red, green and blue.
+# Limits of brightness (mean of red, green and blue, 0..255) for visibility on all terminals.
 DARKEST, BRIGHTEST = 60.0, 225.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signs:
-    """What stands for each of N models: its `texts`, "" for none. Of each of its `groups` (N,) at least one is to be seen.
+    """The signs of N models: `texts`, "" for none. At least one sign of each of the `groups` (N,) should be visible.
 
-    Those with a lower `rank` (N,) come first; one that is `sure` (N,) is not left out for want of room.
+    Signs with a lower `rank` (N,) come first; those marked `sure` (N,) are kept even if space is short.
     """
 
     texts: Sequence[str]
@@ -39,14 +39,14 @@ class Signs:
 
 
 def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Collection[Cell] = ()) -> dict[int, Cell]:
-    """The cell where each model's sign begins, for as many models as can be read; no two share a cell.
+    """The cell where the sign of each model begins, for as many models as stay readable; no two signs overlap.
 
-    `grid` (2 rows, columns) are the owners of pixels, `centers` (N, 2) pixels of the models; `taken` cells stay free.
+    `grid` (2 rows, columns) holds the owners of pixels, `centers` (N, 2) are in pixels; `taken` cells stay free.
     """
     rows, columns = grid.shape[0] // 2, grid.shape[1]
     cells = label_cells(grid, centers)
-    told = np.array([bool(text) for text in signs.texts], dtype=bool)
-    seen = np.flatnonzero((cells[:, 0] >= 0) & told)
+    named = np.array([bool(text) for text in signs.texts], dtype=bool)
+    seen = np.flatnonzero((cells[:, 0] >= 0) & named)
     sizes = np.bincount(grid[grid >= 0], minlength=len(centers))
     seen = seen[np.lexsort((-sizes[seen], signs.rank[seen], ~signs.sure[seen]))]
     if len(seen) * ROOM > rows * columns:
@@ -55,7 +55,8 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
         if sum(len(signs.texts[index]) for index in seen[first].tolist()) * LEAST_ROOM <= rows * columns:
             kept[first] = True
         seen = seen[kept]
-    occupied, placed, missing = set(taken), {}, []
+    occupied, missing = set(taken), []
+    placed: dict[int, Cell] = {}
     for index, (row, column) in zip(seen.tolist(), cells[seen].tolist(), strict=True):
         if not _put(index, signs.texts[index], row, column, columns, occupied, placed):
             missing.append(index)
@@ -68,13 +69,13 @@ def place_signs(grid: np.ndarray, centers: np.ndarray, signs: Signs, taken: Coll
 
 
 def _readable(blocks: np.ndarray, sure: np.ndarray) -> np.ndarray:
-    """Which signs stay where there are too many: the sure ones, and the first of each block."""
-    kept = sure.copy()
+    """Which signs are kept if there are too many: the sure ones, and the first of each block."""
+    kept: np.ndarray = sure.copy()
     kept[np.unique(blocks[:, 0] << 20 | blocks[:, 1], return_index=True)[1]] = True
     return kept
 
 
-def _put(index: int, text: str, row: int, column: int, columns: int, occupied: set[Cell], placed: dict) -> bool:
+def _put(index: int, text: str, row: int, column: int, columns: int, occupied: set[Cell], placed: dict[int, Cell]) -> bool:
     column = max(0, min(column, columns - len(text)))
     own = [(row, column + offset) for offset in range(len(text))]
     if not occupied.isdisjoint(own):
@@ -84,8 +85,8 @@ def _put(index: int, text: str, row: int, column: int, columns: int, occupied: s
     return True
 
 
-def _elsewhere(index: int, text: str, grid: np.ndarray, occupied: set[Cell], placed: dict) -> bool:
-    """Puts a sign on any other cell of its model, or beside one if there is no room."""
+def _elsewhere(index: int, text: str, grid: np.ndarray, occupied: set[Cell], placed: dict[int, Cell]) -> bool:
+    """Puts a sign on another cell of its model, or beside one. Returns whether there was room."""
     rows, columns = np.nonzero((grid[0::2] == index) | (grid[1::2] == index))
     cells = list(zip(rows.tolist(), columns.tolist(), strict=True))
     beside = [(row, column + step) for row, column in cells for step in (1, -1, -len(text))]
@@ -94,7 +95,7 @@ def _elsewhere(index: int, text: str, grid: np.ndarray, occupied: set[Cell], pla
 
 
 def signs(models: Sequence[Drawn]) -> list[str]:
-    """The letter or digit of each model, or "" where they run out."""
+    """The letter or digit of each model, or "" once they run out."""
     largest = sorted(range(len(models)), key=lambda index: -models[index].outline.area)
     found = [""] * len(models)
     for index, sign in zip(largest, SIGNS, strict=False):
@@ -103,7 +104,7 @@ def signs(models: Sequence[Drawn]) -> list[str]:
 
 
 def picture(models: Sequence[Drawn], view: View, *, color: bool) -> Canvas:
-    """All models as seen in `view`, each with its sign. `PLAIN` in the canvas is the terminal's own colour."""
+    """All models in `view`, each with its sign. `PLAIN` in the canvas is the terminal's own colour."""
     canvas = Canvas(view.rows, view.columns, GREY)
     canvas.fore[:], canvas.back[:] = PLAIN, PLAIN
     outlines = [each.outline for each in models]
@@ -122,7 +123,7 @@ def picture(models: Sequence[Drawn], view: View, *, color: bool) -> Canvas:
 
 
 def _fill(each: Drawn, index: int) -> int:
-    """Floors are dull; what is low is darker than what is high, and neighbours in the order of drawing differ."""
+    """Floors are greyish; low models are darker than high ones, and models drawn one after the other differ."""
     if each.floor:
         return packed(_visible(blend(each.color, GREY, 0.6)))
     dark = 0.15 * (1 - each.shade) + 0.14 * (index % 2)
@@ -139,7 +140,7 @@ def _visible(color: RGB) -> RGB:
 
 
 def _blocks(canvas: Canvas, grid: np.ndarray, fills: Sequence[int]) -> None:
-    """Two pixels a cell; the terminal's own colour can only be behind a block, never in it."""
+    """Two pixels per cell; the terminal's own colour can only be the background of a block."""
     assert EMPTY == -1
     colors = np.array([*fills, PLAIN], dtype=np.int32)
     top, bottom = colors[grid[0::2]], colors[grid[1::2]]
@@ -153,7 +154,7 @@ def _blocks(canvas: Canvas, grid: np.ndarray, fills: Sequence[int]) -> None:
 
 
 def _letters(canvas: Canvas, grid: np.ndarray, models: Sequence[Drawn], letters: Sequence[str]) -> None:
-    """Every cell shows whose it is; of two models in one cell the one that is drawn later."""
+    """Every cell shows its model; of two models in one cell the one drawn later."""
     own = [FLOORS[index % 2] if each.floor else letters[index] or NO_SIGN for index, each in enumerate(models)]
     chars = np.array([ord(char) for char in [*own, " "]], dtype=np.uint32)
     canvas.chars[:] = chars[np.maximum(grid[0::2], grid[1::2])]

@@ -1,4 +1,4 @@
-"""What a model looks like from above: the convex outlines of its collision shapes, in the world's x and y, m."""
+"""Models from above: the convex outlines of their collision shapes in the world's x and y, m, and how they are drawn."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from ddenv.world.model import (
     World,
     is_ground,
 )
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import Pose, Vector, vector
 
-# Corners that stand for a circle on a map of characters.
+# Corners of the polygon that stands for a circle on a character map.
 ROUND = 12
 _CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 STATIC: RGB = (150, 156, 166)
 DYNAMIC: RGB = (205, 140, 70)
-# A model so many times larger than the median, and than this, is a floor that others stand on (or a roof over them).
+# A model is a floor (or a roof) if its area is `FLOOR_FACTOR` times the median, and at least `FLOOR_AREA`.
 FLOOR_FACTOR = 12.0
 FLOOR_AREA = 4.0  # m^2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footprint:
-    """A model from above: convex `polygons`, each (N, 2) m and anticlockwise; `low` and `high` are its corners, m."""
+    """A model from above: convex `polygons`, each (N, 2) m and anticlockwise, and the corners `low` and `high` around them, m."""
 
     name: str
     polygons: tuple[np.ndarray, ...]
@@ -51,24 +51,24 @@ class Footprint:
 
     @property
     def area(self) -> float:
-        """Of the rectangle around it, m^2."""
+        """The area of the rectangle around it, m^2."""
         return (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
 
     def distance(self, point: tuple[float, float]) -> float:
-        """From a point to the nearest polygon, m; 0 inside of one. Without polygons, to where the model is."""
+        """The distance from a point to the nearest polygon, m; 0 inside. Without polygons, to the model's centre."""
         if not self.polygons:
             return math.dist(self.center, point)
         return min(_distance(polygon, np.array(point)) for polygon in self.polygons)
 
 
 def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
-    """Footprints of all models but the ground, the largest first, so that small ones can be drawn on top."""
+    """Footprints of all models except the ground, the largest first, so that small ones are drawn on top."""
     prints = [footprint(model, corners) for model in world.models if not is_ground(model)]
     return tuple(sorted(prints, key=lambda each: -each.area))
 
 
 def footprint(model: Model, corners: int = ROUND) -> Footprint:
-    """Where `model` stands; one without collision shapes is a point. Circles are polygons with so many `corners`."""
+    """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners."""
     outlines = [_outline(each, corners) for each in model.collisions if not isinstance(each.shape, Plane)]
     polygons = tuple(outline for outline in outlines if len(outline))
     points = np.vstack(polygons) if polygons else np.array([model.pose.position[:2]])
@@ -81,25 +81,28 @@ def _outline(collision: Collision, corners: int) -> np.ndarray:
 
 
 def _points(shape: Shape, pose: Pose, corners: int) -> np.ndarray:
-    """Points (N, 2), relative to the shape's origin, whose convex hull is the shape seen from above."""
+    """Points (N, 2), relative to the shape's origin, whose convex hull is the shape from above."""
     circle, flat = _circle(corners), pose.rotation()[:2]
+    points: np.ndarray
     match shape:
         case Sphere(radius):
-            return radius * circle
+            points = radius * circle
         case Box(size):
-            return _CUBE * size @ flat.T
+            points = _CUBE * size @ flat.T
         case Cylinder(radius, length):
             rim = radius * circle @ flat[:, :2].T
             end = flat[:, 2] * length / 2
-            return np.vstack([rim + end, rim - end])
+            points = np.vstack([rim + end, rim - end])
         case Capsule(radius, length):
             end = flat[:, 2] * length / 2
-            return np.vstack([radius * circle + end, radius * circle - end])
+            points = np.vstack([radius * circle + end, radius * circle - end])
         case Ellipsoid(radii):
-            return _ellipse(flat * radii, circle)
+            points = _ellipse(flat * radii, circle)
         case Mesh():
-            return shape.vertices @ flat.T
-    raise TypeError(type(shape).__name__)
+            points = shape.vertices @ flat.T
+        case _:
+            raise TypeError(type(shape).__name__)
+    return points
 
 
 def _circle(corners: int) -> np.ndarray:
@@ -108,9 +111,10 @@ def _circle(corners: int) -> np.ndarray:
 
 
 def _ellipse(half_axes: np.ndarray, circle: np.ndarray) -> np.ndarray:
-    """The shadow of an ellipsoid, whose three half axes seen from above are the columns of `half_axes`."""
+    """The outline of an ellipsoid whose three half axes, from above, are the columns of `half_axes`."""
     directions, lengths, _ = np.linalg.svd(half_axes, full_matrices=False)
-    return lengths * circle @ directions.T
+    outline: np.ndarray = lengths * circle @ directions.T
+    return outline
 
 
 def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
@@ -124,9 +128,9 @@ def _distance(polygon: np.ndarray, point: np.ndarray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A model from above. `center` and `size` are those of the box around it, m; `shade` 0..1 tells low from high ones.
+    """A model to draw from above. `center` and `size` are of the box around it, m; `shade` is 0 for low, 1 for high models.
 
-    `color` is the one that covers most of it, or one for its kind where the file names none.
+    `color` covers most of it, or is the default of its kind if the file has none.
     """
 
     model: Model
@@ -144,9 +148,9 @@ class Drawn:
 
 
 def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
-    """All models but the ground: floors first, the largest of them first, then the others from the lowest top to the highest.
+    """All models except the ground in the order of drawing: floors, the largest first, then the others by height of their top.
 
-    Where tops are equal the larger comes first. Circles are polygons with so many `corners`.
+    Of equal tops the larger model comes first. Circles become polygons with `corners` corners.
     """
     models = [model for model in world.models if not is_ground(model)]
     outlines = [footprint(model, corners) for model in models]
@@ -163,26 +167,27 @@ def plan(world: World, corners: int = ROUND) -> tuple[Drawn, ...]:
 
 
 def _turn(each: Drawn) -> tuple[int, float, float]:
-    """Floors come first, and last what has no shape to be seen by; heights are told apart in steps of 1 cm."""
+    """The sort key: floors, then models with shapes, then those without; heights in steps of 1 cm."""
     group = 0 if each.floor else 1 if each.outline.polygons else 2
     return group, 0.0 if each.floor else round(each.top, 2), -each.outline.area
 
 
 def _box(model: Model) -> tuple[Vector, Vector]:
-    """Centre and size of what a model fills."""
+    """Centre and size of the box around a model, m."""
     bounds = model_bounds(model)
     if bounds is None:
         return model.pose.position, (0.0, 0.0, 0.0)
     low, high = bounds
-    return tuple(((low + high) / 2).tolist()), tuple((high - low).tolist())
+    return vector((low + high) / 2), vector(high - low)
 
 
 def _shades(tops: np.ndarray, floors: np.ndarray) -> list[float]:
-    """Heights between the lowest and the highest of the models that are no floors, as 0..1; 1 where all are as high."""
+    """Heights on a scale from the lowest (0) to the highest (1) model other than floors; 1 for all if these are equal."""
     others = tops[~floors]
     if not len(others) or np.ptp(others) < 0.01:
         return [1.0] * len(tops)
-    return np.clip((tops - others.min()) / np.ptp(others), 0.0, 1.0).tolist()
+    shades: list[float] = np.clip((tops - others.min()) / np.ptp(others), 0.0, 1.0).tolist()
+    return shades
 
 
 def _color(model: Model) -> RGB:
@@ -195,5 +200,5 @@ def _color(model: Model) -> RGB:
             red, green, blue = (round(255 * min(1.0, max(0.0, part))) for part in visual.color[:3])
             areas[red, green, blue] += float(np.prod((high - low)[:2]))
     if areas:
-        return max(areas, key=areas.get)
+        return max(areas, key=lambda color: areas[color])
     return STATIC if model.static else DYNAMIC

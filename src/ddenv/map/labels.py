@@ -1,4 +1,4 @@
-"""Where names stand on a drawing: inside large models, beside small ones, never on each other. Lengths are pixels, y downwards."""
+"""Places names on a drawing: inside large models, beside small ones, never on each other. Lengths in pixels, y downwards."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from ddenv.map.names import width
 
-SIZES = (12.0, 10.5, 9.0)
-# Of a letter, to the size of its font.
+SIZES = (12.0, 10.5, 9.0)  # of fonts, the preferred first, pixels
+# Mean width and height of a letter, relative to the font size.
 WIDTH, HEIGHT = 0.58, 1.15
 GAP = 3.0
-# So much of a name may cover other models.
+# Maximum fraction of a name that may cover other models.
 MOST_COVERED = 0.3
-# A model so many times larger than a name can bear the name of another one.
+# A model at least this many times larger than a name may carry the name of another model.
 LARGE = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """A drawn model: `box` is left, top, right and bottom; a rectangle `along` x `across`, turned by `angle`, is inside it.
+    """A drawn model: its `box` (left, top, right, bottom), and a rectangle inside it, `along` x `across`, turned by `angle`.
 
     Angles are in degrees, clockwise. A `floor` has other models on it.
     """
@@ -47,7 +47,7 @@ class Label:
 
     @property
     def length(self) -> float:
-        """About how long the text is."""
+        """The approximate length of the text."""
         return width(self.text) * WIDTH * self.size
 
     @property
@@ -60,25 +60,26 @@ class Label:
 
 
 def spot(outline: np.ndarray, frame: np.ndarray, floor: bool) -> Spot:
-    """Of a convex outline (N, 2); what is outside of `frame` has no room for a label."""
+    """The spot of a convex outline (N, 2), cut to `frame`."""
     box = np.clip(
         np.concatenate([outline.min(axis=0), outline.max(axis=0)]), np.tile(frame[:2], 2), np.tile(frame[2:], 2)
     )
     sides = np.roll(outline, -1, axis=0) - outline
     lengths = np.linalg.norm(sides, axis=1)
     dx, dy = sides[lengths.argmax()]
-    # What is round is read along the page, and nothing upside down.
+    # Names on round models are horizontal.
     angle = math.atan2(dy, dx) if lengths.max() > 0.4 * np.ptp(outline, axis=0).max() else 0.0
     angle = _upright(math.degrees(angle))
     if floor:
-        return Spot(box, *(box[2:] - box[:2]).tolist(), 0.0, floor)
+        along, across = (box[2:] - box[:2]).tolist()
+        return Spot(box, along, across, 0.0, floor)
     turn = math.radians(angle)
     along = float(np.ptp(outline @ (math.cos(turn), math.sin(turn))))
     return Spot(box, along, float(np.ptp(outline @ (-math.sin(turn), math.cos(turn)))), angle, floor)
 
 
 def _upright(angle: float) -> float:
-    """The same line in -95 .. 85 degrees: nothing is read upside down, and what stands upright from below."""
+    """The same line in -95 .. 85 degrees, so that no text is upside down and vertical text reads upwards."""
     return (angle + 95) % 180 - 95
 
 
@@ -89,10 +90,10 @@ def place_labels(
     frame: np.ndarray,
     taken: Sequence[np.ndarray] = (),
 ) -> dict[int, Label]:
-    """A label for each of the `wanted` models that has room for one, in that order.
+    """Labels for those of the `wanted` models that have room for one, placed in that order.
 
-    `spots` are all models in the order of drawing, `frame` is the drawing's left, top, right and bottom, and `taken` boxes are not
-    to be covered.
+    `spots` are all models in the order of drawing, `frame` is left, top, right and bottom of the drawing; no label covers
+    the `taken` boxes.
     """
     occupied = list(taken)
     boxes = np.array([each.box for each in spots]).reshape(-1, 4)
@@ -102,7 +103,7 @@ def place_labels(
     for index in wanted:
         others = solid.copy()
         others[index] = False
-        # What is drawn before a model is below it.
+        # Models drawn earlier lie below.
         above = others & (np.arange(len(boxes)) > index)
         small = areas < LARGE * width(names[index]) * WIDTH * HEIGHT * SIZES[-1] ** 2
         label = _best(_candidates(names[index], spots[index]), boxes[above], boxes[others & small], frame, occupied)
@@ -112,8 +113,14 @@ def place_labels(
     return placed
 
 
-def _best(candidates: Iterable[Label], above, others, frame, occupied) -> Label | None:
-    """The first label that covers nothing, or else the one that covers least."""
+def _best(
+    candidates: Iterable[Label],
+    above: np.ndarray,
+    others: np.ndarray,
+    frame: np.ndarray,
+    occupied: Sequence[np.ndarray],
+) -> Label | None:
+    """The first label that covers nothing, else the one that covers least; None if all cover too much."""
     best, least = None, MOST_COVERED
     for label in candidates:
         own = label.box
@@ -137,8 +144,8 @@ def _candidates(name: str, spot: Spot) -> Iterator[Label]:
             for corner_y in (top + high / 2, bottom - high / 2):
                 for corner_x in (left + long / 2, right - long / 2, x):
                     yield Label(name, corner_x, corner_y, size, 0.0, True)
-        ways = [(spot.angle, spot.along, spot.across), (_upright(spot.angle + 90), spot.across, spot.along)]
-        for angle, room, rest in sorted(ways, key=lambda way: abs(way[0]) > 45):
+        fits = [(spot.angle, spot.along, spot.across), (_upright(spot.angle + 90), spot.across, spot.along)]
+        for angle, room, rest in sorted(fits, key=lambda fit: abs(fit[0]) > 45):
             if long <= room and high <= rest:
                 yield Label(name, x, y, size, angle, True)
     for size in SIZES:
@@ -150,8 +157,9 @@ def _candidates(name: str, spot: Spot) -> Iterator[Label]:
 
 
 def _shared(box: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The area that a box has in common with each of `others` (N, 4)."""
+    """The areas of overlap of a box with each of `others` (N, 4)."""
     if not len(others):
         return np.zeros(1)
     sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
-    return np.prod(np.maximum(sides, 0.0), axis=1)
+    areas: np.ndarray = np.prod(np.maximum(sides, 0.0), axis=1)
+    return areas

@@ -1,4 +1,4 @@
-"""Names from anyone's file, made fit for a place: what they are wide, and how they are shortened."""
+"""The width of names on a terminal, and names shortened or padded to a width."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ddenv.errors import printable
 
 
 def width(text: str) -> int:
-    """Columns that `text` takes on a terminal."""
+    """The number of terminal columns that `text` takes."""
     return sum(_width(char) for char in text)
 
 
@@ -19,7 +19,7 @@ def _width(char: str) -> int:
 
 
 def shortened(name: str, columns: int) -> str:
-    """`name` without control characters, at most so many columns wide. Copies of one model differ at the ends of their names."""
+    """`name` without control characters, cut in its middle to `columns`: names of copies differ at their ends."""
     name = printable(name)
     if width(name) <= columns:
         return name
@@ -33,5 +33,5 @@ def shortened(name: str, columns: int) -> str:
 
 
 def padded(text: str, columns: int) -> str:
-    """`text` with spaces up to so many columns."""
+    """`text` filled with spaces to `columns`."""
     return text + " " * (columns - width(text))

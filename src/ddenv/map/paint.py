@@ -1,15 +1,16 @@
-"""Layers of a map as arrays of cells: characters and colours, put on top of each other, then cut into runs."""
+"""The layers of a map as arrays of character cells with colours, drawn on top of each other, then cut into styled runs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import overload
 
 from ddenv.map import arrays as np
 
 RGB = tuple[int, int, int]
-# Eight hues that stay apart for colour-blind eyes as far as eight can; parts beyond H repeat them, their letters do not.
+# Eight hues, as distinct as possible for colour-blind readers; partitions beyond H repeat the hues, but not the letters.
 HUES: tuple[RGB, ...] = (
     (86, 180, 233),
     (240, 160, 40),
@@ -20,29 +21,29 @@ HUES: tuple[RGB, ...] = (
     (140, 140, 250),
     (150, 200, 90),
 )
-# Packed colour that stands for the terminal's own, and what is added to the number of one of its sixteen.
+# The packed colour of the terminal's default, and the offset of packed numbers 0..15 of the terminal's palette.
 PLAIN, NUMBERED = -1, 1 << 24
 BLACK, WHITE = 0x000000, 0xFFFFFF
-# So much brighter or darker than its ground a dot must be, of 255.
+# Minimum difference in brightness between a dot and its background, of 255.
 LEAST_APART = 70
-# Blocks that fill their cells, whatever is behind them: what is put over them stands on their own colour.
+# Blocks that fill their cells: text over them takes their colour as background.
 FILLED = tuple(map(ord, "█▉▇"))
 _BRIGHT = frozenset({2, 3, 6, 7, 10, 11, 13, 14, 15})
 
 
 def blend(back: RGB, front: RGB, amount: float) -> RGB:
-    """`amount` 0 gives `back`, 1 gives `front`."""
+    """The colour between `back` (`amount` 0) and `front` (1)."""
     red, green, blue = (round(b + (f - b) * amount) for b, f in zip(back, front, strict=True))
     return red, green, blue
 
 
 def packed(color: RGB) -> int:
-    """One number for a colour, as the arrays hold it."""
+    """The colour as one number, 0xRRGGBB."""
     return color[0] << 16 | color[1] << 8 | color[2]
 
 
 def readable(back: int) -> int:
-    """Black or white, whichever reads better on a packed colour; on the terminal's own, its own."""
+    """Black or white, whichever is more readable on a packed colour; the terminal's default on its own default."""
     if back < 0:
         return PLAIN
     if back >= NUMBERED:
@@ -51,7 +52,7 @@ def readable(back: int) -> int:
 
 
 def _apart(backs: np.ndarray, color: int) -> np.ndarray:
-    """`color` on each of the packed colours, or black or white on those that are too near to it."""
+    """`color` for each of the packed colours `backs`, or black or white if `color` is too similar."""
     colors = np.full(len(backs), color, dtype=np.int32)
     if not 0 <= color < NUMBERED:
         return colors
@@ -62,14 +63,22 @@ def _apart(backs: np.ndarray, color: int) -> np.ndarray:
     return colors
 
 
+@overload
+def luminance(color: int) -> float: ...
+
+
+@overload
+def luminance(color: np.ndarray) -> np.ndarray: ...
+
+
 def luminance(color: int | np.ndarray) -> float | np.ndarray:
-    """How bright a packed colour is, or each of many, 0..255."""
+    """The brightness of a packed colour, or of an array of them, 0..255."""
     return 0.3 * (color >> 16) + 0.59 * (color >> 8 & 255) + 0.11 * (color & 255)
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Neighbouring characters of one row that look alike; `fore` and `back` are packed colours."""
+    """Consecutive characters of one row in one style; `fore` and `back` are packed colours."""
 
     text: str
     fore: int
@@ -94,7 +103,7 @@ class Canvas:
         return twin
 
     def put(self, cell: tuple[int, int] | None, text: str, color: int | None = None, back: int | None = None) -> None:
-        """Bold `text` from a cell (row, column) on; without a colour, one that can be read there."""
+        """Puts bold `text` from a cell (row, column) on; without `color` in a readable one."""
         if cell is None:
             return
         row, column = cell
@@ -109,7 +118,7 @@ class Canvas:
             self.bold[place] = True
 
     def dots(self, bits: np.ndarray, color: int) -> None:
-        """Braille dots over whatever fills their cells, in black or white where their colour could not be told from it."""
+        """Puts braille dots over the cells, in black or white where `color` would not stand out."""
         touched = bits > 0
         filled = touched & np.isin(self.chars, FILLED)
         self.back[filled] = self.fore[filled]
@@ -118,7 +127,7 @@ class Canvas:
         self.bold[touched] = False
 
     def changed_rows(self, other: Canvas | None) -> list[int]:
-        """The rows in which this differs from `other`."""
+        """The rows that differ from `other`."""
         if other is None or other.chars.shape != self.chars.shape:
             return list(range(self.chars.shape[0]))
         same = (
@@ -127,11 +136,13 @@ class Canvas:
             & (self.back == other.back)
             & (self.bold == other.bold)
         )
-        return np.flatnonzero(~same.all(axis=1)).tolist()
+        rows: list[int] = np.flatnonzero(~same.all(axis=1)).tolist()
+        return rows
 
     def text(self, row: int) -> str:
         """A row without its colours."""
-        return self.chars[row].tobytes().decode("utf-32-le")
+        text: str = self.chars[row].tobytes().decode("utf-32-le")
+        return text
 
     def runs(self, row: int) -> Iterator[Run]:
         """A row as text, cut where the style changes."""

@@ -1,7 +1,7 @@
-"""Geometry to character cells: which model fills which half block, and which braille dots a path touches. Pure.
+"""From metres to character cells: the view of a map, the model in each half block, and the braille dots of a path.
 
-A cell is taken as twice as high as it is wide, so a half block is a square pixel, and metres keep their proportions.
-Rows count downwards from the top of the map, which is the greatest y; columns count from the left, the least x.
+A cell is assumed to be twice as high as wide, so a half block is a square pixel and proportions are kept. Rows count
+downwards from the top of the map, the largest y; columns count from the left, the smallest x.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from ddenv.map import arrays as np
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
-# So much of a pixel may the middle of one be outside of an outline's edge, and still be filled.
+# Tolerance of the fill test at the edges of outlines, pixels.
 SLACK = 1e-9
-EMPTY = -1
+EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
 DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
 ARROWS = "→↗↑↖←↙↓↘"
-# No closer and no farther than this, whatever is asked for, m for one pixel.
+# Limits of the scale, m per pixel.
 FINEST, COARSEST = 0.002, 1e6
-MOST_PIXELS = 2_000_000
+MOST_PIXELS = 2_000_000  # painted at a time
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What a map of `columns` x `rows` cells shows: `x`, `y` is its centre in m, `scale` is m for one pixel."""
+    """The part of the world on a map of `columns` x `rows` cells: its centre `x`, `y` in m, and `scale` in m per pixel."""
 
     x: float
     y: float
@@ -39,13 +39,13 @@ class View:
     rows: int
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
-        """(N, 2) m to (N, 2) pixels: column and half row, fractions kept."""
+        """Points (N, 2) m to (N, 2) pixels: column and half row, as fractions."""
         left = self.x - self.columns * self.scale / 2
         top = self.y + self.rows * self.scale
         return np.column_stack([(points[:, 0] - left) / self.scale, (top - points[:, 1]) / self.scale])
 
     def cell(self, x: float, y: float) -> tuple[int, int] | None:
-        """Row and column of the cell that holds (x, y), or None outside the map."""
+        """Row and column of the cell at (x, y) m; None outside the map."""
         column, half = self.pixels(np.array([[x, y]]))[0]
         if not (0 <= column < self.columns and 0 <= half < 2 * self.rows):
             return None
@@ -60,18 +60,18 @@ class View:
         )
 
     def zoomed(self, factor: float, about: tuple[float, float] | None = None) -> View:
-        """`factor` times closer; the point `about` (m) stays where it is seen, else the centre does."""
+        """The view `factor` times closer; the point `about` (m), by default the centre, stays in place."""
         scale = min(COARSEST, max(FINEST, self.scale / factor))
         x, y = about or (self.x, self.y)
         part = scale / self.scale
         return View(x + (self.x - x) * part, y + (self.y - y) * part, scale, self.columns, self.rows)
 
     def around(self, x: float, y: float) -> View:
-        """As close, with (x, y) m in the middle."""
+        """The view at the same scale, centred on (x, y) m."""
         return View(x, y, self.scale, self.columns, self.rows)
 
     def panned(self, columns: float, rows: float) -> View:
-        """So many cells to the right and upwards."""
+        """The view moved by `columns` to the right and `rows` upwards."""
         return self.around(self.x + columns * self.scale, self.y + 2 * rows * self.scale)
 
 
@@ -82,7 +82,7 @@ def fit(
     rows: int,
     margin: float = 1.0,
 ) -> View:
-    """A view of everything that matters (see `extent`), with `margin` m around it."""
+    """A view of everything relevant (see `extent`), with a margin in m around it."""
     low, high = extent(prints, points)
     low, high = low - margin, high + margin
     scale = max((high[0] - low[0]) / max(1, columns), (high[1] - low[1]) / max(1, 2 * rows), FINEST)
@@ -90,13 +90,13 @@ def fit(
 
 
 def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner of all `points` and of the models, but of huge ones, m. Of nothing it is 10 m around zero.
+    """Lowest and highest corner of all `points` and of the models except huge ones, m; 10 m around zero for nothing.
 
-    Huge is a model several times larger than the area that the points and the other models span.
+    A model is huge if it is several times larger than the area that the points and the smaller models span.
     """
     corners = np.array([point for point in points if len(point)], dtype=float).reshape(-1, 2)
     boxes = np.array([(*each.low, *each.high, each.area) for each in prints], dtype=float).reshape(-1, 5)
-    # Small models first: each one decides with those before it whether the next is huge.
+    # Sorted by size: each model and those before it decide whether the next is huge.
     boxes = boxes[np.argsort(boxes[:, 4], kind="stable")]
     least, most = corners.min(axis=0, initial=math.inf), corners.max(axis=0, initial=-math.inf)
     lows = np.minimum.accumulate(np.vstack([least, boxes[:, :2]]))
@@ -113,9 +113,9 @@ def extent(prints: Sequence[Footprint], points: Iterable[tuple[float, float]]) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlines:
-    """The polygons of all models one after another: `corners` (M, 2) m; polygon p has `counts[p]` of them from `first[p]` on.
+    """The polygons of all models in flat arrays: polygon p has `counts[p]` of the `corners` (M, 2) m, from `first[p]` on.
 
-    `models[p]` is the model of polygon p. Of each model `centers` (N, 2) m, `areas` (N,) m^2, and whether it is `bare` of polygons.
+    `models[p]` is the model of polygon p. Per model: `centers` (N, 2) m, `areas` (N,) m^2, and `bare` (N,) if it has none.
     """
 
     corners: np.ndarray
@@ -129,9 +129,9 @@ class Outlines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spans:
-    """Runs of pixels in a grid that is read row by row: `lengths[i]` pixels from `starts[i]` on belong to `models[i]`.
+    """Runs of pixels in a grid in row-major order: `lengths[i]` pixels from `starts[i]` on belong to `models[i]`.
 
-    They are in the order of the models, of which there are `count`.
+    They are sorted by model; there are `count` models.
     """
 
     models: np.ndarray
@@ -141,7 +141,7 @@ class Spans:
 
 
 def pack(prints: Sequence[Footprint]) -> Outlines:
-    """Footprints as arrays, which can be drawn again and again."""
+    """Footprints as arrays, for repeated drawing."""
     polygons = [(index, polygon) for index, each in enumerate(prints) for polygon in each.polygons if len(polygon)]
     counts = np.array([len(polygon) for _, polygon in polygons], dtype=np.intp)
     return Outlines(
@@ -156,15 +156,15 @@ def pack(prints: Sequence[Footprint]) -> Outlines:
 
 
 def masks(prints: Sequence[Footprint], view: View) -> Spans:
-    """The pixels that each model fills, in a grid of (2 rows, columns)."""
+    """The pixels of each model, in a grid of (2 rows, columns)."""
     return spans(pack(prints), view)
 
 
 def spans(outlines: Outlines, view: View) -> Spans:
-    """The same of models that are packed already."""
+    """The pixels of each model of packed outlines."""
     width, height = view.columns, 2 * view.rows
     polygon, row, left, right = rows_of(view.pixels(outlines.corners), outlines, width, height)
-    # A model smaller than a pixel still shows.
+    # A model smaller than a pixel stays visible.
     tiny = np.flatnonzero((outlines.areas < 4 * view.scale**2) | outlines.bare)
     middle = view.pixels(outlines.centers[tiny])
     seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
@@ -177,9 +177,9 @@ def spans(outlines: Outlines, view: View) -> Spans:
 
 
 def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) -> tuple[np.ndarray, ...]:
-    """Polygon, row, first and last column of each row of pixels inside a polygon; `corners` are those of `outlines` in pixels.
+    """Polygon, row, first and last column of each row of pixels in a polygon; `corners` are those of `outlines` in pixels.
 
-    A pixel is inside where its middle is.
+    A pixel belongs to a polygon if its centre is inside.
     """
     if not len(outlines.first):
         return (np.zeros(0, dtype=np.intp),) * 4
@@ -200,8 +200,16 @@ def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) ->
     return polygon[filled], row[filled], left[filled].astype(np.intp), right[filled].astype(np.intp)
 
 
-def _cut(corners: np.ndarray, outlines: Outlines, edge: int, polygon, ys, left, right) -> None:
-    """Moves `left` and `right` of all rows (at `ys`) to the inner side of this edge of their polygons."""
+def _cut(
+    corners: np.ndarray,
+    outlines: Outlines,
+    edge: int,
+    polygon: np.ndarray,
+    ys: np.ndarray,
+    left: np.ndarray,
+    right: np.ndarray,
+) -> None:
+    """Narrows `left` and `right` of all rows (at `ys`) to the inner side of edge number `edge` of their polygons."""
     some = np.flatnonzero(outlines.counts[polygon] > edge)
     own = polygon[some]
     start = outlines.first[own]
@@ -220,7 +228,7 @@ def _cut(corners: np.ndarray, outlines: Outlines, edge: int, polygon, ys, left, 
 
 
 def owners(filled: Spans, view: View, drawn: Iterable[int] | None = None) -> np.ndarray:
-    """The model on each pixel, shape (2 rows, columns): of the `drawn` ones (or all) that fill it the last, else EMPTY."""
+    """The model on each pixel, shape (2 rows, columns): the last of the `drawn` ones (default all) that fill it, else EMPTY."""
     grid = np.full(2 * view.rows * view.columns, EMPTY, dtype=np.int32)
     models, starts, lengths = filled.models, filled.starts, filled.lengths
     if drawn is not None:
@@ -229,21 +237,21 @@ def owners(filled: Spans, view: View, drawn: Iterable[int] | None = None) -> np.
         some = wanted[models]
         models, starts, lengths = models[some], starts[some], lengths[some]
     ends = np.cumsum(lengths)
-    # Large models on top of each other are many pixels: a part of them at a time.
+    # Large overlapping models have many pixels: paint a limited number at a time.
     cuts = np.searchsorted(ends, np.arange(0, ends[-1] if len(ends) else 0, MOST_PIXELS))
     for start, stop in pairwise([*np.unique(cuts).tolist(), len(ends)]):
         part = slice(start, stop)
         first = ends[part] - lengths[part]
         pixels = np.arange(first[0], ends[stop - 1]) + np.repeat(starts[part] - first, lengths[part])
-        # Of several values for one pixel the last one stays.
+        # The last of several values for one pixel is kept.
         grid[pixels] = np.repeat(models[part], lengths[part])
     return grid.reshape(2 * view.rows, view.columns)
 
 
 def label_cells(grid: np.ndarray, centers: np.ndarray) -> np.ndarray:
-    """The cell (row, column) for each model's letter, shape (N, 2): of those it fills, the one nearest to its centre (pixels).
+    """The cell (row, column) for the letter of each model, shape (N, 2): the filled cell nearest to its centre (pixels).
 
-    One that fills no cell takes an upper half, or else a lower one; -1 where it is not seen.
+    A model that fills no cell takes one whose upper, or else lower, half it fills; -1 if it is not visible.
     """
     upper, lower = grid[0::2], grid[1::2]
     cells = _nearest(np.where(upper == lower, upper, EMPTY), centers)
@@ -259,16 +267,16 @@ def _nearest(owned: np.ndarray, centers: np.ndarray) -> np.ndarray:
     rows, columns = np.nonzero(owned != EMPTY)
     who = owned[rows, columns]
     away = (columns + 0.5 - centers[who, 0]) ** 2 + (2 * rows + 1 - centers[who, 1]) ** 2
-    # The last of several values stays: that is the nearest, and of equally near ones the first.
+    # The last of several values is kept: the nearest cell, and the first of equally near ones.
     order = np.argsort(away, kind="stable")[::-1]
     cells[who[order]] = np.column_stack([rows[order], columns[order]])
     return cells
 
 
 def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
-    """The braille bits of each cell that the polyline through (N, 2) points in m touches, shape (rows, columns), uint8.
+    """The braille bits of each cell on the polyline through `points` (N, 2) m, shape (rows, columns), uint8.
 
-    With `dash` so many dots are left out after as many.
+    `dash` is the number of dots drawn and then skipped in turn; 0 draws all.
     """
     cells = np.zeros((view.rows, view.columns), dtype=np.uint8)
     points = points[np.isfinite(points).all(axis=1)]
@@ -285,8 +293,8 @@ def braille(points: np.ndarray, view: View, dash: int = 0) -> np.ndarray:
 
 
 def _dense(dots: np.ndarray) -> np.ndarray:
-    """Whole dots along a polyline, without gaps."""
-    # What is far outside cannot be seen, and would only make the line long.
+    """The integer dots along a polyline, without gaps."""
+    # Points far outside are invisible, and would only make the line long.
     dots = np.clip(dots, -4000, 4000)
     steps = np.abs(np.diff(dots, axis=0)).max(axis=1) if len(dots) > 1 else np.zeros(0)
     counts = np.maximum(1, np.ceil(steps).astype(int))

@@ -1,4 +1,4 @@
-"""The map of a world as one SVG file that needs nothing else: for reports, slides and browsers."""
+"""The map of a world as one self-contained SVG file, for reports, slides and browsers."""
 
 from __future__ import annotations
 
@@ -18,16 +18,14 @@ from ddenv.map.raster import extent
 from ddenv.world.extent import convex_hull
 from ddenv.world.model import World, is_ground
 
-# Pixels: the most that the map itself takes, and what stands around it.
+# Maximum width and height and minimum width of the map, and its margins, pixels.
 WIDEST, HIGHEST, NARROWEST = 1100.0, 780.0, 360.0
 LEFT, TOP, RIGHT, BOTTOM = 64.0, 72.0, 28.0, 92.0
-CORNERS = 48
-# At least so much of the world is drawn along each axis, m.
-LEAST = 4.0
+CORNERS = 48  # of the polygon that stands for a circle
+LEAST = 4.0  # minimum extent of the world along each axis, m
 MOST_LABELS = 60
-LONGEST_LABEL = 26
-# Half the size of what marks a model without shapes.
-CROSS = 4
+LONGEST_LABEL = 26  # columns
+CROSS = 4  # half the size of the mark of a model without shapes, pixels
 WHITE: RGB = (255, 255, 255)
 BLACK: RGB = (0, 0, 0)
 INK, FAINT, GRID = "#24292f", "#6e7781", "#e7eaee"
@@ -40,7 +38,7 @@ def svg_map(
 ) -> str:
     """The world from above, without its ground.
 
-    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they are to be marked; all finite.
+    If given, marks `spawn`, x, y (m) and yaw (rad), and `goal`, x, y (m); all finite.
     """
     models = plan(world, CORNERS)
     points = [point[:2] for point in (spawn, goal) if point is not None]
@@ -70,7 +68,7 @@ def svg_map(
 def _frame(models: Sequence[Drawn], points: Sequence[tuple[float, float]]) -> Frame:
     low, high = extent([each.outline for each in models], points)
     margin = max(0.3, 0.04 * float(max(high - low)))
-    # A single crate does not fill the page.
+    # A single crate must not fill the page.
     margin = np.maximum(margin, (LEAST - (high - low)) / 2)
     low, high = low - margin, high + margin
     scale = min(WIDEST / (high[0] - low[0]), HIGHEST / (high[1] - low[1]))
@@ -83,16 +81,16 @@ def _frame(models: Sequence[Drawn], points: Sequence[tuple[float, float]]) -> Fr
 def _head(world: World, models: Sequence[Drawn]) -> Iterator[str]:
     moving = sum(not each.model.static for each in models)
     grounds = sum(is_ground(model) for model in world.models)
-    told = [f"{len(models)} model" + "s" * (len(models) != 1)]
-    told += [f"{moving} dynamic"] if moving else []
-    told += ["ground not drawn"] if grounds else []
+    parts = [f"{len(models)} model" + "s" * (len(models) != 1)]
+    parts += [f"{moving} dynamic"] if moving else []
+    parts += ["ground not drawn"] if grounds else []
     name = _text(shortened(world.path.name, 48))
     yield f'<text x="{LEFT:.0f}" y="34" font-size="20" font-weight="600" fill="{INK}">{name}</text>'
-    yield f'<text x="{LEFT:.0f}" y="56" font-size="13" fill="{FAINT}">{" · ".join(told)}</text>'
+    yield f'<text x="{LEFT:.0f}" y="56" font-size="13" fill="{FAINT}">{" · ".join(parts)}</text>'
 
 
 def _axes(frame: Frame) -> Iterator[str]:
-    """Grid lines with their numbers, and what the axes are."""
+    """Grid lines with their numbers, and the names of the axes."""
     left, top, right, bottom = frame.box
     step = tick_step(max(frame.high - frame.low), 16)
     yield f'<g font-size="12" fill="{FAINT}" stroke-width="1">'
@@ -111,7 +109,7 @@ def _axes(frame: Frame) -> Iterator[str]:
 
 
 def _grid(value: float) -> str:
-    """The axes themselves stand out."""
+    """The colour of a grid line; the axes themselves stand out."""
     return "#c4cad1" if value == 0 else GRID
 
 
@@ -119,14 +117,14 @@ def _model(each: Drawn, frame: Frame) -> str:
     fill = _fill(each)
     edge = blend(fill, BLACK, 0.45)
     dashes = "" if each.model.static else ' stroke-dasharray="5 3"'
-    # Models of many small parts would be all outline.
+    # Models with many small parts would be all outline.
     thick = 1.4 if dashes else 0.5 if len(each.outline.polygons) > 8 else 1.0
     style = f'fill="{_hex(fill)}" fill-opacity="0.92" stroke="{_hex(edge)}" stroke-width="{thick}"{dashes}'
     return f"<g {style}><title>{_tooltip(each)}</title>{_drawn(each, frame)}</g>"
 
 
 def _drawn(each: Drawn, frame: Frame) -> str:
-    """One path with all its polygons; a model that fills nothing is a small cross."""
+    """One path of all polygons; a model without shapes is a small cross."""
     polygons = [_path(frame.pixels(polygon)) for polygon in each.outline.polygons]
     if polygons:
         return f'<path d="{"".join(polygons)}"/>'
@@ -136,8 +134,10 @@ def _drawn(each: Drawn, frame: Frame) -> str:
 
 
 def _cross(each: Drawn, frame: Frame) -> np.ndarray:
-    """The corners around the sign of a model without shapes, pixels."""
-    return frame.pixels(np.array([each.outline.center])) + CROSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    """The corners of the cross of a model without shapes, pixels."""
+    corners: np.ndarray = CROSS * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    placed: np.ndarray = frame.pixels(np.array([each.outline.center])) + corners
+    return placed
 
 
 def _path(corners: np.ndarray) -> str:
@@ -145,7 +145,7 @@ def _path(corners: np.ndarray) -> str:
 
 
 def _fill(each: Drawn) -> RGB:
-    """Floors are light, and what is low is paler than what is high."""
+    """Floors are light, and low models are paler than high ones."""
     return blend(WHITE, each.color, 0.2 if each.floor else 0.6 + 0.25 * each.shade)
 
 
@@ -177,7 +177,7 @@ def _spot(each: Drawn, frame: Frame) -> Spot:
 
 
 def _label(label: Label, each: Drawn) -> str:
-    """A name on a ground of its own, so that neither thin outlines nor neighbours make it hard to read."""
+    """A name on its own background, so that outlines and neighbours do not make it hard to read."""
     fill = _fill(each) if label.inside else WHITE
     color = f"#{readable(packed(fill)):06x}"
     long, high = 1.04 * label.length, HEIGHT * label.size
@@ -190,7 +190,9 @@ def _label(label: Label, each: Drawn) -> str:
     )
 
 
-def _marks(frame: Frame, spawn, goal) -> Iterator[str]:
+def _marks(
+    frame: Frame, spawn: tuple[float, float, float] | None, goal: tuple[float, float] | None
+) -> Iterator[str]:
     if spawn is not None:
         x, y = frame.pixels(np.array([spawn[:2]]))[0]
         yield (
@@ -200,8 +202,8 @@ def _marks(frame: Frame, spawn, goal) -> Iterator[str]:
         )
     if goal is not None:
         x, y = frame.pixels(np.array([goal]))[0]
-        told = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
-        yield f'<g transform="translate({x:.1f} {y:.1f})">{told}{_badge("G", GOAL)}</g>'
+        title = f"<title>goal ({goal[0]:g}, {goal[1]:g}) m</title>"
+        yield f'<g transform="translate({x:.1f} {y:.1f})">{title}{_badge("G", GOAL)}</g>'
 
 
 def _badge(sign: str, color: str) -> str:
@@ -212,7 +214,7 @@ def _badge(sign: str, color: str) -> str:
 
 
 def _foot(frame: Frame, models: Sequence[Drawn]) -> Iterator[str]:
-    """The scale bar, and what the outlines mean."""
+    """The scale bar and the legend of outlines."""
     left, _, right, bottom = frame.box
     y = bottom + 68
     step = tick_step(frame.high[0] - frame.low[0], 6)

@@ -1,1 +1,1 @@
-"""From what a user chose to a run file and the programs that work on it; and back to files."""
+"""From the user's choices to a run file and the programs that work on it, and export back to files."""

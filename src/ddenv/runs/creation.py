@@ -1,4 +1,4 @@
-"""Run files: how one is made from a scenario, and what it was made from."""
+"""Creates run files from scenarios, and reads scenario, world and robot back from them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
 
-# How the names of documents begin that were read of other files.
+# Prefix of the names of documents that hold other files.
 RESOURCE = "resource "
 
 
 def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | None = None) -> World:
-    """Writes a new run file that holds all a reduction needs; returns its world. Raises UserError, with nothing written.
+    """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written.
 
-    `tell` is called with a line before something that takes longer.
+    `tell` is called with a line of text before slow steps.
     """
     world, _ = load_parts(scenario, tell)
     documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
@@ -37,10 +37,9 @@ def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | Non
 
 
 def create_like(run: Path, scenario: Scenario, path: Path) -> None:
-    """Writes a new run file at `path` for the world and the robot that `run` holds, with another `scenario` for them.
+    """Writes a new run file at `path` with the world and the robot of `run`, and another `scenario`.
 
-    Nothing else is read: neither the world's own file nor the robot's need be there any more. Raises UserError, with nothing
-    written.
+    The original files of world and robot are not needed. Raises UserError, with nothing written.
     """
     with RunFile(run) as file:
         _, world, robot = read_parts(file)
@@ -53,12 +52,12 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
-    """What a run file was made from: its scenario, its world and its robot."""
+    """The scenario, world and robot of a run file. Raises UserError."""
     try:
         scenario = Scenario.model_validate_json(run.document("scenario"))
     except ValueError:
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
-    # Whatever a run file says, nothing else on this machine is opened for it.
+    # Never opens another file, whatever the run file says.
     stored = Stored(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
     robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)

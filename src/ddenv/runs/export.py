@@ -1,4 +1,4 @@
-"""The world that a run has left, as files: its SDF text, and a scenario that runs the robot in it."""
+"""Exports the minimal environment of a run: as SDF, and with a scenario that runs the robot in it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from ddenv.world.write import without
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """The files that were written, and the URIs of other files that the written world names."""
+    """The written files, and the URIs of other files that the written world needs."""
 
     files: list[Path]
     needs: list[str]
 
 
 class _Asked:
-    """Stored resources that keep in `names` what was asked of them: each URI with the folder of the file that names it."""
+    """Stored resources that record requests in `names`: each URI with the folder of the file that contains it."""
 
     def __init__(self, stored: Stored) -> None:
         self.taken = stored.taken
@@ -47,7 +47,7 @@ class _Asked:
 
 
 def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
-    """Writes the environment that a run has left as an SDF world, and a scenario for it. Raises UserError."""
+    """Writes the current environment of a run as an SDF world, and a scenario for it if asked. Raises UserError."""
     with RunFile(run) as file:
         scenario, world, _ = read_parts(file)
         robot, stored = file.document("robot"), Stored(file.documents(RESOURCE))
@@ -69,7 +69,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
     write_file(model, robot)
     data = scenario.model_dump(mode="json")
     folder = scenario_file.parent.resolve()
-    # Only programs of the user's own are searched there.
+    # The folder is only searched for the user's own programs.
     if scenario.oracle is None and ":" not in scenario.controller.use:
         del data["folder"]
     else:
@@ -84,7 +84,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
 
 
 def _name(path: Path, folder: Path) -> str:
-    """What `path` is called in a scenario of `folder`: relative if it goes along when that folder is moved."""
+    """`path` as written in a scenario in `folder`: relative if it lies in that folder, so that the folder can be moved."""
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
@@ -94,20 +94,20 @@ def _suffix(robot: Path) -> str:
 
 
 def _packages(file: Path, robot: bytes) -> list[Path]:
-    """The folders around the robot's file that it names as packages."""
+    """The folders above the robot's file that it refers to as packages."""
     around = (folder for folder in file.absolute().parents if folder.name and folder.is_dir())
     return [folder for folder in around if f"package://{folder.name}/".encode() in robot]
 
 
 def _renamed(protected: tuple[str, ...], world: World, removed: frozenset[str], minimal: World) -> list[str]:
-    """The names that protected models have in the minimal world: copies of one name are numbered by their order."""
+    """The names of protected models in the minimal world, where copies of one name are numbered anew."""
     kept = [model.name for model in world.models if model.name not in removed]
     names = dict(zip(kept, (model.name for model in minimal.models), strict=True))
     return [names[name] for name in protected]
 
 
 def _folders(scenario: Scenario, asked: _Asked, robot: bytes, stored: Stored) -> list[Path]:
-    """The folders of the original world and robot, as far as something that is named in these is found only there."""
+    """Those folders of the original world and robot that the exported files still need."""
     file = scenario.robot.model
     asked_by_robot = _Asked(stored)
     parse_model(robot, file, scenario.reading, asked_by_robot)
@@ -116,7 +116,7 @@ def _folders(scenario: Scenario, asked: _Asked, robot: bytes, stored: Stored) ->
 
 
 def _leans_on(folder: Path, uri: str, base: Path) -> bool:
-    """Whether `uri`, named in a file of `base`, is relative to the world in `folder`, or a model beside it."""
+    """Whether `uri`, in a file of the folder `base`, is found relative to `folder`."""
     if "://" not in uri:
         return base == folder and not uri.strip().startswith("/")
     folder = folder.resolve()

@@ -1,4 +1,4 @@
-"""The names of runs, and the folder where they are: all that is needed before a run is read."""
+"""Names and paths of run files."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import platformdirs
 from ddenv.errors import UserError
 
 SUFFIX = ".ddenv"
-# Bytes of a run's name, which leaves room for a number and for the names of the files beside it.
+# Maximum length of a run's name, bytes: leaves room for a number and for the suffixes of the files beside it.
 LONGEST_STEM = 180
 
 
 def runs_folder() -> Path:
-    """Where runs are kept unless a path is given: `$DDENV_HOME/runs`, or the user's data folder."""
+    """The default folder of runs: `$DDENV_HOME/runs`, or in the user's data folder."""
     home = os.environ.get("DDENV_HOME")
     return (Path(home) if home else Path(platformdirs.user_data_dir("ddenv", appauthor=False))) / "runs"
 
@@ -35,7 +35,7 @@ def free_run_path(scenario_name: str) -> Path:
 
 def _free(folder: Path, scenario_name: str) -> Path:
     stem = "".join(char if char.isalnum() or char in "-_" else "-" for char in scenario_name)
-    # A name of 80 letters can have four bytes for each, which no file system takes.
+    # 80 letters of four bytes each are too long for file systems.
     stem = stem.encode()[:LONGEST_STEM].decode(errors="ignore")
     number = 1
     while (path := folder / f"{stem}-{number}{SUFFIX}").exists():
@@ -46,7 +46,7 @@ def _free(folder: Path, scenario_name: str) -> Path:
 def run_path(scenario_name: str, name: str | None, output: Path | None) -> Path:
     """Where a new run is written: `output` (a .ddenv file or a folder), or in the runs folder. Raises UserError."""
     if name is not None and (not name.strip() or any(char in name for char in "/\\\0") or name.startswith(".")):
-        raise UserError(f"--name: '{name}' cannot be a file's name; use letters, digits, - and _")
+        raise UserError(f"--name: '{name}' is not a valid file name; use letters, digits, - and _")
     name = None if name is None else name.removesuffix(SUFFIX)
     if output is None or output.suffix in (".sdf", ".world"):
         if output is not None and not output.parent.is_dir():

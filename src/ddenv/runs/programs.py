@@ -1,4 +1,4 @@
-"""Starts the programs that work beside a view: the engine, and the 3-D scene."""
+"""Starts and stops the programs beside a view: the engine and the 3-D scene."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 
-# How the engine's own lines in its log begin, among whatever libraries print there; and its first one.
+# Prefix of the engine's own lines in its log, where libraries print too; and its first line.
 ENGINE_SAYS = "ddenv engine:"
 ENGINE_STARTED = "started"
-# How long engines that were asked to stop may take to write their last event, s.
+# Maximum time for engines to stop, s.
 STOP_WAIT = 15.0
-# The last line of a traceback.
+# Matches the last line of a traceback.
 PYTHON_SAYS = re.compile(r"[\w.]*(Error|Exception)(:|$)")
 
 
-def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen:
-    """Starts the engine on a run as a program in its own session, so that it outlives this terminal.
+def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes]:
+    """Starts the engine on a run in its own session, so that it outlives this terminal.
 
-    Its output goes to a log beside the run file. `options` become `--name value` on its command line.
+    Its output goes to a log beside the run file. `options` become `--name=value` on its command line.
     """
     words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--since", repr(time.time())]
-    # What begins with a dash is a name all the same.
+    # After `--`, a name that begins with a dash is no option.
     words += [*(f"--{name.replace('_', '-')}={value}" for name, value in options.items()), "--", str(run)]
     with run.with_name(f"{run.name}.log").open("ab") as log:
         return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
 
 
-def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen]]) -> None:
-    """Asks all of them to stop, and waits until they have; what was tested stays in their runs."""
+def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> None:
+    """Asks all engines to stop, and waits for them; finished tests stay in their runs."""
     for file, engine in engines:
         try:
             file.send("stop")
@@ -51,7 +51,7 @@ def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen]]) -> None:
 
 
 def last_words(run: Path) -> str:
-    """Why the engine that was last started on a run is gone, from its log."""
+    """Why the last engine of a run is gone, from its log."""
     log = run.with_name(f"{run.name}.log")
     said = crashed = ""
     for line in log.read_text(errors="replace").splitlines() if log.exists() else []:
@@ -64,10 +64,10 @@ def last_words(run: Path) -> str:
     return f"{run}: the engine was killed or crashed{crashed} (see {log}); go on with 'ddenv resume {run}'"
 
 
-def start_scene(run: Path, port: int = 0) -> subprocess.Popen:
+def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
     """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
 
-    It ends with the program that started it. An empty first line means that it could not start: its log says why.
+    It ends with its parent. An empty first line means that it could not start; its log says why.
     """
     words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port)]
     with run.with_name(f"{run.name}.scene.log").open("ab") as log:

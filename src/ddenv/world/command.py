@@ -43,7 +43,7 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
                 "use {world}, {seed} and {log}; shell variables are not available"
             )
     if not scenario.folder.is_dir():
-        raise UserError(f"folder: {scenario.folder}: no such folder; the command starts there")
+        raise UserError(f"folder: there is no folder {scenario.folder} to start the command in")
     program = _program(words[0], scenario.folder)
     _check_first_line(program)
     return program, *words[1:]

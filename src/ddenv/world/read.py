@@ -84,7 +84,7 @@ def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) ->
     """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
-            raise UserError(f"reading.model_path: no such folder: {folder}")
+            raise UserError(f"reading.model_path: there is no folder {folder}")
     return Disk(path.parent, reading.model_path, tell)
 
 
