@@ -28,7 +28,9 @@ PROMISED = {
 
 
 def test_all_of_table_one_is_there():
-    assert {kind: names - set(schemas.names(kind)) for kind, names in PROMISED.items()} == {kind: set() for kind in KINDS}
+    assert {kind: names - set(schemas.names(kind)) for kind, names in PROMISED.items()} == {
+        kind: set() for kind in KINDS
+    }
     pairs = [(part, order) for part in PROMISED["partitioning"] for order in PROMISED["prioritization"]]
     assert {f"{part}/{order}" for part, order in pairs} <= set(schemas.pairs())
 

@@ -130,7 +130,7 @@ def _source(module: str) -> Path:
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
-    """" (did you mean ...?)" with the known word nearest to `word`, or ""."""
+    """ " (did you mean ...?)" with the known word nearest to `word`, or ""."""
     match = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     return f" (did you mean {match[0]}?)" if match else ""
 

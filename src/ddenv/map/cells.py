@@ -75,7 +75,9 @@ def _readable(blocks: np.ndarray, sure: np.ndarray) -> np.ndarray:
     return kept
 
 
-def _put(index: int, text: str, row: int, column: int, columns: int, occupied: set[Cell], placed: dict[int, Cell]) -> bool:
+def _put(
+    index: int, text: str, row: int, column: int, columns: int, occupied: set[Cell], placed: dict[int, Cell]
+) -> bool:
     column = max(0, min(column, columns - len(text)))
     own = [(row, column + offset) for offset in range(len(text))]
     if not occupied.isdisjoint(own):

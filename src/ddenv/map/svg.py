@@ -190,9 +190,7 @@ def _label(label: Label, each: Drawn) -> str:
     )
 
 
-def _marks(
-    frame: Frame, spawn: tuple[float, float, float] | None, goal: tuple[float, float] | None
-) -> Iterator[str]:
+def _marks(frame: Frame, spawn: tuple[float, float, float] | None, goal: tuple[float, float] | None) -> Iterator[str]:
     if spawn is not None:
         x, y = frame.pixels(np.array([spawn[:2]]))[0]
         yield (
