@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ddenv.workbench.help.keys import Action, actions, shown_key
+from ddenv.workbench.help.catalogue import Action, actions
+from ddenv.workbench.help.key_names import shown_key
 
 PAGE = Path(__file__).resolve().with_name("keys.md")
 # A table is between these; the sections are the first parts of the actions' names.

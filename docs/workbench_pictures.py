@@ -29,8 +29,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.config import Config
+from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.guiding import nearest_other
 from ddenv.workbench.run.run_screen import RunScreen

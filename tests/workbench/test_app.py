@@ -12,10 +12,8 @@ import pytest
 from textual.command import CommandPalette
 from textual.widgets import OptionList, Static
 
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.config import Config
-from ddenv.workbench.help.dialogs import Help
-from ddenv.workbench.help.shortcuts import commands, groups
+from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.shortcuts import Help, commands, groups
 from ddenv.workbench.runs.runs_screen import RunsScreen
 from tests.waiting import PATIENCE, eventually
 

@@ -10,7 +10,6 @@ from textual.widgets import Input, Select
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.workbench.help.question import Question
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run import guiding
 from ddenv.workbench.run.candidates import Candidates
@@ -18,6 +17,7 @@ from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.run_keys import footer_words
+from ddenv.workbench.widgets.question import Question
 
 
 def state_of(run):

@@ -6,11 +6,11 @@ from textual.widgets import DataTable
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Node
-from ddenv.workbench.help.question import Question
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare, compare
 from ddenv.workbench.history.history_screen import History
 from ddenv.workbench.widgets.lines import Lines
+from ddenv.workbench.widgets.question import Question
 
 
 def tree(*parents, here=0):

@@ -22,15 +22,15 @@ from ddenv.runfile.store import Event, RunFile
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.export.export_dialog import Wanted, suggested, write
 from ddenv.workbench.help.config import read_config
-from ddenv.workbench.help.dialogs import WorldTree, complain_about
+from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
+from ddenv.workbench.setup.open_file import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
-from ddenv.workbench.terminal.terminal_check import check_terminal
 
 NAMES = [
     "[bold]loud[/bold]",

@@ -12,8 +12,8 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.dialogs import Help, Method, Quit, SceneDialog, ssh_line
-from ddenv.workbench.help.question import Question
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.history.history_screen import History
 from ddenv.workbench.map.world_map import WorldMap
@@ -21,13 +21,14 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels
 from ddenv.workbench.run.copying import Copy
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, ssh_line
 from ddenv.workbench.run.layers import Layers
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import SchemaSelect
 from ddenv.workbench.setup.setup_screen import SetupScreen
-from ddenv.workbench.widgets.footer import KeyFooter
 from ddenv.workbench.widgets.lines import Lines
+from ddenv.workbench.widgets.question import Question
 
 URL = "http://127.0.0.1:7012/static/"
 

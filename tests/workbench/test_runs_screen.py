@@ -6,12 +6,12 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.question import Question
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder, delete_run
 from ddenv.workbench.runs.runs_screen import RunsScreen
 from ddenv.workbench.runs.runs_table import RunTable
 from ddenv.workbench.setup.setup_screen import SetupScreen
+from ddenv.workbench.widgets.question import Question
 
 
 @pytest.fixture

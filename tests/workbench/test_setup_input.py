@@ -24,7 +24,7 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
 
 @pytest.mark.parametrize(
     ("models", "told"),
-    [("", "No model of it can be removed"), (fake_run.box("one", 3, 3), "1 model: all that can be found")],
+    [("", "None of its models can be removed"), (fake_run.box("one", 3, 3), "1 model: a run can only find")],
     ids=["none", "one"],
 )
 async def test_worlds_with_little_in_them(scenarios, runs, started, models, told):
@@ -57,7 +57,7 @@ async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
     (scenarios / "crates.sdf").write_bytes(fake_run.world_text([STRANGE.replace("\x1b", "").strip("[]"), "b"]))
     async with Opened((80, 24)) as session:
-        assert "[bold]x[/] �[31m" in session.screen.chosen.about
+        assert "[bold]x[/] �[31m" in session.screen.preview.choice.about
         assert str(session.screen.query_one("#preview").border_title).startswith("\\[red]ß")
         await session.press("ctrl+s")
         assert session.wrong_or_run().startswith("-red-ß")
@@ -86,7 +86,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, started):
 @pytest.mark.parametrize("size", [(20, 5), (63, 40), (200, 17)], ids=str)
 async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
     async with Opened(size) as session:
-        assert session.told("small") == f"ddenv needs 64 x 18, this is {size[0]} x {size[1]}"
+        assert session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"
         assert session.screen.query_one("#small").region.size == size
         await session.pilot.resize_terminal(120, 36)
         await session.pilot.pause()

@@ -45,7 +45,7 @@ async def test_what_is_gone_cannot_be_saved(made, tmp_path, monkeypatch):
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
         await session.press("f7")
         await session.press("enter")
-        assert "not there any more" in session.app.screen.query_one("#wrong").render().plain
+        assert "does not exist any more" in session.app.screen.query_one("#wrong").render().plain
 
 
 async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, runs, tmp_path, monkeypatch):

@@ -1,7 +1,5 @@
 """Start, heading and goal are set on the map of the setup screen."""
 
-from types import SimpleNamespace
-
 import fake_run
 import pytest
 import yaml
@@ -16,7 +14,7 @@ class Places:
 
     async def pick(self, x, y):
         """As the map's crosshair or a click would."""
-        self.session.screen.on_world_map_place_picked(SimpleNamespace(x=x, y=y, stop=lambda: None))
+        self.map.post_message(WorldMap.PlacePicked(x, y))
         await self.session.pilot.pause()
 
     def numbers(self):
@@ -108,7 +106,7 @@ async def test_keys_for_the_map_are_letters_in_a_field(scenarios):
         field.value = ""
         await session.press("s", "g", "h", "0", "minus")
         assert field.value == "sgh0-"
-        assert session.screen.picked_next == ""
+        assert session.screen.preview.picker.picked_next == ""
 
 
 async def test_the_crosshair_and_the_mouse_pick(scenarios):

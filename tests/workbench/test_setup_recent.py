@@ -3,7 +3,7 @@
 import pytest
 from setup_session import Opened
 
-from ddenv.workbench.setup.beginnings import KEPT, FileList, recent_file, recent_files, remember
+from ddenv.workbench.setup.file_list import KEPT, FileList, recent_file, recent_files, remember
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ async def test_an_opened_world_is_offered_the_next_time(scenarios, tmp_path):
     async with Opened() as session:
         assert labels(session) == ["crates", "[red]wild[.sdf  fields"]
         await session.press("end")
-        assert session.screen.chosen.path == path
+        assert session.screen.preview.choice.path == path
 
 
 async def test_what_cannot_be_read_and_what_is_bundled_is_not_remembered(scenarios, tmp_path):
@@ -70,5 +70,5 @@ async def test_what_cannot_be_read_and_what_is_bundled_is_not_remembered(scenari
     async with Opened() as session:
         await session.open(broken)
         await session.open(scenarios / "crates.yaml")
-        assert session.screen.chosen.name == "crates"
+        assert session.screen.preview.choice.name == "crates"
     assert not recent_file().exists()

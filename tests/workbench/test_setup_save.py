@@ -7,7 +7,7 @@ from setup_session import Opened
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.setup.beginnings import recent_files
+from ddenv.workbench.setup.file_list import recent_files
 from ddenv.workbench.setup.save_scenario import SaveScenario, save_scenario, scenario_path
 from ddenv.world.load import load_scenario
 
@@ -46,7 +46,7 @@ def test_a_name_gets_its_ending_and_must_be_possible(tmp_path, monkeypatch):
 def test_a_world_that_is_gone_is_told(scenarios, tmp_path):
     own = load_scenario(scenarios / "crates.yaml")
     (scenarios / "crates.sdf").unlink()
-    with pytest.raises(UserError, match="not there any more"):
+    with pytest.raises(UserError, match="does not exist any more"):
         save_scenario(own, tmp_path / "x.yaml")
     assert not (tmp_path / "x.yaml").exists()
 

@@ -7,11 +7,12 @@ from setup_session import Opened
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import explanation
-from ddenv.workbench.help.dialogs import Help, OpenFile
+from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.methods import KINDS
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import Explained
+from ddenv.workbench.setup.open_file import OpenFile
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
@@ -165,7 +166,7 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
             assert session.told("cost")
         await session.press("escape")
         assert session.app.focused.id == "scenario-list"
-        await session.pilot.click("#to-map")
+        await session.pilot.click("#pane-map")
         await session.pilot.pause()
         assert session.app.focused.id == "map"
         session.fill(epsilon="0")
@@ -364,7 +365,7 @@ async def test_a_damaged_run_is_not_opened(scenarios, runs):
     async with Opened() as session:
         session.screen.query_one("#run-list").focus()
         await session.press("down", "enter")
-        assert "is not a ddenv run file" in session.wrong()
+        assert any("is not a ddenv run file" in notice.message for notice in session.app._notifications)
 
 
 async def test_help_and_quit(scenarios):
@@ -393,7 +394,7 @@ async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
 async def test_too_small(scenarios):
     async with Opened((40, 10)) as session:
         assert session.screen.query_one("#small").display
-        assert session.told("small") == "ddenv needs 64 x 18, this is 40 x 10"
+        assert session.told("small") == "ddenv needs 64 x 18; this terminal has 40 x 10"
 
 
 LOST = (

@@ -36,7 +36,7 @@ def app(context: click.Context, **reading) -> None:
     The options are on how the workbench reads worlds; commands that read worlds have them, too.
     """
     if context.invoked_subcommand is None:
-        from ddenv.workbench.app import run_workbench
+        from ddenv.workbench.launch import run_workbench
 
         if any(reading.values()):
             from ddenv.runs.scenarios import reading_of
@@ -108,7 +108,7 @@ def resume(run: str, jobs: int, as_json: bool) -> int:
 def open_run(run: str, watch: bool) -> int:
     """Attaches the workbench to RUN (a name or a file)."""
     from ddenv.runs.folder import find_run
-    from ddenv.workbench.app import run_workbench
+    from ddenv.workbench.launch import run_workbench
 
     return run_workbench(find_run(run), watch=watch)
 

@@ -1,13 +1,15 @@
-"""The workbench as a program: which screen comes first, what concerns the terminal, and the exit code."""
+"""The workbench as an app: which screen comes first, which takes whose place, and what concerns the terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
+from textual import on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
@@ -15,10 +17,18 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.help.config import Config
-from ddenv.workbench.terminal.themes import DARK, OURS, fitting, for_rich
+from ddenv.workbench.messages import ShowRun, ShowSetup
+from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 from ddenv.workbench.wording import plain
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """The user's own wishes: `theme` is "" where the terminal decides, `keys` are Textual's names of keys by action ids."""
+
+    theme: str = ""
+    keys: Mapping[str, str] = field(default_factory=dict)
 
 
 def _commands() -> type[Provider]:
@@ -28,16 +38,15 @@ def _commands() -> type[Provider]:
 
 
 class Workbench(App[int]):
-    """Without a run it begins at the setup screen, else attached to that run. Raises UserError for what is no run file.
+    """Begins at the setup screen, or attached to a run. Raises UserError for a file that is no run.
 
     `reading` holds the command line's options on how to read worlds. With `watch` the run is looked at, and never guided.
     """
 
     TITLE = "ddenv"
-    # Notifications leave the status line and the keys free.
-    CSS = "ToastRack { margin-bottom: 3; } SearchIcon { display: none; } CommandList { min-width: 8; }"
+    CSS_PATH = "app.tcss"
     ENABLE_COMMAND_PALETTE = True
-    COMMANDS: ClassVar[set[Callable[[], type[Provider]]]] = {_commands}
+    COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
         Binding(
             "ctrl+q", "leave", "quit", id="app.leave", tooltip="leave; an engine goes on", show=False, priority=True
@@ -81,27 +90,16 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys = config.keys
-        self._run, self._watch = run, watch
+        self._first = ShowSetup() if run is None else ShowRun(run, watch)
         if run is not None:
             from ddenv.workbench.run.observed import Observed
 
-            # Opened before the screen is taken, so that a wrong file is told in the terminal as one line.
+            # Opened before the screen is taken, so that a wrong file is one line in the terminal.
             Observed(run, strictly=watch).close()
 
-    @staticmethod
-    def _attached(run: Path, watch: bool) -> Screen:
-        from ddenv.workbench.run.run_screen import RunScreen
-
-        return RunScreen(run, watch=True) if watch else RunScreen(run)
-
-    def _setup(self) -> Screen:
-        from ddenv.workbench.setup.setup_screen import SetupScreen
-
-        return SetupScreen(self._reading)
-
     def compose(self) -> ComposeResult:
-        # Seen at once: the first screen takes a moment to be loaded.
-        what = "" if self._run is None else f"  opening {plain(self._run.stem)} ..."
+        # Shown at once: the first screen takes a moment to load.
+        what = f"  opening {plain(self._first.run.stem)} ..." if isinstance(self._first, ShowRun) else ""
         yield Static(Text(" ddenv", "bold").append(what, "not bold dim"), markup=False)
 
     def get_css_variables(self) -> dict[str, str]:
@@ -122,9 +120,59 @@ class Workbench(App[int]):
 
     def _begin(self) -> None:
         try:
-            self.push_screen(self._setup() if self._run is None else self._attached(self._run, self._watch))
+            self.push_screen(self._screen_for(self._first))
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
+
+    # Which screen is shown.
+
+    def _screen_for(self, asked: ShowRun | ShowSetup) -> Screen[Any]:
+        if isinstance(asked, ShowRun):
+            from ddenv.workbench.run.run_screen import RunScreen
+
+            return RunScreen(asked.run, asked.engine, asked.watch)
+        from ddenv.workbench.setup.setup_screen import SetupScreen
+
+        return SetupScreen(self._reading, asked.like)
+
+    @on(ShowRun)
+    @on(ShowSetup)
+    def _show(self, asked: ShowRun | ShowSetup) -> None:
+        """Another screen, in place of all that are open."""
+        try:
+            screen = self._screen_for(asked)
+        except UserError as error:
+            self.notify(str(error), severity="warning", timeout=4, markup=False)
+            return
+        while len(self.screen_stack) > 2:
+            self.pop_screen()
+        self.switch_screen(screen)
+
+    def action_help(self) -> None:
+        """The keys of the focused pane, of the screen, and of the app."""
+        from ddenv.workbench.help.shortcuts import Help, groups
+
+        self.push_screen(Help(groups(self.screen)))
+
+    def action_runs(self) -> None:
+        """The list of all runs, above the screen that asks for it."""
+        from ddenv.workbench.runs.runs_screen import RunsScreen
+
+        if not any(isinstance(screen, RunsScreen) for screen in self.screen_stack):
+            self.push_screen(RunsScreen())
+
+    def action_leave(self) -> None:
+        """Leaves at once. An engine goes on, and the terminal shows how to come back to it."""
+        detach = next((screen.action_detach for screen in self.screen_stack if hasattr(screen, "action_detach")), None)
+        if detach is None:
+            self.exit(0)
+        else:
+            detach()
+
+    async def action_quit(self) -> None:
+        self.action_leave()
+
+    # The terminal.
 
     def _redraw(self) -> None:
         self._written.forget()
@@ -133,7 +181,7 @@ class Workbench(App[int]):
     def on_resize(self) -> None:
         self._written.forget()
 
-    def _display(self, screen: Screen, renderable: RenderableType | None) -> None:
+    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
         super()._display(screen, self._written.fewer(renderable))
 
     def on_unmount(self) -> None:
@@ -147,56 +195,3 @@ class Workbench(App[int]):
         driver = self._driver
         if driver is not None and not self.is_headless:
             driver.write(sequence)
-
-    def action_help(self) -> None:
-        """The keys of the focused pane, of the screen, and of the app."""
-        from ddenv.workbench.help.dialogs import Help
-
-        self.push_screen(Help.of(self.screen))
-
-    def action_runs(self) -> None:
-        """The list of all runs, above the screen that asks for it."""
-        from ddenv.workbench.runs.runs_screen import RunsScreen
-
-        if not any(isinstance(screen, RunsScreen) for screen in self.screen_stack):
-            self.push_screen(RunsScreen())
-
-    def show_run(self, run: Path, watch: bool = False) -> None:
-        """Attaches to another run, in place of all screens. Raises UserError for what is no run file."""
-        self._only(self._attached(run, watch))
-
-    def show_setup(self, like: Path | None = None) -> None:
-        """The setup screen, in place of all screens; with the settings of the run `like` filled in."""
-        from ddenv.workbench.setup.setup_screen import SetupScreen
-
-        self._only(SetupScreen(self._reading) if like is None else SetupScreen(self._reading, like=like))
-
-    def _only(self, screen: Screen) -> None:
-        while len(self.screen_stack) > 2:
-            self.pop_screen()
-        self.switch_screen(screen)
-
-    def action_leave(self) -> None:
-        """Leaves at once; an engine goes on, and how to come back to it is told."""
-        detach = next((screen.action_detach for screen in self.screen_stack if hasattr(screen, "action_detach")), None)
-        if detach is None:
-            self.exit(0)
-        else:
-            detach()
-
-    async def action_quit(self) -> None:
-        self.action_leave()
-
-
-def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None, *, watch: bool = False) -> int:
-    """Runs the workbench until it is left; returns the exit code. Raises UserError for what is no run file, or no terminal."""
-    from ddenv.workbench.help.config import read_config
-    from ddenv.workbench.terminal.terminal_check import check_terminal
-
-    config = read_config()
-    app = Workbench(run, reading, watch=watch, config=config)
-    check_terminal()
-    if not config.theme:
-        app.theme = fitting(app.console.color_system)
-    result = app.run()
-    return result if isinstance(result, int) else app.return_code or 0

@@ -1,26 +1,18 @@
-"""What a user wants otherwise: the theme, and the keys of actions, from a file in the folder for settings."""
+"""The user's own theme and keys, from a file in the folder for settings; and the lines of `ddenv config`."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.workbench.help.keys import Action, actions, written
-from ddenv.workbench.terminal.themes import DARK, theme_names
+from ddenv.workbench.app import Config
+from ddenv.workbench.help.catalogue import Action, actions, checked
+from ddenv.workbench.help.key_names import written
+from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
 
 KNOWN = ("theme", "keys")
-
-
-@dataclass(frozen=True, slots=True)
-class Config:
-    """`theme` is "" where the terminal decides. `keys` are Textual's names of keys by the ids of actions."""
-
-    theme: str = ""
-    keys: Mapping[str, str] = field(default_factory=dict)
 
 
 def config_path() -> Path:
@@ -41,9 +33,6 @@ def read_config() -> Config:
         if os.environ.get("DDENV_CONFIG") and not path.exists():
             raise UserError(f"{path}: no such file; make it, or unset DDENV_CONFIG")
         return Config()
-    from ddenv.workbench.help.keys import checked
-    from ddenv.workbench.terminal.themes import nearest, theme_called
-
     for key in data:
         if key not in KNOWN:
             raise UserError(

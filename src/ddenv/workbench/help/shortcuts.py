@@ -1,60 +1,79 @@
-"""What the keys do on a screen at this moment, with the user's own keys: for the help and for the list of commands."""
+"""What the keys do on a screen at this moment, with the user's own keys: for the footer, the help and the list of commands."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from textual.app import App
-from textual.binding import ActiveBinding
+from rich.table import Table
+from rich.text import Text
+from textual.app import App, ComposeResult
+from textual.binding import ActiveBinding, Binding
+from textual.containers import Vertical, VerticalScroll
 from textual.dom import DOMNode
-from textual.screen import Screen
+from textual.screen import ModalScreen, Screen
+from textual.widgets import Static
 
-from ddenv.workbench.help.keys import shown
+from ddenv.workbench.help.key_names import shown
 from ddenv.workbench.wording import plain
 
-# What Textual brings along, in plain words: other actions of its own are of no use in a list.
-BROUGHT = {
-    "app.focus_next": "to the next pane, field or button, or to the one before",
-    "app.focus_previous": "to the next pane, field or button, or to the one before",
+_FOCUS = "to the next pane, field or button, or to the previous one"
+_LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"
+_TAKE = "take the one under the cursor"
+# Textual's own actions that are worth a line in the help.
+TEXTUAL_WORDS = {
+    "app.focus_next": _FOCUS,
+    "app.focus_previous": _FOCUS,
     "screen.copy_text": "copy the text that is selected with the mouse",
-    "cursor_up": "one line up or down",
-    "cursor_down": "one line up or down",
-    "page_up": "one page up or down",
-    "page_down": "one page up or down",
-    "first": "to the first or the last line",
-    "last": "to the first or the last line",
-    "scroll_top": "to the first or the last line",
-    "scroll_bottom": "to the first or the last line",
-    "select": "take the one under the cursor",
-    "select_cursor": "take the one under the cursor",
+    "cursor_up": _LINE,
+    "cursor_down": _LINE,
+    "page_up": _PAGE,
+    "page_down": _PAGE,
+    "first": _END,
+    "last": _END,
+    "scroll_top": _END,
+    "scroll_bottom": _END,
+    "select": _TAKE,
+    "select_cursor": _TAKE,
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Shortcut:
-    """`keys` as people write them; `action` is run in the name of `node`."""
+    """`keys` as people write them; `action` runs on `node`. It is shown dimmed while it is not `enabled`."""
 
     keys: str
     words: str
     action: str
     node: DOMNode
     id: str
+    enabled: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """What belongs together: a pane, the screen, or the app. `hints` are lines that stand below the keys."""
+    """The shortcuts of a pane, of the screen, or of the app. `hints` are lines below them."""
 
     title: str
     shortcuts: tuple[Shortcut, ...]
     hints: tuple[str, ...] = ()
 
 
-def groups(screen: Screen) -> list[Group]:
-    """The focused pane's shortcuts first, then the screen's, then those that hold everywhere."""
-    panes, own, everywhere = [], [], []
-    for active in screen.active_bindings.values():
+def offered(screen: Screen[Any]) -> list[ActiveBinding]:
+    """The keys that a screen offers now, those of the focused widget first.
+
+    An action whose `check_action` returns False is left out; one with None is there, but not enabled.
+    """
+    return list(screen.active_bindings.values())
+
+
+def groups(screen: Screen[Any]) -> list[Group]:
+    """The focused pane's shortcuts first, then the screen's, then the app's."""
+    panes: list[ActiveBinding] = []
+    own: list[ActiveBinding] = []
+    everywhere: list[ActiveBinding] = []
+    for active in offered(screen):
         if not _words(active):
             continue
         if isinstance(active.node, App) or (active.node is screen and not active.binding.id):
@@ -70,9 +89,9 @@ def groups(screen: Screen) -> list[Group]:
     return [group for group in found if group.shortcuts or group.hints]
 
 
-def commands(screen: Screen) -> list[Shortcut]:
-    """All actions of ours that can be asked for now."""
-    return [shortcut for group in groups(screen) for shortcut in group.shortcuts if shortcut.id]
+def commands(screen: Screen[Any]) -> list[Shortcut]:
+    """The workbench's own actions that can be run now."""
+    return [each for group in groups(screen) for each in group.shortcuts if each.id and each.enabled]
 
 
 def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
@@ -85,7 +104,12 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
         keys.setdefault(what, []).append(active.binding.key)
     return tuple(
         Shortcut(
-            shown(",".join(keys[what])), _words(active), active.binding.action, active.node, active.binding.id or ""
+            shown(",".join(keys[what])),
+            _words(active),
+            active.binding.action,
+            active.node,
+            active.binding.id or "",
+            active.enabled,
         )
         for what, active in first.items()
     )
@@ -94,16 +118,49 @@ def _merged(found: Iterable[ActiveBinding]) -> tuple[Shortcut, ...]:
 def _words(active: ActiveBinding) -> str:
     binding = active.binding
     if not binding.id:
-        return BROUGHT.get(binding.action, "")
+        return TEXTUAL_WORDS.get(binding.action, "")
     return plain(active.tooltip or binding.tooltip or binding.description)
 
 
 def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
-    """What the focused pane calls itself, and what it says of itself beside its keys."""
+    """The focused pane's title, and what it says about itself beside its keys."""
     if focused is None:
         return "Here", ()
     nodes = focused.ancestors_with_self
     title = next((str(title) for node in nodes if (title := getattr(node, "border_title", None))), "Here")
-    # By Textual's custom a widget says in HELP what it is for.
     hints = (focused.HELP or "").splitlines() if "HELP" in vars(type(focused)) else []
     return plain(title), tuple(plain(line) for line in hints if line.strip())
+
+
+class Help(ModalScreen[None]):
+    """Every key with what it does: those of the focused pane first."""
+
+    BINDINGS: ClassVar = [
+        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
+    ]
+
+    def __init__(self, groups: Iterable[Group]) -> None:
+        super().__init__()
+        self._groups = tuple(groups)
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog reading") as dialog:
+            dialog.border_title = "Keys"
+            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
+            with VerticalScroll():
+                yield Static(self._table(), markup=False)
+
+    def _table(self) -> Table:
+        table = Table.grid(padding=(0, 2))
+        table.add_column(justify="right", style="bold", max_width=24)
+        table.add_column(overflow="fold")
+        for group in self._groups:
+            if table.row_count:
+                table.add_row()
+            table.add_row("", Text(group.title, "bold underline"))
+            for shortcut in group.shortcuts:
+                style = "" if shortcut.enabled else "dim"
+                table.add_row(Text(shortcut.keys, style), Text(shortcut.words, style))
+            for hint in group.hints:
+                table.add_row("", Text(hint))
+        return table

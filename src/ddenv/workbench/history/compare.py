@@ -45,8 +45,8 @@ def compare(first: Node, second: Node) -> Comparison:
 class Compare(ModalScreen[None]):
     """Facts, maps where there is room, and the models: those of both, and those of one alone."""
 
-    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-small"), (110, "-large")]
+    CSS_PATH = "history.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-small"), (110, "-large")]
     AUTO_FOCUS = "Lines"
     BINDINGS: ClassVar = [
         Binding("escape,c,q,enter", "dismiss", "close", id="compare.close", tooltip="back to the history"),

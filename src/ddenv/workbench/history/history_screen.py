@@ -16,15 +16,15 @@ from textual.widgets import DataTable, Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.state import Decision, Node
-from ddenv.workbench.help.question import Question
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.world_map import Place
 from ddenv.workbench.run import guiding
 from ddenv.workbench.run.log import decision_line
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.widgets.footer import KeyFooter
 from ddenv.workbench.widgets.lines import Lines
+from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
 
 # How often the run is looked at, s.
@@ -53,7 +53,7 @@ class History(Screen[int | None]):
     """The node to go on from, or None. It follows the run while it is open."""
 
     CSS_PATH: ClassVar = ["history.tcss"]
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
     BINDINGS: ClassVar = [
         Binding(
             "enter",

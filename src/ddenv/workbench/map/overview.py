@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich.segment import Segment
@@ -23,29 +23,16 @@ from ddenv.workbench.map.map_colors import Palette, palette_of, unpacked
 from ddenv.workbench.map.moving import crosshair, follow, robots, strip
 from ddenv.workbench.map.panning import Panning
 from ddenv.workbench.map.picture import Line, Mark, Picture, Point, Seen, picture, seen
+from ddenv.workbench.map.place import Place
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
-    from ddenv.map.footprints import Footprint
     from ddenv.runfile.state import Trial
 
 LAYERS = ("partitions", "removed", "pinned", "sensed", "path", "original", "failure")
 # Dots of the original path, and of the gaps in it.
 DASH = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
-
-    `elements` are the names of the models that may be removed.
-    """
-
-    prints: tuple[Footprint, ...] = ()
-    spawn: tuple[float, float, float] | None = None
-    goal: Point | None = None
-    elements: frozenset[str] = frozenset()
 
 
 class Overview(Panning):

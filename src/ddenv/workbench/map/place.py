@@ -1,21 +1,35 @@
-"""What a map needs of a scenario: read away from the screen's thread, since worlds can be large."""
+"""What a map shows of a world and its scenario: read in a thread, since worlds can be large."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddenv.workbench.map.world_map import Place
 from ddenv.workbench.run.observed import Busy, Observed
 
 if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
     from ddenv.world.model import World
     from ddenv.world.scenario import Scenario
 
-# How long a run that another program writes is asked again, s.
+Point = tuple[float, float]
+# How long a run file that another program keeps locked is tried again, s.
 PATIENCE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
+
+    `elements` are the names of the models that may be removed.
+    """
+
+    prints: tuple[Footprint, ...] = ()
+    spawn: tuple[float, float, float] | None = None
+    goal: Point | None = None
+    elements: frozenset[str] = frozenset()
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:
@@ -31,7 +45,7 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 
 
 def place_of_run(path: Path) -> Place:
-    """What a run file was made from. Raises UserError."""
+    """The world and the scenario of a run file. Raises UserError."""
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
     from ddenv.runs.creation import read_parts
 
@@ -42,7 +56,7 @@ def place_of_run(path: Path) -> Place:
                 scenario, world, _ = read_parts(run)
             return place_of(world, scenario)
         except Busy:
-            # The world is asked for once: what another program writes now is done soon.
+            # The world is read only once, and other programs soon finish their writing.
             if time.monotonic() > until:
                 raise
             time.sleep(0.1)

@@ -29,8 +29,8 @@ LARGEST = {"iterations": 1000, "budget": 1_000_000}
 class Change(ModalScreen[dict[str, Any] | None]):
     """The settings as they stand here, None if that was left. They hold from the next round on."""
 
-    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (34, "-tall")]
+    CSS_PATH = "run_dialogs.tcss"
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (34, "-tall")]
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="change.cancel", tooltip="change nothing"),
         Binding("ctrl+s", "apply", "change", id="change.apply", tooltip="change the settings", priority=True),
@@ -63,7 +63,7 @@ class Change(ModalScreen[dict[str, Any] | None]):
                         yield Static(key, classes="label", markup=False)
                         yield Input(self._numbers[key], id=key, compact=True)
                     yield Static(meaning, classes="meaning", markup=False)
-            yield Static("", id="wrong", markup=False)
+            yield Static("", id="wrong", classes="wrong", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Change", id="apply", variant="primary")
                 yield Button("Cancel", id="cancel")

@@ -25,7 +25,7 @@ WIDTH = 58
 class ChooseModels(ModalScreen[tuple[str, ...] | None]):
     """The names that were chosen, None if that was left. Typing filters them; a part of a name in any case is enough."""
 
-    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
         Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),

@@ -109,7 +109,7 @@ class Controls(Screen[None]):
         if not asked.question:
             self._send_asked(asked)
             return
-        from ddenv.workbench.help.question import Question
+        from ddenv.workbench.widgets.question import Question
 
         self.app.push_screen(Question(asked.question), lambda yes: self._send_asked(asked) if yes else None)
 

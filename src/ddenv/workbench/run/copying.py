@@ -20,7 +20,7 @@ from ddenv.workbench.wording import plain, shorten
 class Copy(ModalScreen[None]):
     """A list of texts, of which enter or a click copies one."""
 
-    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape,y,q", "dismiss", "close", id="copy.close", tooltip="copy nothing"),
     ]

@@ -29,7 +29,7 @@ MEANINGS = {
 class Layers(ModalScreen[None]):
     """A list of the map's layers with a mark at those that are shown."""
 
-    CSS_PATH: ClassVar = ["../help/dialogs.tcss", "../help/guide.tcss"]
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("space", "toggle", "show or hide", id="layers.toggle", tooltip="show this layer or hide it"),
         Binding("escape,l,q", "dismiss", "close", id="layers.close", tooltip="back to the map"),

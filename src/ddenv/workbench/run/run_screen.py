@@ -17,6 +17,7 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.runfile.state import Candidate, RunState
 from ddenv.workbench.background import tell
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import place_of_run
 from ddenv.workbench.map.world_map import MapLines, Place, WorldMap
 from ddenv.workbench.run import models_left
@@ -29,9 +30,8 @@ from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine, Scene
 from ddenv.workbench.run.run_keys import FIRST, KEYS, LOOKING, SHOWN, footer_words
 from ddenv.workbench.run.status import Header, Status
-from ddenv.workbench.widgets.footer import KeyFooter
 from ddenv.workbench.widgets.lines import Lines
-from ddenv.workbench.widgets.panes import PANES, Panes
+from ddenv.workbench.widgets.panes import Panes
 from ddenv.workbench.wording import plain, shorten
 
 # How often the run file is read, s.
@@ -43,6 +43,8 @@ CALM = 4.0
 # So long it takes until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004
 SMALLEST = (64, 18)
+# The panes and their words, in the order of the keys 1 to 5.
+PANES = {"map": "map", "round": "round", "chart": "chart", "now": "what is happening", "log": "log"}
 # Where map, table and chart stand side by side, and where models and decisions do too.
 WIDE, HUGE = 110, 170
 
@@ -51,8 +53,8 @@ class RunScreen(Leaving):
     """Attached to one run. Leaving it never touches the engine, unless the user asks to stop it."""
 
     CSS_PATH: ClassVar = ["run.tcss"]
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (SMALLEST[0], "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (SMALLEST[1], "-low"), (23, "-short"), (30, "-tall")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (23, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = KEYS
     AUTO_FOCUS = "#candidates"
     # What the focus changes is drawn again by the widgets themselves: the whole screen need not be.
@@ -70,7 +72,7 @@ class RunScreen(Leaving):
         self.snapshot = Snapshot()
         self.log_lines = Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, told=self.log_lines.add)
-        self._pane = PANES[0][0]
+        self._pane = "map"
         self._modelled: tuple = ()
         self._titled: tuple = ()
         self._following: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
@@ -79,7 +81,7 @@ class RunScreen(Leaving):
 
     def compose(self) -> ComposeResult:
         yield Header(id="header")
-        yield Panes(id="run-panes")
+        yield Panes({name: f"{key} {words}" for key, (name, words) in enumerate(PANES.items(), 1)}, id="run-panes")
         with Horizontal(id="run-body"):
             with Vertical(id="run-main"):
                 with Horizontal(id="top"):
@@ -110,6 +112,7 @@ class RunScreen(Leaving):
 
     def on_mount(self) -> None:
         self.add_class(f"-pane-{self._pane}")
+        self.query_one(Panes).mark(self._pane)
         self._look()
         self.set_interval(PERIOD, self._look)
         # What it needs takes long to load: the first paint comes before.
@@ -286,7 +289,7 @@ class RunScreen(Leaving):
         self.query_one(focus).focus()
 
     def action_next_pane(self) -> None:
-        names = [name for name, _ in PANES]
+        names = list(PANES)
         self.show_pane(names[(names.index(self._pane) + 1) % len(names)])
 
     def action_follow(self) -> None:

@@ -15,9 +15,10 @@ from textual.widgets import DataTable, Footer, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import is_open, tell
-from ddenv.workbench.help.question import Question
+from ddenv.workbench.messages import ShowRun, ShowSetup
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, delete_run, named
 from ddenv.workbench.runs.runs_table import RunTable, about
+from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain
 
 # How often the folder is looked at, and how long a look may read before it shows what it has, s.
@@ -28,8 +29,8 @@ class RunsScreen(Screen[None]):
     """Looked at beside the screen, again and again; nothing is written but what is asked for."""
 
     CSS_PATH = "runs.tcss"
-    HORIZONTAL_BREAKPOINTS: ClassVar = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (12, "-short"), (30, "-tall")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = [
         Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it: look only, and change nothing"),
         Binding("c", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
@@ -129,18 +130,12 @@ class RunsScreen(Screen[None]):
         self._go_to(watch=True)
 
     def _go_to(self, watch: bool) -> None:
-        run = self._readable()
-        if run is None:
-            return
-        try:
-            self.app.show_run(run.path, watch)
-        except UserError as error:
-            self._complain(str(error))
+        if (run := self._readable()) is not None:
+            self.post_message(ShowRun(run.path, watch))
 
     def action_copy(self) -> None:
-        run = self._readable()
-        if run is not None:
-            self.app.show_setup(like=run.path)
+        if (run := self._readable()) is not None:
+            self.post_message(ShowSetup(like=run.path))
 
     def _readable(self) -> Recent | None:
         """The run under the cursor, if it can be read; says why not."""

@@ -1,4 +1,4 @@
-"""A scenario as a file of its own, which loads to the same scenario."""
+"""Saves the setup screen's scenario as a file, and the dialog that asks for its name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 def scenario_path(text: str) -> Path:
-    """The file that a user names, with .yaml where he left it out. Raises UserError for what cannot be one."""
+    """The file that a user names, with .yaml if it has no ending. Raises UserError for a name that no file can have."""
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
@@ -56,14 +56,13 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     for each in (scenario.world, scenario.robot.model):
         if not each.is_file():
             raise UserError(
-                f"{each}: is not there any more, so that no scenario could name it; "
-                "'ddenv export' writes the world of a run"
+                f"{each}: does not exist any more, so no scenario can name it; 'ddenv export' writes the world of a run"
             )
     data = scenario.model_dump(mode="json")
     folder = path.resolve().parent
     data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
     data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
-    # Only programs of the user's own are searched there.
+    # Only the user's own programs are looked up there.
     if scenario.oracle is None and ":" not in scenario.controller.use:
         del data["folder"]
     else:
@@ -72,22 +71,14 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
 
 
 def _name(path: Path, folder: Path) -> str:
-    """What `path` is called in a scenario of `folder`: relative if it goes along when that folder is moved."""
+    """How a scenario in `folder` names `path`: relative if it is inside that folder."""
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
 class SaveScenario(ModalScreen[Path | None]):
-    """The file that was written, or None. What is there is only replaced after a second enter."""
+    """Returns the file that was written, or None. A file that exists is only replaced after a second enter."""
 
-    CSS_PATH = "../help/dialogs.tcss"
-    CSS = """
-    SaveScenario { align: center middle; }
-    SaveScenario .dialog { width: 80; }
-    SaveScenario .dialog Static, SaveScenario .dialog Input { width: 100%; }
-    SaveScenario .dialog Input { background: $panel; }
-    SaveScenario .dialog #wrong { color: $text-warning; }
-    """
     BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="save.cancel", tooltip="write nothing")]
 
     def __init__(self, scenario: Scenario) -> None:
@@ -101,7 +92,7 @@ class SaveScenario(ModalScreen[Path | None]):
             dialog.border_subtitle = "enter saves   escape cancels"
             yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
             yield Input(_suggested(self._scenario.name), placeholder="name of a file", id="path", compact=True)
-            yield Static("", id="wrong", markup=False)
+            yield Static("", id="wrong", classes="wrong", markup=False)
 
     @on(Input.Changed)
     def _changed(self) -> None:

@@ -1,107 +1,92 @@
-"""The setup screen: choose a scenario or a world, see it, set all that is to be set, start; or open an earlier run."""
+"""The setup screen: choose a scenario or a world, see it, change its settings, start; or open an earlier run."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 from textual import events, on, work
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
-from textual.widgets import Footer, OptionList, Static
+from textual.screen import Screen
+from textual.widgets import Button, Footer, Input, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import tell
-from ddenv.workbench.help.dialogs import OpenFile
-from ddenv.workbench.map.place import place_of
-from ddenv.workbench.map.world_map import Place, WorldMap
+from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.beginnings import About, FileList
-from ddenv.workbench.setup.chosen import Chosen, read_choice, read_run
-from ddenv.workbench.setup.costs import Past, past_of
+from ddenv.workbench.setup.choice import Choice
+from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
-from ddenv.workbench.setup.starting import Starting
-from ddenv.workbench.widgets.panes import SetupPanes
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.setup.file_list import FileList, recent_files, remember
+from ddenv.workbench.setup.preview import Preview
+from ddenv.workbench.setup.setup_keys import KEYS
+from ddenv.workbench.setup.start_run import (
+    NO_COMMAND,
+    NewRun,
+    Saved,
+    command_words,
+    create,
+    run_file,
+)
+from ddenv.workbench.widgets.panes import Panes
+from ddenv.workbench.wording import plain
 
-LEAST = (64, 18)
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+SMALLEST = (64, 18)
 # From this size on everything is seen at once.
 ROOMY = (110, 32)
 # From this size on the rarely used settings are seen, too.
 VAST = (160, 48)
-PANES = {"F2": "choose", "F3": "map", "F4": "settings"}
+PANES = {"choose": "F2 choose", "map": "F3 map", "settings": "F4 settings"}
+# Where the focus goes in each pane.
 HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
-class SetupScreen(Starting):
-    """Small terminals show one of three panes at a time: what to choose from, the map, or the settings."""
+class SetupScreen(Screen[None]):
+    """Small terminals show one of three panes at a time: what to choose from, the map, or the settings.
+
+    Nothing is written before the user starts, and then only if everything fits.
+    """
 
     CSS_PATH = "setup.tcss"
-    HORIZONTAL_BREAKPOINTS: ClassVar = [
+    HORIZONTAL_BREAKPOINTS = [
         (0, "-thin"),
-        (LEAST[0], "-slim"),
+        (SMALLEST[0], "-slim"),
         (80, "-narrow"),
         (ROOMY[0], "-wide"),
         (VAST[0], "-vast"),
     ]
-    VERTICAL_BREAKPOINTS: ClassVar = [(0, "-flat"), (LEAST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
-    BINDINGS: ClassVar = [
-        Binding("ctrl+s,f5", "start", "start", id="setup.start", tooltip="start the reduction", key_display="^s"),
-        Binding(
-            "f6,ctrl+b",
-            "baseline",
-            "baseline",
-            id="setup.baseline",
-            tooltip="start, and pause after the baseline: it shows how often the whole world fails",
-            key_display="f6",
-        ),
-        Binding("f7,ctrl+g", "save", "save", id="setup.save", tooltip="save as a scenario file", key_display="f7"),
-        Binding(
-            "f8,ctrl+y",
-            "copy",
-            "copy",
-            id="setup.copy",
-            tooltip="copy the ddenv run command that does the same",
-            key_display="f8",
-        ),
-        Binding("f9", "more", "more", id="setup.more", tooltip="show or hide the rarely used settings", show=False),
-        Binding("ctrl+o", "open", "open", id="setup.open", tooltip="choose a scenario or world file"),
-        Binding("s", "pick('start')", "start", id="setup.pick_start", tooltip="set the start on the map", show=False),
-        Binding(
-            "h", "pick('heading')", "heading", id="setup.pick_heading", tooltip="set the heading on the map", show=False
-        ),
-        Binding("g", "pick('goal')", "goal", id="setup.pick_goal", tooltip="set the goal on the map", show=False),
-        Binding("plus,equals_sign", "zoom(1.25)", "closer", id="setup.closer", tooltip="map: closer", show=False),
-        Binding("minus", "zoom(0.8)", "farther", id="setup.farther", tooltip="map: farther away", show=False),
-        Binding("0", "fit", "fit", id="setup.fit", tooltip="map: show all that matters", show=False),
-        Binding("f2", "pane('choose')", "choose", id="setup.choose", tooltip="to what there is to choose", show=False),
-        Binding("f3", "pane('map')", "map", id="setup.map", tooltip="to the map", show=False),
-        Binding("f4", "pane('settings')", "settings", id="setup.settings", tooltip="to the settings", show=False),
-        Binding("R", "app.runs", "runs", id="setup.runs", tooltip="the list of all runs", show=False),
-        Binding("f1,question_mark", "app.help", "help", id="setup.help", tooltip="show every key", key_display="?"),
-        Binding(
-            "escape", "home", "back", id="setup.home", tooltip="leave picking; back to the list of files", show=False
-        ),
-        Binding("q", "app.leave", "quit", id="setup.quit", tooltip="leave"),
-    ]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
+    BINDINGS = KEYS
 
     def __init__(self, reading: Mapping[str, Any] | None = None, like: Path | None = None) -> None:
         """`reading` holds the command line's options on how to read worlds; `like` is a run to begin with the settings of."""
         super().__init__()
         self._reading = reading or {}
         self._like = like
+        self.form = OptionsForm(id="options", classes="panel")
+        self.preview = Preview(self.form, self._reading, id="preview")
+        # Whether the choice is still being read; so is the first file when the screen opens.
+        self._awaited = True
+        self._past = Past()
+        self._saved: Saved | None = None
         self._opened_now: Path | None = None
         self._keep_places = False
+        self._busy = False
         self._pane = "choose"
 
     def compose(self) -> ComposeResult:
         with Horizontal(id="header"):
-            yield Static(_title(), id="title", markup=False)
-            yield SetupPanes(PANES, id="panes")
+            title = Text(" ddenv", "bold", no_wrap=True)
+            yield Static(title.append("  find the few models that make a robot fail", "not bold dim"), id="title")
+            yield Panes(PANES, id="panes")
         with Horizontal(id="body"):
             with Vertical(id="choice"):
                 with Vertical(id="scenarios", classes="panel") as panel:
@@ -112,12 +97,8 @@ class SetupScreen(Starting):
                     panel.border_title = "Recent runs"
                     panel.border_subtitle = "enter opens"
                     yield RunList(id="run-list")
-            with Vertical(id="preview", classes="panel") as panel:
-                panel.border_title = "World"
-                yield WorldMap(id="map")
-                yield Static("", id="picking", markup=False)
-                yield About(id="about")
-        yield OptionsForm(id="options", classes="panel")
+            yield self.preview
+        yield self.form
         yield Footer(compact=True, show_command_palette=False)
         yield Static("", id="small", markup=False)
 
@@ -133,13 +114,13 @@ class SetupScreen(Starting):
     def on_resize(self, event: events.Resize) -> None:
         width, height = event.size
         self._arrange()
-        self.query_one("#small", Static).update(f"ddenv needs {LEAST[0]} x {LEAST[1]}, this is {width} x {height}")
+        words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
+        self.query_one("#small", Static).update(words)
 
     # What there is to choose from.
 
     @work(thread=True, group="recent", exclusive=True)
     def _list_files(self) -> None:
-        from ddenv.workbench.setup.beginnings import recent_files
         from ddenv.world.load import SCENARIOS, bundled_names
 
         bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
@@ -149,7 +130,7 @@ class SetupScreen(Starting):
         files = self.query_one(FileList)
         files.offer(bundled, recent, self._like)
         if not files.option_count:
-            self.query_one(WorldMap).set_place(Place(), "no bundled scenarios were found; ctrl+o opens a file")
+            self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
 
     @on(FileList.Looked)
     def _looked_at(self, event: FileList.Looked) -> None:
@@ -161,82 +142,207 @@ class SetupScreen(Starting):
 
     @on(OptionList.OptionSelected, "#run-list")
     def _open_run(self, event: OptionList.OptionSelected) -> None:
-        from ddenv.workbench.run.run_screen import RunScreen
+        self.post_message(ShowRun(self.query_one(RunList).run_of(event.option_id).path))
 
-        recent = self.query_one(RunList).run_of(event.option_id)
-        try:
-            screen = RunScreen(recent.path)
-        except UserError as error:
-            self.complain(error)
-            return
-        self.app.switch_screen(screen)
+    def action_open(self) -> None:
+        from ddenv.workbench.setup.open_file import OpenFile
 
-    # The chosen one, read beside the screen.
+        self.app.push_screen(OpenFile(Path.cwd()), self._opened)
+
+    def _opened(self, path: Path | None) -> None:
+        if path is not None:
+            self._opened_now = path
+            self._show_pane("choose")
+            self.query_one(FileList).add(path)
+
+    # The choice.
 
     def _choose(self, path: Path) -> None:
-        self._keep_places = self.chosen is not None and self.chosen.scenario is None
-        self.chosen, self.past, self._awaited = None, Past(), True
-        self.pick("")
+        self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
+        self._past, self._awaited = Past(), True
         self.form.tell("")
-        self.tell_outcome()
-        self._title_preview(path.name)
-        self.query_one("#preview").border_subtitle = ""
-        self.query_one(About).tell("")
-        self.query_one(WorldMap).set_place(Place(), "reading the world ...")
-        self._read(path)
+        self.preview.read(path, opened=path == self._opened_now)
+        self._show_outcome()
 
-    def _title_preview(self, name: str) -> None:
-        self.query_one("#preview").border_title = Text(shorten(plain(name), 40))
+    @on(Preview.Failed)
+    def _cannot_be_read(self) -> None:
+        self._awaited = False
+        self.form.tell("")
 
-    @work(thread=True, group="world", exclusive=True)
-    def _read(self, path: Path) -> None:
+    @on(Preview.Read)
+    def _was_read(self, event: Preview.Read) -> None:
+        choice, picker = event.choice, self.preview.picker
+        if choice is not self.preview.choice:
+            return
+        self._awaited = False
+        # A complaint about a key that came too early is out of date.
+        self.form.tell("")
+        self.form.suggest_name(event.free_name)
+        placed = choice.scenario is not None
+        self.form.show_settings(choice.settings, placed, self._keep_places)
+        picker.show_places()
+        if not placed and picker.spawn is None:
+            picker.pick("start")
+
+    @on(Preview.PastRead)
+    def _past_was_read(self, event: Preview.PastRead) -> None:
+        if event.choice is self.preview.choice:
+            self._past, self.form.seconds = event.past, event.past.seconds
+            self._show_outcome()
+
+    # Places on the map.
+
+    def action_pick(self, what: str) -> None:
+        if self.preview.choice is None:
+            self.notify("there is no world to pick a place in yet", severity="warning", timeout=3)
+            return
+        self.action_pane("map")
+        self.preview.picker.pick(what)
+
+    def action_zoom(self, factor: float) -> None:
+        self.preview.map.zoom(factor)
+
+    def action_fit(self) -> None:
+        self.preview.map.fit()
+
+    # What the settings come to.
+
+    @on(OptionsForm.Edited)
+    def _edited(self, event: OptionsForm.Edited) -> None:
+        if event.place:
+            self.preview.picker.show_places()
+        self._show_outcome()
+
+    def _show_outcome(self) -> None:
+        """The cost and the command of what the form says now, or what is wrong with it."""
+        self.workers.cancel_group(self, "cost")
+        cost, words, typed = "", "", True
+        if self.preview.choice is not None:
+            try:
+                scenario, command = self._scenario(), self._command()
+                words, typed = shlex.join(command) or NO_COMMAND, bool(command)
+                self._reckon(scenario, self.preview.choice.models, form.jobs(self.form.texts["jobs"]), self._past)
+            except UserError as error:
+                cost = f"not ready: {error}"
+        if cost or not words:
+            self.form.tell_cost(cost)
+        self.form.tell_command(words, typed)
+
+    @work(thread=True, group="cost", exclusive=True)
+    def _reckon(self, scenario: Scenario, models: int, jobs: int, past: Past) -> None:
         from textual.worker import get_current_worker
 
-        from ddenv.runs.folder import runs_folder
-
         worker = get_current_worker()
-        try:
-            chosen = read_run(path) if path.suffix == ".ddenv" else read_choice(path, self._reading)
-            answer = chosen, place_of(chosen.world, chosen.scenario), _free_name(chosen.settings.name), ""
-        except UserError as error:
-            answer = None, Place(), "", str(error)
-        if worker.is_cancelled:
-            return
-        tell(self, self._preview, *answer)
-        if answer[0] is None:
-            return
-        if path == self._opened_now:
-            self._remember(path)
-        past = past_of(answer[0].settings, runs_folder())
+        cost = whole_cost(scenario, models, jobs, past)
         if not worker.is_cancelled:
-            tell(self, self._know, answer[0], past)
+            tell(self, self.form.tell_cost, cost)
 
-    def _preview(self, chosen: Chosen | None, place: Place, name: str, wrong: str) -> None:
-        self.chosen, self._awaited = chosen, False
-        # What was asked for too early is not wrong any more.
-        self.form.tell("")
-        self.query_one(WorldMap).set_place(place, wrong)
-        if chosen is None:
+    def _scenario(self) -> Scenario:
+        """The scenario that the form describes. Raises UserError."""
+        pair, algorithm = self.form.method
+        return form.asked_of(self._chosen().settings, self.form.texts, pair, algorithm)
+
+    def _chosen(self) -> Choice:
+        """Raises UserError while there is none."""
+        if self.preview.choice is not None:
+            return self.preview.choice
+        if self._awaited:
+            raise UserError("the world is still being read: try again in a moment")
+        raise UserError("choose a scenario or a world that can be read first")
+
+    def _command(self) -> list[str]:
+        """The words of the command that does the same, none if there is no such command. Raises UserError."""
+        jobs, name = form.jobs(self.form.texts["jobs"]), self.form.own_name
+        return command_words(self._chosen(), self._saved, self._scenario(), jobs=jobs, reading=self._reading, name=name)
+
+    def action_copy(self) -> None:
+        """The whole command to the clipboard (OSC 52)."""
+        try:
+            words = self._command()
+        except UserError as error:
+            self._complain(error)
             return
-        self._title_preview(chosen.name)
-        self.query_one(About).tell(chosen.about)
-        self.form.suggest_name(name)
-        placed = chosen.scenario is not None
-        self.form.show_settings(chosen.settings, placed, self._keep_places)
-        self.mark_places()
-        if not placed and self._place("spawn") is None:
-            self.pick("start")
+        if not words:
+            self.notify(NO_COMMAND, severity="warning", timeout=4)
+            return
+        self.app.copy_to_clipboard(shlex.join(words))
+        self.notify("command copied, if the terminal allows it", timeout=3)
 
-    def _know(self, chosen: Chosen, past: Past) -> None:
-        if chosen is self.chosen:
-            self.past, self.form.seconds = past, past.seconds
-            self.tell_outcome()
+    # Start.
+
+    @on(Button.Pressed, "#start")
+    @on(Input.Submitted)
+    def action_start(self) -> None:
+        self._begin(only_baseline=False)
+
+    def action_baseline(self) -> None:
+        self._begin(only_baseline=True)
+
+    def _begin(self, only_baseline: bool) -> None:
+        if self._busy:
+            return
+        texts = self.form.texts
+        try:
+            scenario = self._scenario()
+            path = run_file(scenario.name, str(form.value(form.NAME, texts["name"])))
+            new = NewRun(self._chosen(), scenario, form.jobs(texts["jobs"]), texts["accept"], path)
+        except UserError as error:
+            self._complain(error)
+            return
+        self._busy = True
+        self.form.tell("checking ...")
+        self._create(new, only_baseline)
+
+    @work(thread=True, group="start", exclusive=True)
+    def _create(self, new: NewRun, only_baseline: bool) -> None:
+        try:
+            engine = create(new, only_baseline)
+        except UserError as error:
+            tell(self, self._complain, error)
+            return
+        tell(self, self.post_message, ShowRun(new.path, engine=engine))
+
+    def _complain(self, error: UserError) -> None:
+        """Shows what is wrong, and the field that it is about."""
+        self._busy = False
+        if form.field_of(error) not in (None, form.NAME.id):
+            self._show_pane("settings")
+        self.form.complain(error)
+
+    # Save as a scenario.
+
+    def action_save(self) -> None:
+        from ddenv.workbench.setup.save_scenario import SaveScenario
+
+        try:
+            scenario = self._scenario()
+        except UserError as error:
+            self._complain(error)
+            return
+        self.app.push_screen(SaveScenario(scenario), self._written)
+
+    def _written(self, path: Path | None) -> None:
+        if path is not None:
+            self.notify(plain(f"wrote {path}"), timeout=5, markup=False)
+            self._load_saved(path)
+
+    @work(thread=True, group="recent", exclusive=True)
+    def _load_saved(self, path: Path) -> None:
+        from ddenv.world.load import load_scenario
+
+        remember(path)
+        try:
+            saved = Saved(path, load_scenario(path))
+        except UserError as error:
+            tell(self, self._complain, error)
+            return
+        tell(self, self._keep_saved, saved)
+
+    def _keep_saved(self, saved: Saved) -> None:
+        self._saved = saved
+        self._show_outcome()
 
     # Panes.
-
-    @property
-    def _roomy(self) -> bool:
-        return self.size.width >= ROOMY[0] and self.size.height >= ROOMY[1]
 
     def _show_pane(self, pane: str) -> None:
         self._pane = pane
@@ -244,36 +350,27 @@ class SetupScreen(Starting):
 
     def _arrange(self) -> None:
         # Not by classes of the screen, which would have all styles worked out again.
-        all, pane = self._roomy, self._pane
-        fits = self.size.width >= LEAST[0] and self.size.height >= LEAST[1]
+        width, height = self.size
+        all, pane = width >= ROOMY[0] and height >= ROOMY[1], self._pane
+        fits = width >= SMALLEST[0] and height >= SMALLEST[1]
         self.form.display = fits
         self.query_one("#body").display = fits and (all or pane != "settings")
         self.query_one("#choice").display = all or pane == "choose"
         self.form.show_fields(all or pane == "settings")
         self.form.set_class(not all and pane == "settings", "-alone")
         self.form.set_class(not all, "-frameless")
-        panes = self.query_one(SetupPanes)
+        panes = self.query_one(Panes)
         panes.display = not all
         panes.mark(pane)
 
-    @on(SetupPanes.Asked)
-    def _pane_asked(self, event: SetupPanes.Asked) -> None:
+    @on(Panes.Chosen)
+    def _pane_chosen(self, event: Panes.Chosen) -> None:
         self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
         """Shows one of the panes where there is no room for all, and goes there."""
         self._show_pane(pane)
         self.query_one(HEADS[pane]).focus()
-
-    def show_map(self) -> None:
-        self.action_pane("map")
-
-    def complain(self, error: UserError) -> None:
-        if form.field_of(error) not in (None, form.NAME.id):
-            self._show_pane("settings")
-        super().complain(error)
-
-    # Other keys.
 
     def action_scroll(self, pages: int) -> None:
         explained = self.query_one(Explained)
@@ -283,37 +380,8 @@ class SetupScreen(Starting):
         self._show_pane("settings")
         self.form.toggle_more()
 
-    def action_zoom(self, factor: float) -> None:
-        self.query_one(WorldMap).zoom(factor)
-
-    def action_fit(self) -> None:
-        self.query_one(WorldMap).fit()
-
-    def action_open(self) -> None:
-        self.app.push_screen(OpenFile(Path.cwd()), self._opened)
-
-    def _opened(self, path: Path | None) -> None:
-        if path is not None:
-            self._opened_now = path
-            self._show_pane("choose")
-            self.query_one(FileList).add(path)
-
     def action_home(self) -> None:
-        if self.picked_next:
-            self.pick("")
+        if self.preview.picker.picked_next:
+            self.preview.picker.pick("")
         else:
             self.action_pane("choose")
-
-
-def _title() -> Text:
-    return Text(" ddenv", "bold", no_wrap=True).append("  find the few models that make a robot fail", "not bold dim")
-
-
-def _free_name(name: str) -> str:
-    """The name that the next run of a scenario gets."""
-    from ddenv.runs.folder import free_run_path
-
-    try:
-        return free_run_path(name).stem
-    except OSError:
-        return "run"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rich.cells import cell_len
 from rich.text import Text
 from textual import events
 from textual.screen import Screen
 from textual.widget import Widget
+
+from ddenv.workbench.help.shortcuts import offered
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ class KeyFooter(Widget):
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self._bindings_changed)
 
-    def _bindings_changed(self, screen: Screen) -> None:
+    def _bindings_changed(self, screen: Screen[Any]) -> None:
         # One move of the focus tells of it several times.
         if screen.app.app_focus and screen is self.screen and not self._due:
             self._due = True
@@ -82,8 +84,9 @@ class KeyFooter(Widget):
 
     def _fitting(self) -> tuple[Entry, ...]:
         """The keys that fit."""
-        active = {each.binding.id: each for each in self.screen.active_bindings.values()}
-        room, found = self.screen.size.width, {}
+        active = {each.binding.id: each for each in offered(self.screen)}
+        room = self.screen.size.width
+        found: dict[str, Entry] = {}
         for id in self._first:
             if id not in active:
                 continue

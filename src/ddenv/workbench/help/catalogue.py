@@ -1,8 +1,7 @@
-"""Every action that a key stands for, and the keys that a user wants for them instead."""
+"""The catalogue of actions: every action that has a key, in the app and on all of its screens."""
 
 from __future__ import annotations
 
-import string
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,24 +10,17 @@ from pkgutil import walk_packages
 
 from textual.binding import Binding
 from textual.dom import DOMNode
-from textual.keys import Keys, _character_to_key
 from textual.screen import Screen
 
 from ddenv.errors import UserError
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.help.key_names import shown_key, textual_keys
 from ddenv.workbench.terminal.themes import nearest
-
-_MODIFIERS = ("ctrl", "shift", "alt", "meta", "super", "hyper")
-_NAMED = {key.value for key in Keys}
-# The names of signs that are on every keyboard, such as question_mark.
-_SIGNS = {_character_to_key(sign): sign for sign in string.punctuation}
-_ARROWS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
-# Terminals send the same for these: (key, what it is).
-_SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+h": "backspace", "ctrl+left_square_bracket": "escape"}
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """What `keys` (as Textual names them) do; `owner` is the name of the screen or widget that has them."""
+    """What `keys` (by Textual's names) do; `owner` is the name of the screen or widget that has them."""
 
     id: str
     keys: tuple[str, ...]
@@ -50,7 +42,7 @@ def actions() -> dict[str, Action]:
 
 def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     """The keymap for Textual that gives the actions these keys. Raises UserError, which begins with `where`."""
-    keymap = {id: _normal(id, keys, where) for id, keys in wanted.items()}
+    keymap = {id: textual_keys(keys, f"{where}: keys: {id}") for id, keys in wanted.items()}
     known = actions()
     for id in keymap:
         if id not in known:
@@ -60,29 +52,8 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
     return keymap
 
 
-def shown(keys: str) -> str:
-    """Keys as a screen shows them: `question_mark,up` as `? ↑`."""
-    return " ".join(shown_key(key) for key in keys.split(","))
-
-
-def shown_key(key: str) -> str:
-    """One key as a screen shows it."""
-    *modifiers, name = key.split("+")
-    return "+".join((*modifiers, _ARROWS[name])) if name in _ARROWS else written(key)
-
-
-def written(key: str) -> str:
-    """One key as it is written in the file: a character as itself, others by name."""
-    *modifiers, name = key.split("+")
-    if not modifiers and len(name) == 1 and name.isupper():
-        return f"shift+{name.lower()}"
-    return "+".join((*modifiers, _SIGNS.get(name, name)))
-
-
 def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) -> None:
-    """No two actions of one screen may be on one key, if one of them was put there by the user."""
-    from ddenv.workbench.app import Workbench
-
+    """No two actions of one screen may have the same key, if the user gave it to one of them."""
     holders: dict[str, str] = {}
     everywhere = _bindings(Workbench) if issubclass(owner, Screen) else ()
     for id in dict.fromkeys(binding.id for binding in (*_bindings(owner), *everywhere) if binding.id):
@@ -97,36 +68,6 @@ def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) 
                 )
 
 
-def _normal(id: str, keys: str, where: str) -> str:
-    names = [keys] if keys == "," else [key.strip() for key in keys.split(",")]
-    return ",".join(_normal_key(id, key, where) for key in names)
-
-
-def _normal_key(id: str, key: str, where: str) -> str:
-    # The plus sign itself may stand after the last plus sign.
-    *modifiers, name = f"{key[:-1]}plus".split("+") if key.endswith("+") else key.split("+")
-    modifiers = [modifier.lower() for modifier in modifiers]
-    if len(name) == 1:
-        if modifiers == ["shift"] and name.isalpha():
-            return name.upper()
-        name = _character_to_key(name)
-    elif name.lower() in _NAMED or name.lower() in _SIGNS:
-        name = name.lower()
-    else:
-        name = ""
-    if not name or not set(modifiers) <= set(_MODIFIERS):
-        raise UserError(
-            f"{where}: keys: {id}: there is no key '{key}'; write a character, or a name such as "
-            f"space, enter, f2, ctrl+s or shift+left"
-        )
-    normal = "+".join((*sorted(modifiers, key=_MODIFIERS.index), name))
-    if normal in _SAME:
-        raise UserError(
-            f"{where}: keys: {id}: terminals send the same for {normal} and {_SAME[normal]}; use another key"
-        )
-    return normal
-
-
 def _keys_of(owner: type[DOMNode], id: str) -> tuple[str, ...]:
     bindings = (binding for binding in _bindings(owner) if binding.id == id)
     return tuple(dict.fromkeys(single.key for binding in bindings for single in Binding.make_bindings([binding])))
@@ -134,9 +75,7 @@ def _keys_of(owner: type[DOMNode], id: str) -> tuple[str, ...]:
 
 @cache
 def _owners() -> tuple[type[DOMNode], ...]:
-    """The app, and all screens and widgets of ours that have keys."""
-    from ddenv.workbench.app import Workbench
-
+    """The app, and all screens and widgets of the workbench that have keys."""
     home = import_module("ddenv.workbench")
     names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
     classes = (value for name in names for value in vars(import_module(name)).values())
@@ -146,7 +85,7 @@ def _owners() -> tuple[type[DOMNode], ...]:
 
 
 def _bindings(owner: type[DOMNode]) -> Iterator[Binding]:
-    """The owner's own bindings, and those of the classes of ours that it is made of."""
+    """The owner's own bindings, and those of its base classes in ddenv."""
     for each in owner.__mro__:
         if each.__module__.startswith("ddenv."):
             yield from (binding for binding in vars(each).get("BINDINGS", ()) if isinstance(binding, Binding))

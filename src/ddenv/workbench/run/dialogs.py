@@ -1,83 +1,31 @@
-"""Dialogs above the screens: help, the method, quit, the scene, and choosing a file."""
+"""Dialogs of the run screen: the method, quit, and the scene."""
 
 from __future__ import annotations
 
 import getpass
 import socket
-from collections.abc import Callable, Iterable
-from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 from urllib.parse import urlsplit
 
 from rich.style import Style
-from rich.table import Table
-from rich.text import Text, TextType
-from textual import on
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
-from textual.screen import ModalScreen, Screen
-from textual.widgets import Button, DirectoryTree, Input, Static
+from textual.screen import ModalScreen
+from textual.widgets import Button, Static
 
-from ddenv.errors import shortened
-from ddenv.workbench.help.shortcuts import Group, groups
 from ddenv.workbench.run.processes import Scene
-from ddenv.workbench.setup.beginnings import is_file
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind
 
-SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
-
-
-class Help(ModalScreen[None]):
-    """Every key with what it does: those of the focused pane first."""
-
-    CSS_PATH = "dialogs.tcss"
-    BINDINGS: ClassVar = [
-        Binding("escape,question_mark,q,enter,f1", "dismiss", "close", id="help.close", tooltip="close this dialog"),
-    ]
-
-    def __init__(self, keys: Iterable[tuple[str, str]] = (), groups: Iterable[Group] = ()) -> None:
-        """`keys` are (key, what it does), for those that no binding tells of."""
-        super().__init__()
-        self._keys, self._groups = tuple(keys), tuple(groups)
-
-    @classmethod
-    def of(cls, screen: Screen) -> Help:
-        """The help for a screen as it is now."""
-        return cls(groups=groups(screen))
-
-    def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Keys"
-            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
-            with VerticalScroll():
-                yield Static(self._table(), markup=False)
-
-    def _table(self) -> Table:
-        table = Table.grid(padding=(0, 2))
-        table.add_column(justify="right", style="bold", max_width=24)
-        table.add_column(overflow="fold")
-        for group in self._groups:
-            if table.row_count:
-                table.add_row()
-            table.add_row("", Text(group.title, "bold underline"))
-            for shortcut in group.shortcuts:
-                table.add_row(Text(shortcut.keys), Text(shortcut.words))
-            for hint in group.hints:
-                table.add_row("", Text(hint))
-        for key, what in self._keys:
-            table.add_row(Text(key), Text(what))
-        return table
-
 
 class Method(ModalScreen[None]):
     """What a run is reduced by, each with its explanation."""
 
-    CSS_PATH = "dialogs.tcss"
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape,e,q,enter", "dismiss", "close", id="method.close", tooltip="close this dialog"),
     ]
@@ -87,7 +35,7 @@ class Method(ModalScreen[None]):
         self._algorithm, self._pair = algorithm, pair
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
+        with Vertical(classes="dialog reading") as dialog:
             dialog.border_title = "How this run is reduced"
             dialog.border_subtitle = "escape closes"
             with VerticalScroll():
@@ -112,7 +60,7 @@ class Method(ModalScreen[None]):
 class Quit(ModalScreen[str]):
     """What becomes of the engine: "stop", "leave" or "cancel"."""
 
-    CSS_PATH = "dialogs.tcss"
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("s", "answer('stop')", "stop the engine", id="quit.stop", tooltip="stop the engine and leave"),
         Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave, the engine goes on"),
@@ -141,7 +89,7 @@ class Quit(ModalScreen[str]):
 class SceneDialog(ModalScreen[None]):
     """The scene's address, and how to reach it over SSH."""
 
-    CSS_PATH = "dialogs.tcss"
+    CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("c", "copy", "copy the address", id="scene.copy", tooltip="copy the address to the clipboard (OSC 52)"),
         Binding("s", "copy_ssh", "copy the ssh line", id="scene.ssh", tooltip="copy the ssh line to the clipboard"),
@@ -199,79 +147,3 @@ def ssh_line(url: str) -> str:
     """The command that makes the scene of this machine reachable from another one."""
     port = urlsplit(url).port
     return f"ssh -L {port}:127.0.0.1:{port} {getpass.getuser()}@{socket.gethostname()}"
-
-
-class WorldTree(DirectoryTree):
-    """Folders, and files that may hold a scenario or a world."""
-
-    ICON_NODE_EXPANDED = "▾ "
-    ICON_NODE = "▸ "
-    ICON_FILE = "  "
-
-    def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        return [path for path in paths if not path.name.startswith(".") and (_is_folder(path) or _fits(path))]
-
-    def process_label(self, label: TextType) -> Text:
-        return Text(plain(label))
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except OSError:
-        return False
-
-
-def _fits(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES
-
-
-class OpenFile(ModalScreen[Path | None]):
-    """Asks for a scenario or world file."""
-
-    CSS_PATH = "dialogs.tcss"
-    BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="open.cancel", tooltip="choose no file")]
-
-    def __init__(self, folder: Path, check: Callable[[Path], str] | None = None) -> None:
-        super().__init__()
-        self._folder, self._check = folder, check or complain_about
-
-    def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog tall") as dialog:
-            dialog.border_title = "Open a scenario (.yaml) or a world (.sdf, .world)"
-            dialog.border_subtitle = "enter opens   escape cancels"
-            yield Input(placeholder="path of a file", id="path", compact=True)
-            yield Static("", id="wrong", markup=False)
-            yield WorldTree(self._folder, id="tree")
-
-    @on(DirectoryTree.FileSelected)
-    def _chosen(self, event: DirectoryTree.FileSelected) -> None:
-        self._take(event.path)
-
-    @on(Input.Submitted)
-    def _typed(self, event: Input.Submitted) -> None:
-        path = Path(event.value.strip())
-        with suppress(RuntimeError):
-            # Nobody knows every user's home; then the path as it is does not exist.
-            path = path.expanduser()
-        self._take(path)
-
-    def _take(self, path: Path) -> None:
-        wrong = self._check(path)
-        self.query_one("#wrong", Static).update(Text(shortened(plain(wrong))))
-        if not wrong:
-            self.dismiss(path)
-
-    def action_cancel(self) -> None:
-        self.dismiss(None)
-
-
-def complain_about(path: Path) -> str:
-    """Why a path cannot be opened, or nothing."""
-    if not str(path) or path == Path():
-        return "give the path of a file"
-    if _is_folder(path):
-        return f"{path}: is a folder; expected a file"
-    if not is_file(path):
-        return f"{path}: no such file"
-    return "" if _fits(path) else f"{path.name}: expected a name that ends in {', '.join(SUFFIXES)}"

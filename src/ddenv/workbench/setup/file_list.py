@@ -1,4 +1,4 @@
-"""The list of what a reduction can begin with: bundled scenarios, and the files that were opened before."""
+"""The list of scenarios and worlds to choose from: the bundled ones, and the files that were opened before."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path
 from rich.text import Text
 from textual import on
 from textual.message import Message
-from textual.widgets import OptionList, Static
+from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.workbench.wording import plain
 
-# More would hide what is looked for.
+# The maximum number of recent files: more would hide the one that is looked for.
 KEPT = 12
 
 
 def recent_file() -> Path:
-    """Where the list is kept: in `$DDENV_HOME`, or in the user's state folder."""
+    """Where the recent files are listed: in `$DDENV_HOME`, or in the user's state folder."""
     import platformdirs
 
     home = os.environ.get("DDENV_HOME")
@@ -29,14 +29,17 @@ def recent_file() -> Path:
 
 
 def recent_files() -> list[Path]:
-    """The files that still are there; none where the list is missing or damaged."""
+    """The recent files that still exist; none where the list is missing or damaged."""
     return [path for path in _listed() if is_file(path)]
 
 
 def remember(path: Path) -> None:
-    """Puts a file at the head of the list. Where nothing can be written, nothing is remembered."""
+    """Puts a file at the head of the recent ones, if the list can be written; bundled scenarios are listed anyway."""
     from ddenv.world.files.access import write_file
+    from ddenv.world.load import SCENARIOS
 
+    if path.parent == SCENARIOS:
+        return
     path = path.absolute()
     names = [path, *(each for each in _listed() if each != path)][:KEPT]
     place = recent_file()
@@ -58,44 +61,15 @@ def _listed() -> list[Path]:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file, and it can be looked at."""
+    """Whether there is such a file, and it can be read."""
     try:
         return path.is_file()
     except (OSError, ValueError):
         return False
 
 
-MORE = " …"
-
-
-class About(Static):
-    """A text of at most `max-height` lines; where it is longer, an ellipsis says so."""
-
-    def __init__(self, *, id: str | None = None) -> None:
-        super().__init__("", id=id, markup=False)
-        self._words = ""
-
-    def tell(self, words: str) -> None:
-        self._words = words
-        self._fit()
-
-    def on_resize(self) -> None:
-        self._fit()
-
-    def _fit(self) -> None:
-        width, most = self.content_size.width, self.styles.max_height
-        lines = Text(self._words).wrap(self.app.console, max(1, width))
-        if most is None or len(lines) <= most.cells:
-            self.update(Text(self._words))
-            return
-        *shown, last = (line.plain.rstrip() for line in lines[: most.cells])
-        if len(last) + len(MORE) > width:
-            last = last.rpartition(" ")[0]
-        self.update(Text("\n".join([*shown, f"{last}{MORE}"])))
-
-
 class FileList(OptionList):
-    """Scenarios by their names, worlds by their files'; a run stands for its own scenario and world."""
+    """Scenarios by their names, worlds by their files' names; a run stands for its own scenario and world."""
 
     class Looked(Message):
         """The cursor is on this file."""
@@ -112,7 +86,7 @@ class FileList(OptionList):
         self._looked: str | None = None
 
     def offer(self, bundled: list[Path], recent: list[Path], like: Path | None = None) -> None:
-        """All that there is to choose from; the cursor is on `like`, a run, or else on the first."""
+        """Shows all that there is to choose from; the cursor is on `like`, a run, or else on the first."""
         self._bundled, self._like = bundled, like
         self._recent = [path for path in recent if path not in bundled]
         self._fill()
@@ -120,7 +94,7 @@ class FileList(OptionList):
             self.highlighted = 0
 
     def add(self, path: Path) -> None:
-        """A file that was opened just now: first of the recent ones, and under the cursor."""
+        """A file that was just opened: first of the recent ones, and under the cursor."""
         if path not in self._bundled:
             self._recent = [path, *(each for each in self._recent if each != path)]
         self._looked = None
@@ -142,7 +116,7 @@ class FileList(OptionList):
     @on(OptionList.OptionHighlighted)
     def _cursor_moved(self, event: OptionList.OptionHighlighted) -> None:
         event.stop()
-        # A list that was filled again has its cursor where it was.
+        # After the list is filled again, its cursor is where it was.
         if event.option_id is not None and event.option_id != self._looked:
             self._looked = event.option_id
             self.post_message(self.Looked(Path(event.option_id)))

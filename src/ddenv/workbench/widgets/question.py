@@ -1,4 +1,4 @@
-"""A question above a screen that is answered by yes or no."""
+"""A dialog that asks a question, answered by yes or no."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from textual.widgets import Button, Static
 
 
 class Question(ModalScreen[bool]):
-    """True for yes. The text may hold names from files: it is never markup."""
+    """True for yes. The text may contain names from files: it is never markup."""
 
-    CSS_PATH: ClassVar = ["dialogs.tcss", "guide.tcss"]
+    CSS = """
+    Question .dialog { width: 72; }
+    Question .dialog Static { width: 100%; }
+    """
     BINDINGS: ClassVar = [
-        Binding("y", "answer(True)", "yes", id="question.yes", tooltip="yes, do it"),
-        Binding("n,escape", "answer(False)", "no", id="question.no", tooltip="no, leave everything as it is"),
+        Binding("y", "dismiss(True)", "yes", id="question.yes", tooltip="yes, do it"),
+        Binding("n,escape", "dismiss(False)", "no", id="question.no", tooltip="no, leave everything as it is"),
         Binding("left", "app.focus_previous", show=False, id="question.previous", tooltip="previous button"),
         Binding("right", "app.focus_next", show=False, id="question.next", tooltip="next button"),
     ]
 
     def __init__(self, text: str, *, final: bool = False) -> None:
-        """Where yes is `final`, enter alone means no."""
+        """With `final`, enter alone means no."""
         super().__init__()
         self._text, self._final = text, final
 
@@ -42,6 +45,3 @@ class Question(ModalScreen[bool]):
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         self.dismiss(event.button.id == "yes")
-
-    def action_answer(self, answer: bool) -> None:
-        self.dismiss(answer)

@@ -1,0 +1,28 @@
+"""What screens ask the app for: to show another screen in their place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from textual.message import Message
+
+if TYPE_CHECKING:
+    from ddenv.workbench.run.processes import Engine
+
+
+@dataclass
+class ShowRun(Message):
+    """Attach to `run`; only `watch` it, without guiding it. `engine` is the one that was just started on it."""
+
+    run: Path
+    watch: bool = False
+    engine: Engine | None = None
+
+
+@dataclass
+class ShowSetup(Message):
+    """The setup screen, with the settings of the run `like` filled in."""
+
+    like: Path | None = None

@@ -1,0 +1,146 @@
+"""What was chosen on the setup screen: a scenario, a world or a run, read in a thread since worlds can be large."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ddenv.errors import UserError
+from ddenv.workbench.wording import count, plain
+
+if TYPE_CHECKING:
+    from ddenv.world.model import Model, World
+    from ddenv.world.scenario import Reading, Scenario
+
+# A robot starts this far above the ground, m: wheels that begin inside it would throw the robot.
+GAP = 0.02
+# The height of a robot's frame where its file cannot be read, m; Start complains about the file.
+SOME_HEIGHT = 0.2
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A world, how it was read, and its scenario unless a bare world was chosen.
+
+    `settings` has the options that the form starts with: the scenario's own, or the defaults. `clearance` is how far the robot's
+    frame is above the ground, m. With `run`, all of it was in the run file `path`.
+    """
+
+    path: Path
+    world: World
+    reading: Reading
+    scenario: Scenario | None
+    settings: Scenario
+    clearance: float
+    run: bool = False
+
+    @property
+    def name(self) -> str:
+        return self.scenario.name if self.scenario else self.path.name
+
+    @property
+    def models(self) -> int:
+        """How many models a reduction could remove."""
+        return len(self.world.elements(frozenset(self.settings.protected)))
+
+    @property
+    def about(self) -> str:
+        """The words below the map."""
+        notes = self.world.notes
+        noted = f" {count(len(notes), 'part')} replaced or ignored ('ddenv world check' lists them)." if notes else ""
+        models = f"{self._removable}{noted}"
+        if self.run:
+            return f"{models} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
+        if self.scenario is not None:
+            return f"{models} {plain(self.scenario.description)}"
+        return f"{models} A world without a scenario: give the robot a spawn and a goal, on the map or in numbers."
+
+    @property
+    def _removable(self) -> str:
+        if self.models == 0:
+            return "None of its models can be removed: there is nothing to reduce."
+        if self.models == 1:
+            return "1 model: a run can only find whether the failure needs it."
+        return f"{self.models} models."
+
+
+def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
+    """A scenario, a world or a run file; `options` are the command line's on how to read worlds. Raises UserError."""
+    if path.suffix == ".ddenv":
+        return _read_run(path)
+    from ddenv.runs.scenarios import reading_of, scenario_for_world
+    from ddenv.world.load import load_scenario
+    from ddenv.world.read import read_world
+    from ddenv.world.scenario import PLAIN
+
+    scenario = load_scenario(path) if path.suffix.lower() in (".yaml", ".yml") else None
+    reading = reading_of(scenario.reading if scenario else PLAIN, **options)
+    settings = scenario or scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    settings = settings.model_copy(update={"reading": reading})
+    world = read_world(settings.world, reading)
+    return Choice(path, world, reading, scenario, settings, _clearance(world, settings, scenario is not None))
+
+
+def _read_run(path: Path) -> Choice:
+    """The scenario and the world that a run file holds, wherever their own files are."""
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.creation import read_parts
+
+    with RunFile(path) as run:
+        scenario, world, robot = read_parts(run)
+    clearance = _scenario_clearance(world, scenario) or _robot_clearance(robot)
+    return Choice(path, world, scenario.reading, scenario, scenario, clearance, run=True)
+
+
+# How high a robot starts.
+
+
+def spawn_height(world: World, clearance: float, x: float, y: float) -> float | None:
+    """The z of a spawn at (x, y) for a robot with that `clearance`, m, to the mm; None where there is no ground."""
+    top = _ground(world, x, y)
+    return None if top is None else round(top + clearance, 3)
+
+
+def _ground(world: World, x: float, y: float) -> float | None:
+    """The highest top of the boxes around the shapes at (x, y), m. None where there is nothing."""
+    from ddenv.world.extent import shape_bounds
+    from ddenv.world.model import Plane
+
+    tops = []
+    for model in world.models:
+        for collision in model.collisions:
+            if isinstance(collision.shape, Plane):
+                tops.append(float(collision.pose.position[2]))
+                continue
+            low, high = shape_bounds(collision.shape, collision.pose)
+            if low[0] <= x <= high[0] and low[1] <= y <= high[1]:
+                tops.append(float(high[2]))
+    return max(tops, default=None)
+
+
+def _clearance(world: World, settings: Scenario, placed: bool) -> float:
+    """As the scenario has it, or else as the robot's shapes need."""
+    from ddenv.world.read import read_model
+
+    above = _scenario_clearance(world, settings) if placed else None
+    if above is not None:
+        return above
+    try:
+        return _robot_clearance(read_model(settings.robot.model, settings.reading))
+    except UserError:
+        return SOME_HEIGHT
+
+
+def _scenario_clearance(world: World, scenario: Scenario) -> float | None:
+    spawn = scenario.robot.spawn
+    ground = _ground(world, spawn.x, spawn.y)
+    return None if ground is None or spawn.z < ground else spawn.z - ground
+
+
+def _robot_clearance(robot: Model) -> float:
+    from ddenv.world.extent import model_bounds
+
+    box = model_bounds(robot)
+    return GAP if box is None else GAP + float(robot.pose.position[2] - box[0][2])

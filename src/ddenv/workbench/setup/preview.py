@@ -1,0 +1,252 @@
+"""The chosen world on the setup screen: its map, the places that are picked on it, and what it is about."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+from textual import on, work
+from textual.app import ComposeResult
+from textual.containers import Vertical
+from textual.message import Message
+from textual.widgets import Static
+
+from ddenv.errors import UserError
+from ddenv.map.raster import arrow
+from ddenv.workbench.background import tell
+from ddenv.workbench.map.place import Place, place_of
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
+from ddenv.workbench.setup.costs import Past, past_of
+from ddenv.workbench.setup.fields import OptionsForm
+from ddenv.workbench.setup.file_list import remember
+from ddenv.workbench.wording import plain, shorten
+
+KEYS = {"start": "s", "heading": "h", "goal": "g"}
+ASKS = {
+    "start": "the start: move the crosshair and press enter, or click",
+    "heading": "the heading: pick a place that the robot looks at",
+    "goal": "the goal: move the crosshair and press enter, or click",
+}
+MORE = " …"
+
+
+class Preview(Vertical):
+    """The panel with the world. `choice` is what was read last, None while something is read or where that failed."""
+
+    @dataclass
+    class Read(Message):
+        """The choice was read; `free_name` is the name that its next run gets."""
+
+        choice: Choice
+        free_name: str
+
+    @dataclass
+    class Failed(Message):
+        """It cannot be read: the map says why."""
+
+    @dataclass
+    class PastRead(Message):
+        """What earlier runs of the choice took was read, too."""
+
+        choice: Choice
+        past: Past
+
+    def __init__(self, form: OptionsForm, reading: Mapping[str, Any], *, id: str) -> None:
+        """`reading` holds the command line's options on how to read worlds."""
+        super().__init__(id=id, classes="panel")
+        self._reading = reading
+        self.map = WorldMap(id="map")
+        self.picker = PlacePicker(self.map, form, id="picking")
+        self.choice: Choice | None = None
+        self.border_title = "World"
+
+    def compose(self) -> ComposeResult:
+        yield self.map
+        yield self.picker
+        yield About(id="about")
+
+    def read(self, path: Path, *, opened: bool) -> None:
+        """Reads a scenario, a world or a run in a thread. A file that the user `opened` is remembered."""
+        self.show_nothing("reading the world ...")
+        self._title(path.name)
+        self._read(path, opened)
+
+    def show_nothing(self, why: str) -> None:
+        """Shows `why` there is no world."""
+        self._choose(None)
+        self.picker.pick("")
+        self.query_one(About).show("")
+        self.map.set_place(Place(), why)
+
+    def _choose(self, choice: Choice | None) -> None:
+        self.choice = self.picker.choice = choice
+
+    def _title(self, name: str) -> None:
+        self.border_title, self.border_subtitle = Text(shorten(plain(name), 40)), ""
+
+    @work(thread=True, group="world", exclusive=True)
+    def _read(self, path: Path, opened: bool) -> None:
+        from textual.worker import get_current_worker
+
+        from ddenv.runs.folder import runs_folder
+
+        worker = get_current_worker()
+        try:
+            choice = read_choice(path, self._reading)
+            place, name = place_of(choice.world, choice.scenario), _free_name(choice.settings.name)
+        except UserError as error:
+            if not worker.is_cancelled:
+                tell(self, self._fail, str(error))
+            return
+        if worker.is_cancelled:
+            return
+        tell(self, self._show, choice, place, name)
+        if opened:
+            remember(path)
+        past = past_of(choice.settings, runs_folder())
+        if not worker.is_cancelled:
+            tell(self, self.post_message, self.PastRead(choice, past))
+
+    def _fail(self, why: str) -> None:
+        self.map.set_place(Place(), why)
+        self.post_message(self.Failed())
+
+    def _show(self, choice: Choice, place: Place, name: str) -> None:
+        self._choose(choice)
+        self._title(choice.name)
+        self.map.set_place(place)
+        self.query_one(About).show(choice.about)
+        self.post_message(self.Read(choice, name))
+
+    @on(WorldMap.PlacePicked)
+    def _place_picked(self, event: WorldMap.PlacePicked) -> None:
+        self.picker.take(event.x, event.y)
+
+
+class PlacePicker(Static):
+    """The line below the map: which place is picked next, or where start and goal are and the keys to pick others.
+
+    The numbers themselves are in the form; the map shows them, and has the crosshair to pick with. `picked_next` is "start",
+    "heading", "goal", or "" for nothing.
+    """
+
+    def __init__(self, world: WorldMap, form: OptionsForm, *, id: str) -> None:
+        super().__init__("", id=id, markup=False)
+        self._map, self._form = world, form
+        self.choice: Choice | None = None
+        self.picked_next = ""
+
+    def pick(self, what: str) -> None:
+        """The next place on the map is "start", "heading" or "goal"; "" ends that."""
+        if what == "heading" and self.spawn is None:
+            what = "start"
+        self.picked_next = what
+        self._map.picking = bool(what)
+        self._show_words()
+
+    def take(self, x: float, y: float) -> None:
+        """A place on the map was picked, m: fills in the form, and goes on to what is not placed yet."""
+        if self.choice is None or not self.picked_next:
+            return
+        if self.picked_next == "start":
+            texts, then = self._start(self.choice, x, y), "heading"
+        elif self.picked_next == "heading":
+            texts, then = self._heading(x, y), "goal" if self.goal is None else ""
+        else:
+            texts, then = {"goal_x": _metres(x), "goal_y": _metres(y)}, ""
+        if texts:
+            self._form.set_texts(texts)
+            self.pick(then)
+
+    def _start(self, choice: Choice, x: float, y: float) -> dict[str, str]:
+        z = spawn_height(choice.world, choice.clearance, x, y)
+        texts = {"spawn_x": _metres(x), "spawn_y": _metres(y)}
+        if z is not None:
+            texts["spawn_z"] = _metres(z)
+        if not self._form.texts["spawn_yaw"].strip():
+            texts["spawn_yaw"] = "0"
+        return texts
+
+    def _heading(self, x: float, y: float) -> dict[str, str]:
+        spawn = self.spawn
+        if spawn is None or math.hypot(x - spawn[0], y - spawn[1]) < 0.01:
+            return {}
+        return {"spawn_yaw": form.text_of(round(math.atan2(y - spawn[1], x - spawn[0]), 3))}
+
+    @property
+    def spawn(self) -> tuple[float, float, float] | None:
+        """x and y, m, and yaw, rad, as the form has them; None while one of them is no number."""
+        numbers = form.place("spawn", self._form.texts)
+        return (numbers[0], numbers[1], numbers[3]) if numbers and all(map(math.isfinite, numbers)) else None
+
+    @property
+    def goal(self) -> tuple[float, float] | None:
+        """x and y, m, as the form has them; None while one of them is no number."""
+        numbers = form.place("goal", self._form.texts)
+        return (numbers[0], numbers[1]) if numbers and all(map(math.isfinite, numbers)) else None
+
+    def show_places(self) -> None:
+        """Shows start and goal as the form has them, on the map and in words."""
+        if self.choice is not None:
+            self._map.set_marks(self.spawn, self.goal)
+            self._show_words()
+
+    def _show_words(self) -> None:
+        self.set_class(bool(self.picked_next), "-on")
+        if self.picked_next:
+            words = Text("▶ ", "bold", no_wrap=True, overflow="ellipsis").append(ASKS[self.picked_next])
+            self.update(words.append("   escape leaves it", "dim"))
+            return
+        spawn, goal = self.spawn, self.goal
+        heading = f"{arrow(spawn[2])} {math.degrees(spawn[2]):.0f}°" if spawn else "?"
+        text = Text(no_wrap=True, overflow="ellipsis")
+        for what, where in (("start", _point(spawn)), ("heading", heading), ("goal", _point(goal))):
+            text.append(KEYS[what], "bold").append(f" {what} {where}   ")
+        self.update(text)
+
+
+class About(Static):
+    """A text of at most `max-height` lines; an ellipsis says that there is more."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__("", id=id, markup=False)
+        self._words = ""
+
+    def show(self, words: str) -> None:
+        self._words = words
+        self.on_resize()
+
+    def on_resize(self) -> None:
+        width, most = self.content_size.width, self.styles.max_height
+        lines = Text(self._words).wrap(self.app.console, max(1, width))
+        if most is None or most.cells is None or len(lines) <= most.cells:
+            self.update(Text(self._words))
+            return
+        *shown, last = (line.plain.rstrip() for line in lines[: most.cells])
+        if len(last) + len(MORE) > width:
+            last = last.rpartition(" ")[0]
+        self.update(Text("\n".join([*shown, f"{last}{MORE}"])))
+
+
+def _metres(value: float) -> str:
+    return form.text_of(round(value, 3) + 0.0)
+
+
+def _point(place: tuple[float, ...] | None) -> str:
+    return f"({place[0]:.2f}, {place[1]:.2f}) m" if place else "not set"
+
+
+def _free_name(scenario_name: str) -> str:
+    """The name that the next run of a scenario gets."""
+    from ddenv.runs.folder import free_run_path
+
+    try:
+        return free_run_path(scenario_name).stem
+    except OSError:
+        return "run"
