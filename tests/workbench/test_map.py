@@ -14,9 +14,9 @@ from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live
-from ddenv.workbench.map import overview
-from ddenv.workbench.map.place import place_of_run
-from ddenv.workbench.map.world_map import LAYERS, Place, WorldMap
+from ddenv.workbench.map import map_drawing
+from ddenv.workbench.map.place import LAYERS, Place, place_of_run
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.poll import Poll, Snapshot
 
 
@@ -134,16 +134,16 @@ async def test_removed_models_are_selected_no_longer(busy):
 
 async def test_the_crosshair_moves_by_cells_and_pans_at_the_border(busy):
     async with Shown(busy) as (pilot, world):
-        view, (row, column) = world._view, world.cursor
+        view, (row, column) = world.viewport.view, world.viewport.cursor
         await pilot.press("left", "up")
-        assert world.cursor == (row - 1, column - 1)
-        assert world._view == view
+        assert world.viewport.cursor == (row - 1, column - 1)
+        assert world.viewport.view == view
         await pilot.press(*["up"] * (row + 2))
-        assert world.cursor[0] == 0
-        assert world._view.y == pytest.approx(view.y + 3 * 2 * view.scale)
+        assert world.viewport.cursor[0] == 0
+        assert world.viewport.view.y == pytest.approx(view.y + 3 * 2 * view.scale)
         await pilot.press("shift+right")
-        assert world._view.x > view.x
-        assert world.cursor == (0, column - 1)
+        assert world.viewport.view.x > view.x
+        assert world.viewport.cursor == (0, column - 1)
         assert "┼" in text_of(world)
 
 
@@ -159,48 +159,48 @@ async def test_the_crosshair_finds_removed_models_on_a_floor(busy):
 async def test_a_model_outside_the_view_comes_into_it(busy):
     async with Shown(busy) as (pilot, world):
         world.zoom(8)
-        world.pan(500, 0)
+        world.viewport.pan(500, 0)
         await pilot.pause()
         assert world.go_to("crate_02")
         assert world.model_at_cursor == "crate_02"
-        assert world._view.cell(*world.place.prints[world._numbers["crate_02"]].center) == world.cursor
+        assert world.viewport.view.cell(*world.place.prints[world._numbers["crate_02"]].center) == world.viewport.cursor
         assert not world.go_to("nothing")
 
 
 async def test_the_wheel_keeps_the_place_under_the_pointer(busy):
     async with Shown(busy) as (pilot, world):
-        before = world._view.point((3, 10))
+        before = world.viewport.view.point((3, 10))
         scroll = MouseScrollUp(world, 10, 3, 0, 0, 0, False, False, False, screen_x=11, screen_y=4)
         world.post_message(scroll)
         await pilot.pause()
-        assert world._view.point((3, 10)) == pytest.approx(before)
+        assert world.viewport.view.point((3, 10)) == pytest.approx(before)
 
 
 async def test_a_click_selects_and_a_drag_pans(busy):
     async with Shown(busy) as (pilot, world):
         index = world._numbers["crate_01"]
-        row, column = world._picture.cells[index]
+        row, column = world.picture.cells[index]
         await pilot.click(world, offset=(column, row))
         assert world.selection == {"crate_01"}
-        view = world._view
+        view = world.viewport.view
         await pilot.mouse_down(world, offset=(10, 5))
         await pilot.hover(world, offset=(14, 7))
         await pilot.mouse_up(world, offset=(14, 7))
         assert world.selection == {"crate_01"}
-        assert world._view.x == pytest.approx(view.x - 4 * view.scale)
-        assert world._view.y == pytest.approx(view.y + 2 * 2 * view.scale)
+        assert world.viewport.view.x == pytest.approx(view.x - 4 * view.scale)
+        assert world.viewport.view.y == pytest.approx(view.y + 2 * 2 * view.scale)
 
 
 async def test_a_place_is_picked_by_enter_or_click(busy):
     async with Shown(busy) as (pilot, world):
         world.picking = True
         await pilot.press("right", "enter")
-        x, y = world._view.point(world.cursor)
+        x, y = world.viewport.view.point(world.viewport.cursor)
         assert subtitle(world) == f"x {x:.2f}, y {y:.2f} m"
         await pilot.click(world, offset=(10, 5))
         assert pilot.app.places == [
             pytest.approx((x, y), abs=1e-3),
-            pytest.approx(world._view.point((5, 10)), abs=1e-3),
+            pytest.approx(world.viewport.view.point((5, 10)), abs=1e-3),
         ]
         assert world.selection == frozenset()
 
@@ -236,22 +236,22 @@ def fake_sensed(test, sensed):
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
     async with Shown(busy) as (_, world):
-        before = world._picture.canvas.chars.copy()
+        before = world.picture.canvas.chars.copy()
         moved = type(world.snapshot.evidence)("d", world.snapshot.evidence)
         for index in range(2, len(moved), 8):
             moved[index] -= 2.0
         world.show(Snapshot(world.snapshot.state, evidence=world.snapshot.evidence, original=moved), None)
-        new = world._picture.canvas.chars[(world._picture.canvas.chars != before)]
+        new = world.picture.canvas.chars[(world.picture.canvas.chars != before)]
         assert (new > 0x2800).any()
         assert "path of f" in world.legend(100).plain
         world.toggle_layer("original")
-        assert (world._picture.canvas.chars == before).all()
+        assert (world.picture.canvas.chars == before).all()
 
 
 async def test_only_the_robot_is_drawn_again_when_only_it_moves(busy, monkeypatch):
     async with Shown(busy) as (_, world):
         for name in ("picture", "looks", "seen", "kept"):
-            monkeypatch.setattr(overview, name, lambda *_, **__: pytest.fail("drawn again"))
+            monkeypatch.setattr(map_drawing, name, lambda *_, **__: pytest.fail("drawn again"))
         regions = []
         monkeypatch.setattr(world, "refresh", lambda *changed, **_: regions.extend(changed))
         snapshot = world.snapshot
@@ -321,9 +321,9 @@ async def test_in_every_theme_models_stand_out_from_the_background(busy, theme):
     async with Shown(busy) as (pilot, world):
         pilot.app.theme = theme
         await pilot.pause()
-        canvas, index = world._picture.canvas, world._numbers["crate_00"]
+        canvas, index = world.picture.canvas, world._numbers["crate_00"]
         back = world._palette.back
-        shown = np.argwhere(world._picture.grid[0::2] == index)
+        shown = np.argwhere(world.picture.grid[0::2] == index)
         colors = {int(canvas.fore[tuple(cell)]) for cell in shown} | {int(canvas.back[tuple(cell)]) for cell in shown}
         assert colors - {back}
         assert (back == -1) == theme.startswith("ansi")

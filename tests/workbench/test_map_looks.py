@@ -11,7 +11,6 @@ from textual.color import Color
 from ddenv.map.footprints import Footprint
 from ddenv.map.paint import HUES, NUMBERED, Canvas, luminance, packed
 from ddenv.map.raster import View, masks, owners
-from ddenv.workbench.map.looks import Kept, fill, looks
 from ddenv.workbench.map.map_colors import (
     KEPT,
     LEFT_OUT,
@@ -26,7 +25,8 @@ from ddenv.workbench.map.map_colors import (
     plain,
     sixteen,
 )
-from ddenv.workbench.map.moving import strip
+from ddenv.workbench.map.model_looks import Kept, fill, looks
+from ddenv.workbench.map.picture import strip
 
 DARK, LIGHT = ((15, 20, 27), (213, 219, 229)), ((250, 250, 250), (30, 30, 30))
 PALETTES = {

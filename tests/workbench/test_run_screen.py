@@ -78,11 +78,11 @@ async def test_keys_that_only_look(run):
     fake_run.guided(run).hold()
     async with Attached(run) as session:
         screen, world = session.screen, session.screen.query_one(WorldMap)
-        fitted = world._view
+        fitted = world.viewport.view
         await session.press("plus")
-        assert world._view.scale < fitted.scale
+        assert world.viewport.view.scale < fitted.scale
         await session.press("0")
-        assert world._view == fitted
+        assert world.viewport.view == fitted
         await session.press("slash", *"_03", "enter")
         assert world.has_focus
         assert world.model_at_cursor == "crate_03"

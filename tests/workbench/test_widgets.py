@@ -10,8 +10,8 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
-from ddenv.workbench.map.looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
-from ddenv.workbench.map.moving import strip
+from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
+from ddenv.workbench.map.picture import strip
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.run.processes import last_line
 from ddenv.workbench.runs.recent_runs import recent_runs

@@ -16,7 +16,8 @@ from textual.widgets import Static
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Node, RunState
 from ddenv.workbench.history import branches
-from ddenv.workbench.map.world_map import Place, WorldMap
+from ddenv.workbench.map.place import Place
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run import guiding
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.widgets.lines import Lines

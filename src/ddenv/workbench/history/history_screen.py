@@ -19,7 +19,7 @@ from ddenv.runfile.state import Decision, Node
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
-from ddenv.workbench.map.world_map import Place
+from ddenv.workbench.map.place import Place
 from ddenv.workbench.run import guiding
 from ddenv.workbench.run.log import decision_line
 from ddenv.workbench.run.poll import Snapshot

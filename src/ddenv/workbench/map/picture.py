@@ -1,18 +1,26 @@
-"""What a map shows besides the robots that drive now: drawn once for a view and an environment, then kept between frames."""
+"""The picture of a map: what stays while robots drive, then the robots, the paths behind them, and the crosshair."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+
+from rich.color import Color
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
 
 from ddenv.map import arrays as np
 from ddenv.map.cells import Cell, place_signs
-from ddenv.map.paint import Canvas, readable
-from ddenv.map.raster import Outlines, Spans, View, braille, owners, spans
-from ddenv.workbench.map.looks import Looks, fill, ghosts
-from ddenv.workbench.map.map_colors import REMOVED
+from ddenv.map.paint import NUMBERED, Canvas, readable
+from ddenv.map.raster import Outlines, Spans, View, arrow, braille, heading, owners, spans
+from ddenv.workbench.map.map_colors import REMOVED, Palette
+from ddenv.workbench.map.model_looks import Looks, fill, ghosts
+from ddenv.workbench.map.place import Point
+from ddenv.workbench.run.poll import Snapshot
 
-Point = tuple[float, float]
+ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +34,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A path through `points` (N, 2) m in a packed colour; with `dash`, so many dots of it and as many left out in turn."""
+    """A path through `points` (N, 2) m in a packed colour; with `dash`, this number of dots and of gaps in turn."""
 
     points: np.ndarray
     color: int
@@ -44,12 +52,14 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A canvas with the owners of its pixels: of kept models in `grid`, of removed ones in `gone`.
+    """A canvas for `view`, with the looks of the models and the owner of each pixel: kept ones in `grid`, removed ones in `gone`.
 
     `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where the sign of each model begins
     that has one.
     """
 
+    view: View
+    how: Looks
     canvas: Canvas
     grid: np.ndarray
     gone: np.ndarray
@@ -59,7 +69,8 @@ class Picture:
 
     def holds(self, cell: Cell) -> bool:
         """Whether a cell is in the picture."""
-        return cell[0] < self.written.shape[0] and cell[1] < self.written.shape[1]
+        rows, columns = self.canvas.chars.shape
+        return cell[0] < int(rows) and cell[1] < int(columns)
 
     def owner(self, cell: Cell) -> int:
         """The model that is seen in a cell, a removed one if there are dots, or EMPTY."""
@@ -102,4 +113,68 @@ def picture(
     for cell, mark in places.items():
         canvas.put(cell, mark.text, readable(mark.ground), mark.ground)
         written[cell] = True
-    return Picture(canvas, grid, gone, dotted, written, cells)
+    return Picture(view, how, canvas, grid, gone, dotted, written, cells)
+
+
+def follow(trails: Mapping[int, list[Point]], snapshot: Snapshot) -> dict[int, list[Point]]:
+    """Where the robots that drive now have been, by test, m: those of before and where they are now."""
+    grown = {}
+    for live in snapshot.live:
+        trail = trails.get(live.test, [])
+        point = (live.pose[0], live.pose[1])
+        if not trail or trail[-1] != point:
+            trail.append(point)
+        grown[live.test] = trail
+    return grown
+
+
+def robots(
+    canvas: Canvas,
+    view: View,
+    written: np.ndarray,
+    snapshot: Snapshot,
+    trails: Mapping[int, list[Point]],
+    palette: Palette,
+) -> None:
+    """The robots as arrows and the paths behind them, which hide no letter; those of the candidate in focus stand out."""
+    focus = snapshot.focus
+    ids = {test.id for test in snapshot.running if focus is not None and test.candidate == focus.index}
+    colors = {live.test: palette.live if live.test in ids or not ids else palette.dull for live in snapshot.live}
+    for test, trail in trails.items():
+        bits = braille(np.array(trail), view)
+        bits[written] = 0
+        canvas.dots(bits, colors.get(test, palette.dull))
+    for live in snapshot.live:
+        color = colors[live.test]
+        canvas.put(view.cell(live.pose[0], live.pose[1]), arrow(heading(live.pose[3:])), readable(color), color)
+
+
+def crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
+    """Marks a cell by four arms; a letter in it stays to be read."""
+    rows, columns = canvas.chars.shape
+    row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
+    for (down, right), sign in ARMS:
+        place = row + down, column + right
+        if 0 <= place[0] < rows and 0 <= place[1] < columns:
+            canvas.put(place, sign)
+    sign = chr(canvas.chars[row, column]) if written[row, column] else "┼"
+    canvas.put((row, column), sign, readable(palette.live), palette.live)
+
+
+def strip(canvas: Canvas, row: int) -> Strip:
+    """One row of `canvas`."""
+    segments = [Segment(run.text, _style(run.fore, run.back, run.bold)) for run in canvas.runs(row)]
+    return Strip(segments, canvas.chars.shape[1])
+
+
+@lru_cache(maxsize=4096)
+def _style(fore: int, back: int, bold: bool) -> Style:
+    return Style(color=_color(fore), bgcolor=_color(back), bold=bold)
+
+
+def _color(value: int) -> Color:
+    if value < 0:
+        return Color.default()
+    if value >= NUMBERED:
+        return Color.from_ansi(value - NUMBERED)
+    return Color.from_rgb(value >> 16, value >> 8 & 255, value & 255)

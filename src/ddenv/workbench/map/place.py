@@ -1,19 +1,23 @@
-"""What a map shows of a world and its scenario: read in a thread, since worlds can be large."""
+"""What a map shows: a place, read in a thread since worlds can be large, and a run as it is now."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ddenv.workbench.run.observed import Busy, Observed
+from ddenv.workbench.run.poll import Snapshot
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
+    from ddenv.runfile.state import Candidate, Trial
     from ddenv.world.model import World
     from ddenv.world.scenario import Scenario
 
+# The layers of the map, which can be hidden.
+LAYERS = ("partitions", "removed", "pinned", "sensed", "path", "original", "failure")
 Point = tuple[float, float]
 # How long a run file that another program keeps locked is tried again, s.
 PATIENCE = 10.0
@@ -30,6 +34,31 @@ class Place:
     spawn: tuple[float, float, float] | None = None
     goal: Point | None = None
     elements: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """All that a map shows: a world, its run as it is now, and the `candidate` whose models stand out.
+
+    `layers` are from LAYERS; `selection` are the names of the models that the user selected.
+    """
+
+    place: Place = field(default_factory=Place)
+    snapshot: Snapshot = field(default_factory=Snapshot)
+    candidate: Candidate | Trial | None = None
+    layers: frozenset[str] = frozenset(LAYERS) - {"sensed"}
+    selection: frozenset[str] = frozenset()
+
+    @property
+    def start(self) -> Point | None:
+        """Where the robot starts, m."""
+        return None if self.place.spawn is None else self.place.spawn[:2]
+
+    @property
+    def failure(self) -> Point | None:
+        """Where the robot ended in f, m."""
+        base = self.snapshot.state.baseline
+        return None if base is None else (base.position[0], base.position[1])
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:

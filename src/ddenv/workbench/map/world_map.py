@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.segment import Segment
 from rich.text import Text
+from textual import events
 from textual.binding import Binding
+from textual.geometry import Region
 from textual.message import Message
+from textual.strip import Strip
 from textual.widget import Widget
 
 from ddenv.map.cells import Cell
+from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY, View
-from ddenv.runfile.state import Candidate, Trial
-from ddenv.workbench.map.described import describe
-from ddenv.workbench.map.overview import LAYERS, Overview, Place
+from ddenv.workbench.map.map_colors import Palette, palette_of
+from ddenv.workbench.map.map_drawing import MapDrawing
+from ddenv.workbench.map.map_words import describe, legend
+from ddenv.workbench.map.picture import Picture, strip
+from ddenv.workbench.map.place import Place, Point, Shown
+from ddenv.workbench.map.viewport import Viewport
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
-    from ddenv.runfile.state import Trial
+    from ddenv.runfile.state import Candidate, Trial
 
-__all__ = ["LAYERS", "Place", "WorldMap"]
+# Each turn of the wheel comes closer by this factor, or goes farther away.
+WHEEL = 1.25
 
 
-class WorldMap(Overview, can_focus=True):
+class WorldMap(Widget, can_focus=True):
     """Top-down map. Give it a `Place`, then snapshots. While it is `picking`, enter and clicks choose places, not models."""
 
     HELP = "click: select a model or not   wheel: closer, farther   drag: move the map"
@@ -39,24 +48,8 @@ class WorldMap(Overview, can_focus=True):
         Binding("shift+up", "pan(0, 1)", "pan", show=False, id="map.pan_up", tooltip="move the map up"),
         Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
         Binding("enter", "pick", "select", id="map.pick", tooltip="select the model under the crosshair, or no longer"),
-        Binding(
-            "left_square_bracket",
-            "neighbour(-1)",
-            "previous model",
-            show=False,
-            id="map.previous",
-            key_display="[",
-            tooltip="crosshair to the previous model",
-        ),
-        Binding(
-            "right_square_bracket",
-            "neighbour(1)",
-            "next model",
-            show=False,
-            id="map.next",
-            key_display="]",
-            tooltip="crosshair to the next model",
-        ),
+        Binding("left_square_bracket", "neighbour(-1)", show=False, id="map.previous", tooltip="to the previous model"),
+        Binding("right_square_bracket", "neighbour(1)", show=False, id="map.next", tooltip="to the next model"),
     ]
 
     @dataclass
@@ -80,12 +73,48 @@ class WorldMap(Overview, can_focus=True):
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
+        self.shown = Shown()
+        self.notice = "reading the world ..."
+        self.viewport = Viewport()
+        self._drawing = MapDrawing()
+        self._palette: Palette | None = None
+        self.picture: Picture | None = None
+        self._canvas: Canvas | None = None
+        self._strips: dict[int, Strip] = {}
+        self._due = False
         self._picking = False
+        # Where the mouse has hold of the map, and whether it moved since.
+        self._grabbed: tuple[int, int] | None = None
+        self._dragged = False
         self._numbers: dict[str, int] = {}
         # The model that the crosshair was sent to, with where it was then: it may be hidden by another one.
         self._aim: tuple[str, Cell, View] | None = None
         self._pointed: str | None = None
-        self._told: tuple = ()
+        self._subtitle_of: tuple[object, ...] = ()
+
+    # What is shown.
+
+    @property
+    def place(self) -> Place:
+        return self.shown.place
+
+    @property
+    def snapshot(self) -> Snapshot:
+        return self.shown.snapshot
+
+    @property
+    def candidate(self) -> Candidate | Trial | None:
+        """The one whose models stand out."""
+        return self.shown.candidate
+
+    @property
+    def selection(self) -> frozenset[str]:
+        """The names of the models that the user selected."""
+        return self.shown.selection
+
+    @property
+    def shown_layers(self) -> frozenset[str]:
+        return self.shown.layers
 
     @property
     def picking(self) -> bool:
@@ -99,50 +128,76 @@ class WorldMap(Overview, can_focus=True):
 
     @property
     def aims(self) -> bool:
+        """Whether the crosshair is shown."""
         return self.has_focus or self._picking
 
     def set_place(self, place: Place, notice: str = "") -> None:
+        """Another world. `notice` is shown instead of a map when there is none."""
+        self.notice = notice
+        self.shown = replace(self.shown, place=place)
         self._numbers = {each.name: number for number, each in enumerate(place.prints)}
-        self._aim = None
-        super().set_place(place, notice)
+        self._aim, self.picture, self._canvas = None, None, None
+        self.fit()
+        self.refresh()
+
+    def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
+        """Other start (x, y, yaw) and goal in the same world."""
+        self.shown = replace(self.shown, place=replace(self.place, spawn=spawn, goal=goal))
+        self._refit()
 
     def show(self, snapshot: Snapshot, candidate: Candidate | Trial | None) -> None:
-        if self.selection and snapshot.state.environment is not self.snapshot.state.environment:
+        """The run as it is now; `candidate` is the one whose models stand out."""
+        before = self.snapshot
+        if self.selection and snapshot.state.environment is not before.state.environment:
             self.select(self.selection.intersection(snapshot.state.environment))
-        super().show(snapshot, candidate)
+        self.shown = replace(self.shown, snapshot=snapshot, candidate=candidate)
+        self._drawing.follow(snapshot)
+        if snapshot.evidence is not before.evidence and self.viewport.fitted:
+            self._refit()
+        else:
+            self.draw()
+
+    def toggle_layer(self, name: str) -> None:
+        """Shows one of `LAYERS`, or hides it."""
+        self.shown = replace(self.shown, layers=self.shown_layers ^ {name})
+        self.draw()
+
+    def legend(self, width: int) -> Text:
+        """One line that says what the signs on the map mean, as many as fit."""
+        return legend(self.shown, width, same_paths=self._drawing.same_paths(self.snapshot))
 
     # Models.
 
     @property
     def model_at_cursor(self) -> str | None:
         """The name of the model under the crosshair."""
-        if self._aim is not None and self._aim[1:] == (self.cursor, self._view):
+        cursor = self.viewport.cursor
+        if self._aim is not None and self._aim[1:] == (cursor, self.viewport.view):
             return self._aim[0]
-        drawn = self._picture
-        if drawn is None or not drawn.holds(self.cursor):
+        if self.picture is None or not self.picture.holds(cursor):
             return None
-        owner = drawn.owner(self.cursor)
+        owner = self.picture.owner(cursor)
         return None if owner == EMPTY else self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
-        """What is known of a model, on one line of at most so many `columns`; empty for one that is not there."""
+        """What is known of a model, on one line of at most `columns`; empty for a name that no model has."""
         number = self._numbers.get(name)
         return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
     def go_to(self, name: str) -> bool:
-        """The crosshair to a model, and the map to where it is; False if there is no such model."""
-        number, view = self._numbers.get(name), self._view
-        if number is None or view is None:
+        """Moves the crosshair to a model, and the map if needed; False if there is no such model."""
+        number, port = self._numbers.get(name), self.viewport
+        if number is None or port.view is None:
             return False
         center = self.place.prints[number].center
-        current = self._picture is not None and self._seen is not None and self._seen.view == view
-        cell = (self._picture.cells.get(number) if current else None) or view.cell(*center)
+        drawn = self.picture
+        cell = drawn.cells.get(number) if drawn is not None and drawn.view == port.view else None
+        cell = cell or port.view.cell(*center)
         if cell is None:
-            self._fitted = False
-            self._view = view.around(*center)
-            cell = self._view.cell(*center)
-        self.cursor = cell or self.cursor
-        self._aim = (name, self.cursor, self._view)
+            port.center_on(*center)
+        else:
+            port.cursor = cell
+        self._aim = (name, port.cursor, port.view)
         self.draw()
         return True
 
@@ -150,7 +205,7 @@ class WorldMap(Overview, can_focus=True):
         """These models instead of those selected so far."""
         selection = frozenset(names)
         if selection != self.selection:
-            self.selection = selection
+            self.shown = replace(self.shown, selection=selection)
             self.post_message(self.SelectionChanged(selection))
             self.draw()
 
@@ -169,15 +224,11 @@ class WorldMap(Overview, can_focus=True):
         elif names:
             self.go_to(names[0 if step > 0 else -1])
 
-    def clicked(self) -> None:
-        self._aim = None
-        self.action_pick()
-
     def action_pick(self) -> None:
         """Chooses the place under the crosshair, or else its model."""
-        name, state = self.model_at_cursor, self.snapshot.state
-        if self._picking and self._view is not None:
-            self.post_message(self.PlacePicked(*(round(value, 3) for value in self._view.point(self.cursor))))
+        name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
+        if self._picking and port.view is not None:
+            self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
         elif name is None or not state.elements:
             return
         elif name in state.environment:
@@ -186,69 +237,152 @@ class WorldMap(Overview, can_focus=True):
             why = "removed already" if name in state.elements else "protected: it always stays"
             self.notify(f"{plain(name)} is {why}", severity="warning", markup=False)
 
-    # What is told of them.
+    # Which part of the world.
+
+    def zoom(self, factor: float) -> None:
+        """Closer by `factor`, about the crosshair where there is one, else about the middle."""
+        self.viewport.zoom(factor, self.viewport.cursor if self.aims else None)
+        self._draw_soon()
+
+    def fit(self) -> None:
+        """Shows all that matters again."""
+        self.viewport.fitted = True
+        self._refit()
+
+    def _refit(self) -> None:
+        """Another size, or other things that matter."""
+        columns, rows = self.size
+        # Without a world there is nothing to see, and what draws it need not be loaded.
+        if columns and rows and (not self.notice or self.place.prints):
+            self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
+            self.draw()
+
+    def on_resize(self) -> None:
+        self._refit()
+
+    def action_pan(self, right: int, up: int) -> None:
+        self.viewport.pan_part(right, up)
+        self._draw_soon()
+
+    def action_move(self, right: int, up: int) -> None:
+        self.viewport.step(right, up)
+        self._draw_soon()
+
+    # The mouse.
+
+    def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
+        self._wheel(event, WHEEL)
+
+    def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
+        self._wheel(event, 1 / WHEEL)
+
+    def _wheel(self, event: events.MouseEvent, factor: float) -> None:
+        event.stop()
+        self.viewport.zoom(factor, (event.y, event.x))
+        self._draw_soon()
+
+    def on_mouse_down(self, event: events.MouseDown) -> None:
+        if event.button == 1:
+            self._grabbed, self._dragged = (event.screen_x, event.screen_y), False
+            self.capture_mouse()
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        if self._grabbed is None:
+            return
+        x, y = self._grabbed
+        self._grabbed = event.screen_x, event.screen_y
+        if self._grabbed != (x, y):
+            self._dragged = True
+            self.viewport.pan(x - event.screen_x, event.screen_y - y)
+            self._draw_soon()
+
+    def on_mouse_up(self, event: events.MouseUp) -> None:
+        if self._grabbed is None:
+            return
+        self._grabbed = None
+        self.release_mouse()
+        if not self._dragged and self.viewport.holds((event.y, event.x)):
+            self.viewport.cursor, self._aim = (event.y, event.x), None
+            self.action_pick()
+            self._draw_soon()
+
+    # Drawing.
+
+    def watch_has_focus(self, focused: bool) -> None:
+        super().watch_has_focus(focused)
+        self.draw()
+
+    def notify_style_update(self) -> None:
+        """Another theme: every colour is mixed with its background."""
+        super().notify_style_update()
+        palette = self._mixed() if self.is_attached else None
+        # A move of the focus comes here, too, and changes no colour.
+        if palette != self._palette:
+            self._palette, self._canvas = palette, None
+            self.draw()
+
+    def _mixed(self) -> Palette:
+        return palette_of(self.app, self.background_colors[1], self.colors[3])
+
+    def _draw_soon(self) -> None:
+        """Draws once for all that is asked for until then."""
+        if not self._due:
+            self._due = True
+            self.call_later(self._draw_due)
+
+    def _draw_due(self) -> None:
+        self._due = False
+        self.draw()
 
     def draw(self) -> None:
-        super().draw()
-        if self._view is not None and self.is_attached:
-            self._tell_pointed()
+        """Draws a new frame, and refreshes only the lines that changed."""
+        view = self.viewport.view
+        if view is None or not self.is_attached:
+            return
+        palette = self._palette = self._palette or self._mixed()
+        cursor = self.viewport.cursor if self.aims else None
+        canvas, self.picture = self._drawing.frame(self.shown, view, palette, cursor)
+        changed = canvas.changed_rows(self._canvas)
+        self._canvas = canvas
+        for row in changed:
+            self._strips.pop(row, None)
+        if changed:
+            self.refresh(*(Region(0, row, self.size.width, 1) for row in changed))
+        self._show_pointed(view)
 
-    def _tell_pointed(self) -> None:
+    def render_line(self, y: int) -> Strip:
+        width, height = self.size
+        if self.notice:
+            lines = Text(plain(self.notice), justify="center").wrap(self.app.console, max(1, width))
+            index = y - max(0, (height - len(lines)) // 2)
+            text = lines[index].plain if 0 <= index < len(lines) else ""
+            return Strip([Segment(text.center(width)[:width], self.rich_style)])
+        if self._canvas is None or y >= self._canvas.chars.shape[0]:
+            return Strip.blank(width, self.rich_style)
+        if y not in self._strips:
+            self._strips[y] = strip(self._canvas, y)
+        return self._strips[y]
+
+    def _show_pointed(self, view: View) -> None:
         """The model under the crosshair in the panel's lower border, else how wide the map is."""
         model = self.model_at_cursor if self.aims else None
         if model != self._pointed:
             self._pointed = model
             self.post_message(self.Pointed(model))
-        # Words take their time: only when something of what they tell changed.
-        place = self.cursor if self._picking else self.snapshot.state.evidence_test
-        told = (model, self._who[1], self._view, place, self.notice)
-        if told != self._told:
-            self._told = told
+        # Words take their time: only when something that they mention changed.
+        where = self.viewport.cursor if self._picking else self.snapshot.state.evidence_test
+        made_of = (model, self.picture and self.picture.how, view, where, self.notice)
+        if made_of != self._subtitle_of:
+            self._subtitle_of = made_of
             if isinstance(self.parent, Widget):
-                self.parent.border_subtitle = self._words(model)
+                self.parent.border_subtitle = self._subtitle(model, view)
 
-    def _words(self, model: str | None) -> Text:
+    def _subtitle(self, model: str | None, view: View) -> Text:
         if self._picking:
-            x, y = self._view.point(self.cursor)
+            x, y = view.point(self.viewport.cursor)
             return Text(f"x {x:.2f}, y {y:.2f} m")
         if model is not None:
             return self.describe(model, self.size.width - 4)
         if not self.place.prints:
             return Text("" if self.notice else "this world has no models")
-        return Text(f"{self._view.columns * self._view.scale:.3g} m wide")
-
-
-class MapLines(Widget):
-    """One line on what is shown, one of signs; drawn again only if they changed. The map itself tells what its crosshair is on."""
-
-    def __init__(self, *, id: str | None = None) -> None:
-        super().__init__(id=id)
-        self._map: WorldMap | None = None
-        self._shown: Candidate | Trial | None = None
-        self._drawn: tuple = ()
-
-    def show(self, world: WorldMap, shown: Candidate | Trial | None) -> None:
-        """`shown` is the candidate or trial whose models stand out."""
-        self._map, self._shown = world, shown
-        facts = (world.selection, None if shown is None else (shown.label, shown.size), world.legend(200).plain)
-        if facts != self._drawn:
-            self._drawn = facts
-            self.refresh()
-
-    def render(self) -> Text:
-        if self._map is None:
-            return Text("")
-        width = self.size.width
-        first = self._about(self._map, width)
-        first.truncate(width, overflow="ellipsis")
-        return first.append("\n").append_text(self._map.legend(width))
-
-    def _about(self, world: WorldMap, width: int) -> Text:
-        text = Text(no_wrap=True)
-        if world.selection:
-            keys = ": p pin, w try without, o try only" if width > 44 else ": p, w or o"
-            text.append(f"{len(world.selection)} selected", "bold").append(keys, "dim")
-        elif self._shown is not None:
-            text.append(f"{self._shown.label}: {count(self._shown.size, 'model')}", "bold")
-            text.append("  others in small letters" if width > 44 else "", "dim")
-        return text
+        return Text(f"{view.columns * view.scale:.3g} m wide")

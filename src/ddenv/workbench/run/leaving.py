@@ -9,7 +9,8 @@ from textual import work
 
 from ddenv.runfile.settings import settings
 from ddenv.workbench.background import is_open
-from ddenv.workbench.map.world_map import LAYERS, WorldMap
+from ddenv.workbench.map.place import LAYERS
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.run.processes import Scene
 from ddenv.workbench.run.steering import Steering

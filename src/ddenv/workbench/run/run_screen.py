@@ -18,8 +18,9 @@ from ddenv.errors import UserError
 from ddenv.runfile.state import Candidate, RunState
 from ddenv.workbench.background import tell
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.map.place import place_of_run
-from ddenv.workbench.map.world_map import MapLines, Place, WorldMap
+from ddenv.workbench.map.map_words import MapLines
+from ddenv.workbench.map.place import Place, place_of_run
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run import models_left
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.happening import Happening
@@ -229,7 +230,7 @@ class RunScreen(Leaving):
     def show_legend(self) -> None:
         """The lines below the map."""
         world = self.query_one(WorldMap)
-        self.query_one(MapLines).show(world, world.candidate)
+        self.query_one(MapLines).show(len(world.selection), world.candidate, world.legend)
 
     def _show_models(self) -> None:
         """The list of models; where it is not in sight it is not made."""

@@ -1,18 +1,22 @@
-"""What is told of the map in words: its legend, and the model under the crosshair."""
+"""The map in words: its legend, and the model under the crosshair."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rich.text import Text
+from textual.widget import Widget
 
 from ddenv.map.names import shortened
 from ddenv.runfile.state import RunState, partition_letter
+from ddenv.workbench.map.place import Shown
+from ddenv.workbench.wording import count
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
+    from ddenv.runfile.state import Candidate, Trial
 
 LEGEND = (
     ("S", "start"),
@@ -26,14 +30,25 @@ LEGEND = (
 LONGEST_NAME = 40
 
 
-def legend(width: int, *, parts: bool = True, extra: Sequence[tuple[str, str]] = ()) -> Text:
-    """One line that says what the signs mean, as many as fit in `width`; `extra` signs come before the others."""
+def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
+    """One line that says what the signs on the map mean, as many as fit in `width`.
+
+    With `same_paths`, the last similar run went as f did.
+    """
+    state, layers = shown.snapshot.state, shown.layers
+    told = {
+        ("A B", "parts"): bool(state.elements),
+        ("*", "selected"): bool(shown.selection),
+        ("+", "pinned"): bool(state.pinned) and "pinned" in layers,
+        ("1 2", "order sensed"): "sensed" in layers and state.evidence_test is not None,
+        ("⠒ ⠒", "path of f"): "original" in layers and not same_paths,
+    }
+    signs = [sign for sign, there in told.items() if there]
     text = Text(no_wrap=True, overflow="ellipsis")
-    entries = (("A B", "parts"), *extra, *LEGEND) if parts else (*extra, *LEGEND[:2])
-    for sign, meaning in entries:
+    for sign, meaning in (*signs, *(LEGEND if state.elements else LEGEND[:2])):
         if text.cell_len + len(sign) + len(meaning) + 3 > width:
             break
-        text.append(f"{sign}", "bold").append(f" {meaning}  ", "dim")
+        text.append(sign, "bold").append(f" {meaning}  ", "dim")
     return text
 
 
@@ -85,3 +100,35 @@ def _standing(state: RunState, name: str) -> str:
     partitions = state.round.partitions if state.round else ()
     part = next((index for index, names in enumerate(partitions) if name in names), None)
     return "kept" if part is None else f"part {partition_letter(part)}"
+
+
+class MapLines(Widget):
+    """One line on what is shown, one of signs; drawn again only if they changed."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._legend: Callable[[int], Text] | None = None
+        self._made_of: tuple[int, tuple[str, int] | None, str] = (0, None, "")
+
+    def show(self, selected: int, shown: Candidate | Trial | None, legend: Callable[[int], Text]) -> None:
+        """`selected` models are selected, those of `shown` stand out; `legend` makes the line of signs for a width."""
+        facts = (selected, None if shown is None else (shown.label, shown.size), legend(200).plain)
+        if facts != self._made_of:
+            self._made_of, self._legend = facts, legend
+            self.refresh()
+
+    def render(self) -> Text:
+        if self._legend is None:
+            return Text()
+        width = self.size.width
+        selected, shown, _ = self._made_of
+        text = Text(no_wrap=True)
+        if selected:
+            text.append(f"{selected} selected", "bold")
+            text.append(": p pin, w try without, o try only" if width > 44 else ": p, w or o", "dim")
+        elif shown is not None:
+            label, size = shown
+            text.append(f"{label}: {count(size, 'model')}", "bold")
+            text.append("  others in small letters" if width > 44 else "", "dim")
+        text.truncate(width, overflow="ellipsis")
+        return text.append("\n").append_text(self._legend(width))

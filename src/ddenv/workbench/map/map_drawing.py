@@ -1,0 +1,151 @@
+"""Draws the map of a world and its run: whatever stays the same is kept between frames."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from ddenv.map import arrays as np
+from ddenv.map.cells import Cell
+from ddenv.map.paint import Canvas
+from ddenv.map.raster import Outlines, View, fit, pack
+from ddenv.runfile.state import Candidate
+from ddenv.runfile.store import COLUMNS
+from ddenv.workbench.map.map_colors import Palette, unpacked
+from ddenv.workbench.map.map_words import sensed_order
+from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
+from ddenv.workbench.map.picture import Line, Mark, Picture, Seen, crosshair, follow, picture, robots, seen
+from ddenv.workbench.map.place import Point, Shown
+from ddenv.workbench.run.poll import Snapshot
+
+if TYPE_CHECKING:
+    pass
+
+T = TypeVar("T")
+# Dots of the original path, and of the gaps in it.
+DASH = 5
+
+
+class Remembered(Generic[T]):
+    """A value with the things that it was made from.
+
+    These are compared by identity: to compare the names of thousands of models would take too long in each frame.
+    """
+
+    def __init__(self) -> None:
+        self._made_of: tuple[object, ...] | None = None
+        self._value: T
+
+    def get(self, made_of: tuple[object, ...], make: Callable[[], T]) -> T:
+        """The value, made again only if one of the things is another one."""
+        before = self._made_of
+        if (
+            before is None
+            or len(before) != len(made_of)
+            or any(one is not other for one, other in zip(before, made_of, strict=True))
+        ):
+            self._value, self._made_of = make(), made_of
+        return self._value
+
+
+class MapDrawing:
+    """Makes one frame after another from what is `Shown`."""
+
+    def __init__(self) -> None:
+        self._trails: dict[int, list[Point]] = {}
+        # Each is kept for what it was made from.
+        self._evidence: Remembered[np.ndarray] = Remembered()
+        self._original: Remembered[np.ndarray] = Remembered()
+        self._same_paths: Remembered[bool] = Remembered()
+        self._outlines: Remembered[Outlines] = Remembered()
+        self._seen: Remembered[Seen] = Remembered()
+        self._kept: Remembered[Kept] = Remembered()
+        self._looks: Remembered[Looks] = Remembered()
+        self._picture: Remembered[Picture] = Remembered()
+
+    def fitting(self, shown: Shown, columns: int, rows: int) -> View:
+        """A view of all that matters."""
+        path = _path(self._evidence, shown.snapshot.evidence)
+        points = path[np.isfinite(path).all(axis=1)].tolist()
+        points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
+        return fit(shown.place.prints, points, columns, rows, margin=0.4)
+
+    def follow(self, snapshot: Snapshot) -> None:
+        """Adds to the paths behind the robots that drive now."""
+        self._trails = follow(self._trails, snapshot)
+
+    def same_paths(self, snapshot: Snapshot) -> bool:
+        """Whether the last similar run went as f did: it is f before the first reduction."""
+        original, evidence = snapshot.original, snapshot.evidence
+        return self._same_paths.get((original, evidence), lambda: original is None or original == evidence)
+
+    def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
+        """A new frame, and the picture below its robots and its crosshair. Without a `cursor` it has no crosshair."""
+        still = self._still(shown, view, palette)
+        canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
+        robots(canvas, view, still.written, shown.snapshot, trails, palette)
+        if cursor is not None:
+            crosshair(canvas, cursor, still.written, palette)
+        return canvas, still
+
+    def _still(self, shown: Shown, view: View, palette: Palette) -> Picture:
+        """All but what moves."""
+        place, layers, snapshot = shown.place, shown.layers, shown.snapshot
+        evidence, original = _path(self._evidence, snapshot.evidence), _path(self._original, snapshot.original)
+        outlines = self._outlines.get((place.prints,), lambda: pack(place.prints))
+        models = self._seen.get((outlines, view), lambda: seen(outlines, view))
+        who = self._who(shown)
+        back, fore = unpacked(palette.back), unpacked(palette.fore)
+        how = self._looks.get((who, palette, place.prints), lambda: looks(place.prints, who, back, fore, palette))
+
+        def draw() -> Picture:
+            lines = [Line(evidence, palette.path)] if "path" in layers else []
+            if "original" in layers and not self.same_paths(snapshot):
+                lines.insert(0, Line(original, palette.original, DASH))
+            marks = tuple(_marks(shown, palette))
+            return picture(models, how, removed="removed" in layers, lines=lines, marks=marks)
+
+        made_of = (models, how, palette, layers, evidence, original, place, snapshot.state.baseline)
+        return self._picture.get(made_of, draw)
+
+    def _who(self, shown: Shown) -> Kept:
+        """Which models are in the environment, and how they stand out."""
+        place, state, candidate, layers = shown.place, shown.snapshot.state, shown.candidate, shown.layers
+        looked_at: tuple[object, ...] = (candidate,)
+        if isinstance(candidate, Candidate):
+            # Another object after each of its tests, with the same models.
+            looked_at = (candidate.split, candidate.kind, candidate.partition)
+        split = state.round.split if state.round else None
+        made_of = (state.elements, state.environment, split, state.pinned, *looked_at, state.evidence_test)
+
+        def gather() -> Kept:
+            who = kept(state, candidate)
+            if not who.elements:
+                who = Kept(place.elements, place.elements)
+            return replace(
+                who,
+                parts=who.parts if "partitions" in layers else {},
+                pinned=who.pinned if "pinned" in layers else frozenset(),
+                selected=shown.selection,
+                sensed=sensed_order(state) if "sensed" in layers else {},
+            )
+
+        return self._kept.get((*made_of, shown.selection, layers, place.elements), gather)
+
+
+def _path(remembered: Remembered[np.ndarray], rows: array[float] | None) -> np.ndarray:
+    """Flat rows of a motion as (N, 2) m."""
+
+    def read() -> np.ndarray:
+        return np.zeros((0, 2)) if rows is None else np.array(rows, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
+
+    return remembered.get((rows,), read)
+
+
+def _marks(shown: Shown, palette: Palette) -> Iterator[Mark]:
+    places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal)]
+    if "failure" in shown.layers:
+        places.append((shown.failure, "×", palette.failure))
+    return (Mark(point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())

@@ -1,0 +1,69 @@
+"""Which part of the plane a map shows, and the crosshair that goes from cell to cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ddenv.map.cells import Cell
+from ddenv.map.raster import View
+
+
+class Viewport:
+    """A `view` (None before the map has a size) and a `cursor` (row, column) in it.
+
+    While it is `fitted`, the view shows all that matters; zooming and panning end that.
+    """
+
+    def __init__(self) -> None:
+        self.view: View | None = None
+        self.cursor: Cell = (0, 0)
+        self.fitted = True
+
+    def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
+        """Another size, or other things that matter: `fitting` returns a view of these for a size."""
+        view = self.view
+        if view is None or self.cursor == (view.rows // 2, view.columns // 2):
+            # Until it is moved the crosshair is in the middle.
+            self.cursor = rows // 2, columns // 2
+        else:
+            self.cursor = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
+        keep = view if not self.fitted else None
+        new = View(keep.x, keep.y, keep.scale, columns, rows) if keep else fitting(columns, rows)
+        # Drawings are kept for a view: an equal one stays the same object.
+        self.view = view if new == view else new
+
+    def zoom(self, factor: float, about: Cell | None) -> None:
+        """Closer by `factor`, about a cell, or about the middle."""
+        if self.view is not None:
+            self._look(self.view.zoomed(factor, self.view.point(about) if about else None))
+
+    def pan(self, columns: float, rows: float) -> None:
+        """Shows what is this number of cells to the right and upwards."""
+        if self.view is not None:
+            self._look(self.view.panned(columns, rows))
+
+    def pan_part(self, right: int, up: int) -> None:
+        """An eighth of the map to the right, or a quarter up."""
+        if self.view is not None:
+            self.pan(right * max(1, self.view.columns // 8), up * max(1, self.view.rows // 4))
+
+    def step(self, right: int, up: int) -> None:
+        """Moves the crosshair by a cell; at the border the map moves instead."""
+        row, column = self.cursor[0] - up, self.cursor[1] + right
+        if self.holds((row, column)):
+            self.cursor = row, column
+        else:
+            self.pan(right, up)
+
+    def holds(self, cell: Cell) -> bool:
+        """Whether a cell is in the view."""
+        return self.view is not None and 0 <= cell[0] < self.view.rows and 0 <= cell[1] < self.view.columns
+
+    def center_on(self, x: float, y: float) -> None:
+        """Moves the view and the crosshair to a place, m."""
+        if self.view is not None:
+            self._look(self.view.around(x, y))
+            self.cursor = self.view.cell(x, y) or self.cursor
+
+    def _look(self, view: View) -> None:
+        self.fitted, self.view = False, view
