@@ -299,12 +299,17 @@ def _dense(dots: np.ndarray) -> np.ndarray:
     steps = np.abs(np.diff(dots, axis=0)).max(axis=1) if len(dots) > 1 else np.zeros(0)
     counts = np.maximum(1, np.ceil(steps).astype(int))
     if not len(counts):
-        return np.floor(dots).astype(int)
+        return _floored(dots)
     start = np.repeat(np.arange(len(counts)), counts)
     along = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     part = (along / np.repeat(counts, counts))[:, None]
     line = dots[start] * (1 - part) + dots[start + 1] * part
-    return np.floor(np.vstack([line, dots[-1:]])).astype(int)
+    return _floored(np.vstack([line, dots[-1:]]))
+
+
+def _floored(dots: np.ndarray) -> np.ndarray:
+    whole: np.ndarray = np.floor(dots).astype(int)
+    return whole
 
 
 def arrow(yaw: float) -> str:

@@ -1,6 +1,6 @@
-"""`python -m ddenv.scene RUN [--port N]`: serves the 3-D scene of a run until it is ended or its parent goes away.
+"""`python -m ddenv.scene RUN [--port N]`: serves the 3-D scene of a run until it is stopped or its parent exits.
 
-The first line of output is the URL. Errors of the user are one line on standard error, and exit code 2.
+The first line of output is the URL. User errors are one line on standard error, with exit code 2.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ddenv.scene.player import Player
 from ddenv.scene.server import Server
 from ddenv.scene.stage import Stage
 
-PERIOD = 0.05  # s between two pictures
+PERIOD = 0.05  # time between two updates of the scene, s
 
 
 class _Parser(argparse.ArgumentParser):

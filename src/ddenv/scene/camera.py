@@ -1,24 +1,25 @@
-"""Where the camera and the sun stand: the way from start to goal fills the picture, seen aslant from its right side."""
+"""Places the camera and the sun: the path from start to goal fills the picture, seen at an angle from its right side."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from ddenv.scene import colors
 from ddenv.scene.draw import WORLD
 from ddenv.scene.stage import DRAWN, Stage
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import Pose, Vector, vector
 
 FIELD_OF_VIEW = 38.0  # vertical, degrees
 ELEVATION = 32.0  # of the camera above the horizon, degrees
-ASIDE = 20.0  # how far the camera is turned from straight across the way towards the start, degrees
+ASIDE = 20.0  # rotation of the camera from perpendicular to the path towards the start, degrees
 _CAMERA = ("Cameras", "default", "rotated", DRAWN)
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """`center` is what the camera looks at; `camera` and `sun` are places relative to it; `radius` is what it must show, m."""
+    """The camera looks at `center`, m; `camera` and `sun` are relative to it, m; `radius` is the visible distance around it, m."""
 
     center: Vector
     camera: Vector
@@ -27,11 +28,11 @@ class View:
 
 
 def view(start: Vector, goal: Vector) -> View:
-    """The view of a robot that goes from `start` to `goal`."""
+    """The view of a robot that drives from `start` to `goal`."""
     dx, dy = goal[0] - start[0], goal[1] - start[1]
     radius = max(2.5, 0.5 * math.hypot(dx, dy) + 1.8)
     along = math.atan2(dy, dx)
-    center = tuple(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
+    center = vector(0.5 * (a + b) for a, b in zip(start, goal, strict=True))
     camera = _polar(2.2 * radius, along - math.radians(90 + ASIDE), ELEVATION)
     sun = _polar(3.0 * radius, along - math.radians(165), 50.0)
     return View(center, camera, sun, radius)
@@ -43,12 +44,12 @@ def _polar(distance: float, azimuth: float, elevation: float) -> Vector:
 
 
 def set_up(stage: Stage, view: View) -> None:
-    """Camera, light and background."""
-    # The viewer's camera turns about the scene's origin, so the world is moved there rather than the camera.
+    """Sets camera, light and background."""
+    # The viewer's camera orbits the scene's origin, so the world is moved instead of the camera.
     x, y, z = view.center
     stage.move(WORLD, Pose((-x, -y, -z)))
     east, north, up = view.camera
-    # The camera's own axes have y upwards.
+    # In the camera's frame y points upwards.
     for name, value in (("fov", FIELD_OF_VIEW), ("near", 0.1), ("far", 600.0), ("position", [east, up, -north])):
         stage.set(_CAMERA, name, value)
     for name in ("Grid", "Axes"):
@@ -62,7 +63,7 @@ def set_up(stage: Stage, view: View) -> None:
     stage.set(("Background",), "bottom_color", list(bottom))
 
 
-def _sun(view: View) -> dict:
+def _sun(view: View) -> dict[str, Any]:
     reach = 1.7 * view.radius
     shadow = {
         "bias": -0.0004,

@@ -1,4 +1,4 @@
-"""Colours of models whose file names none, and of what the scene adds. Red, green, blue in 0..1, then alpha."""
+"""Default colours of models, and colours of the marks that the scene adds: red, green, blue, alpha in 0..1."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
 
 
 def default_color(model: Model) -> Color:
-    """By a word in the model's name, or else by whether it can move."""
+    """The colour for a word in the model's name, else for whether it can move."""
     name = model.name.lower()
     for words, color in _BY_WORD:
         if any(word in name for word in words):
@@ -41,8 +41,8 @@ def default_color(model: Model) -> Color:
 
 
 def varied(color: Color, number: int) -> Color:
-    """`color` a little brighter or darker, so that neighbouring shapes of one colour can be told apart."""
-    # Multiples of the golden ratio are spread evenly and never repeat.
+    """`color` slightly brighter or darker, to distinguish neighbouring shapes of one colour."""
+    # The fractions of multiples of the golden ratio are evenly spread and never repeat.
     factor = 0.92 + 0.16 * math.modf(number * 0.6180339887)[0]
     red, green, blue = (min(1.0, part * factor) for part in color[:3])
     return red, green, blue, color[3]

@@ -1,9 +1,10 @@
-"""The world, the robot and the marks of a run as things on the stage."""
+"""Draws the world, the robot and the marks of a run on the stage."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from meshcat.geometry import (
@@ -26,17 +27,17 @@ from ddenv.world.pose import Pose, Vector
 WORLD: Path = ("world",)
 MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
 ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
-# A growing trail is sent in pieces of so many points, so that only the last piece is sent again.
+# Points in one piece of a growing trail: only the last piece is sent again.
 PIECE = 24
 GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
-STEEP = 1e-6  # a plane whose normal rises by less is upright
+STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
 LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 
 @dataclass(frozen=True)
 class Painted:
-    """A surface of one transparency: `tints` (N, 3) is the colour of every vertex."""
+    """A surface of one transparency; `tints` (N, 3) are the colours of its vertices."""
 
     surface: Surface
     tints: np.ndarray
@@ -44,12 +45,12 @@ class Painted:
 
     def thing(self) -> Mesh:
         geometry = TriangularMeshGeometry(self.surface.vertices, self.surface.faces, color=self.tints)
-        # Only outsides are drawn: shadows of two-sided faces fall on the faces themselves.
+        # Only the outside is drawn: two-sided faces would cast shadows on themselves.
         return Mesh(geometry, MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
 
 
 def paint(model: Model) -> list[Painted]:
-    """Everything a model shows, in the frame its poses are given in. A link without visuals shows its collisions."""
+    """All visuals of a model, in the frame of its poses. A link without visuals shows its collisions."""
     groups: dict[float, list[tuple[Surface, Color]]] = {}
     default = colors.default_color(model)
     shown = [(item.shape, item.pose, _color(item) or default) for link in model.links for item in _shown(link)]
@@ -75,10 +76,11 @@ def _painted(parts: list[tuple[Surface, Color]], alpha: float) -> Painted:
 
 
 def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> Mesh:
-    """A thing of one colour. `glow` 0..1 is how much of it is seen without light; `offset` above 0 lets others win in one plane."""
-    options = {}
+    """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the same plane are drawn over it."""
+    options: dict[str, Any] = {}
     if glow:
-        options["emissive"] = colors.hexadecimal((*(glow * part for part in color[:3]), 1.0))
+        red, green, blue, _ = color
+        options["emissive"] = colors.hexadecimal((glow * red, glow * green, glow * blue, 1.0))
     if offset:
         options |= {"polygonOffset": True, "polygonOffsetFactor": offset, "polygonOffsetUnits": offset}
     material = MeshLambertMaterial(color=colors.hexadecimal(color), opacity=color[3], side=0, **options)
@@ -86,13 +88,13 @@ def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -
 
 
 def lines(ends: np.ndarray, color: Color) -> LineSegments:
-    """Straight lines between `ends` (2 N, 3), taken in pairs."""
+    """Line segments between pairs of `ends` (2 N, 3)."""
     material = LineBasicMaterial(color=colors.hexadecimal(color), opacity=color[3])
     return LineSegments(PointsGeometry(np.asarray(ends, dtype=np.float32).T), material)
 
 
 def outline(model: Model, shape: Surface) -> np.ndarray:
-    """Ends of the 12 edges of the box around `shape` (in world axes), turned as the model is turned: shape (24, 3)."""
+    """Ends (24, 3) of the 12 edges of the box around `shape` in the axes of the model; world frame."""
     own = shape.at(model.pose.inverse()).vertices
     low, high = own.min(axis=0), own.max(axis=0)
     corners = np.array([[(high if bit >> axis & 1 else low)[axis] for axis in range(3)] for bit in range(8)])
@@ -101,20 +103,20 @@ def outline(model: Model, shape: Surface) -> np.ndarray:
 
 
 def safe_name(number: int, name: str) -> str:
-    """A name for the browser's tree: unique by its number, without what has a meaning in paths or pages."""
+    """A name for the browser's tree: unique by its number, without special characters of paths or pages."""
     kept = "".join(char if char.isalnum() or char in "-_. " else "_" for char in name)[:40]
     return f"{number:03d} {kept}"
 
 
 def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
-    """Points (N, 3) below a robot with rows (t, x, y, z, qw, qx, qy, qz), whose lowest point is at z = `lowest` in its frame."""
+    """Points (N, 3) below a robot at rows (t, x, y, z, qw, qx, qy, qz) whose lowest point has z = `lowest` in its frame."""
     w, x, y, z = samples[:, 4:8].T
     up = np.column_stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
     return samples[:, 1:4] + (lowest + ABOVE) * up
 
 
 class Scenery:
-    """What is drawn of one run. Every element of the world is drawn once; a change of environment only shows and hides."""
+    """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements."""
 
     def __init__(self, stage: Stage, world: World, robot: Model, elements: Iterable[str]) -> None:
         self._stage = stage
@@ -138,7 +140,7 @@ class Scenery:
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
-        """Shows the environment of `shot`, everything at its first place."""
+        """Shows the environment of `shot`, all models at their initial poses."""
         for name, key in self._keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
             self._stage.show((*LEFT_OUT, key), name in shot.left_out)
@@ -152,33 +154,33 @@ class Scenery:
         self._stage.move(ROBOT, pose, newest_only=True)
 
     def place_model(self, name: str, pose: Pose) -> None:
-        """Puts the first link of a model that can move at `pose`."""
+        """Puts the first link of a moving model at `pose`."""
         if name in self._keys:
             self._moved.add(name)
             self._stage.move((*MODELS, self._keys[name]), pose @ self._first[name].inverse(), newest_only=True)
 
     def evidence(self, samples: np.ndarray | None) -> None:
-        """Draws the robot's way in the run that shows f."""
+        """Draws the robot's path in the run that shows f."""
         self._stage.delete(EVIDENCE)
         if samples is not None and len(samples):
-            way = mesh.tube(path_on_ground(samples, self._lowest), LINE)
-            self._draw_way(EVIDENCE, way, colors.EVIDENCE)
+            path = mesh.tube(path_on_ground(samples, self._lowest), LINE)
+            self._draw_path(EVIDENCE, path, colors.EVIDENCE)
 
     def trail(self, samples: np.ndarray) -> None:
-        """Draws the robot's way so far; fewer `samples` than before begin a new one."""
+        """Draws the robot's path so far; fewer `samples` than before start a new one."""
         points = path_on_ground(samples, self._lowest) if len(samples) else np.zeros((0, 3))
         pieces = -(-max(0, len(points) - 1) // PIECE)
         if pieces < self._pieces or not pieces:
             self._stage.delete(TRAIL)
             self._pieces = 0
         for piece in range(max(0, self._pieces - 1), pieces):
-            way = mesh.tube(points[piece * PIECE : (piece + 1) * PIECE + 1], LINE)
-            self._draw_way((*TRAIL, str(piece)), way, colors.TRAIL)
+            path = mesh.tube(points[piece * PIECE : (piece + 1) * PIECE + 1], LINE)
+            self._draw_path((*TRAIL, str(piece)), path, colors.TRAIL)
         self._pieces = pieces
 
-    def _draw_way(self, path: Path, way: Surface, color: Color) -> None:
-        if len(way.faces):
-            self._stage.draw(path, plain(way, color, glow=0.4), shadow=False)
+    def _draw_path(self, at: Path, tube: Surface, color: Color) -> None:
+        if len(tube.faces):
+            self._stage.draw(at, plain(tube, color, glow=0.4), shadow=False)
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
         key = safe_name(number, model.name)
@@ -217,7 +219,7 @@ class Scenery:
 
 
 def _ground(world: World) -> Pose | None:
-    """The plane that is the highest at the origin, as its pose there; it may slope."""
+    """The pose at the origin of the plane that is highest there, which may slope; None without planes."""
     planes = (
         collision.pose
         for model in world.models
@@ -234,14 +236,14 @@ def _ground(world: World) -> Pose | None:
 
 
 def _height_of(plane: Pose, x: float, y: float) -> float | None:
-    """How high `plane` is at (x, y), m; None where it is upright."""
+    """The height of `plane` at (x, y), m; None if it is vertical."""
     a, b, c = plane.rotate((0.0, 0.0, 1.0))
     px, py, pz = plane.position
     return pz - (a * (x - px) + b * (y - py)) / c if abs(c) > STEEP else None
 
 
 def mark(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """A ring of `radius` m around `position` with a pin above it, seen from afar and from above."""
+    """Draws a ring of `radius` m around `position` with a pin above it, visible from afar and from above."""
     path = (*WORLD, name)
     pin = [
         mesh.ring(radius, 0.05),
@@ -253,7 +255,7 @@ def mark(stage: Stage, name: str, position: Vector, radius: float, color: Color)
 
 
 def flag(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """A ring of `radius` m around `position` with a flag in it."""
+    """Draws a ring of `radius` m around `position` with a flag in it."""
     path = (*WORLD, name)
     parts = [
         mesh.ring(radius, 0.05),
@@ -265,7 +267,7 @@ def flag(stage: Stage, name: str, position: Vector, radius: float, color: Color)
 
 
 def circle(stage: Stage, name: str, position: Vector, radius: float, color: Color) -> None:
-    """A ring of `radius` m around `position`."""
+    """Draws a ring of `radius` m around `position`."""
     path = (*WORLD, name)
     stage.draw(path, plain(mesh.ring(radius, 0.05), color, glow=0.35), shadow=False)
     stage.move(path, Pose(position))

@@ -1,6 +1,6 @@
-"""Triangles from shapes: pure functions from sizes and poses (m) to arrays.
+"""Triangulates shapes: pure functions from sizes and poses (m) to arrays.
 
-A corner where faces meet at an edge stands once for each face, since the browser shades by averaging over shared corners.
+At a sharp edge each face has its own copy of a corner, since the browser averages the shading over shared corners.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 from ddenv.world.pose import Pose
 
-SIDES = 24
-# A drawn trajectory bends at most once in so many m: a robot that stands still leaves no pile of points.
+SIDES = 24  # of the polygon that stands for a circle
+# Minimum distance between points of a drawn trajectory, m: a robot that stands still leaves one point.
 TUBE_STEP = 0.04
-# Where the faces of a mesh bend by less than this from their common direction in a corner, they look round there, rad.
+# A corner of a mesh looks smooth if its faces deviate by less than this from their mean normal, rad.
 SMOOTH = math.radians(30.0)
 
 
 @dataclass(frozen=True)
 class Surface:
-    """`vertices` (N, 3) in m; `faces` (M, 3) are numbers of vertices, counterclockwise seen from outside."""
+    """`vertices` (N, 3) in m; `faces` (M, 3) are vertex indices, counterclockwise seen from outside."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -35,14 +35,15 @@ class Surface:
     @property
     def triangles(self) -> np.ndarray:
         """Corners of every face, shape (M, 3, 3)."""
-        return self.vertices[self.faces]
+        corners: np.ndarray = self.vertices[self.faces]
+        return corners
 
 
 EMPTY = Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
 
 
 def merge(surfaces: Sequence[Surface]) -> Surface:
-    """One surface with the faces of all."""
+    """One surface with the faces of all `surfaces`."""
     if not surfaces:
         return EMPTY
     starts = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
@@ -65,12 +66,12 @@ _UNIT_BOX = _unit_box()
 
 
 def box(size: Sequence[float]) -> Surface:
-    """A box about its frame's origin; `size` along x, y, z."""
+    """A box centred on its frame's origin; `size` along x, y, z."""
     return Surface(_UNIT_BOX.vertices * np.asarray(size, dtype=float), _UNIT_BOX.faces)
 
 
 def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Surface:
-    """A cut cone along z about its frame's origin, with the radii `bottom` and `top`; equal radii make a cylinder."""
+    """A truncated cone along z, centred on its frame's origin, with radii `bottom` and `top`."""
     angles = np.arange(sides) * 2 * math.pi / sides
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     low = np.column_stack([circle * bottom, np.full(sides, -length / 2)])
@@ -85,12 +86,12 @@ def frustum(bottom: float, top: float, length: float, sides: int = SIDES) -> Sur
 
 
 def cylinder(radius: float, length: float, sides: int = SIDES) -> Surface:
-    """Along z, about its frame's origin."""
+    """A cylinder along z, centred on its frame's origin."""
     return frustum(radius, radius, length, sides)
 
 
 def sphere(radius: float, sides: int = SIDES) -> Surface:
-    """About its frame's origin."""
+    """A sphere centred on its frame's origin."""
     rings = sides // 2
     theta, phi = np.meshgrid(np.linspace(0, math.pi, rings + 1), np.arange(sides) * 2 * math.pi / sides, indexing="ij")
     points = radius * np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
@@ -98,24 +99,24 @@ def sphere(radius: float, sides: int = SIDES) -> Surface:
 
 
 def ellipsoid(radii: Sequence[float]) -> Surface:
-    """About its frame's origin; `radii` along x, y, z."""
+    """An ellipsoid centred on its frame's origin; `radii` along x, y, z."""
     ball = sphere(1.0)
     return Surface(ball.vertices * np.asarray(radii, dtype=float), ball.faces)
 
 
 def capsule(radius: float, length: float) -> Surface:
-    """A cylinder of `length` along z about its frame's origin, with half a ball on each end."""
+    """A cylinder of `length` along z, centred on its frame's origin, with a hemisphere on each end."""
     ball = sphere(radius)
     rings = ball.vertices.reshape(-1, SIDES, 3)
     middle = len(rings) // 2
-    # The equator stands twice: once for each end of the cylinder.
+    # The equator appears twice, once at each end of the cylinder.
     end = np.array([0.0, 0.0, length / 2])
     halves = np.concatenate([rings[: middle + 1] + end, rings[middle:] - end])
     return Surface(halves.reshape(-1, 3), _sheet(len(halves), SIDES))
 
 
 def creased(mesh: Mesh) -> Surface:
-    """The surface of a mesh, round where it bends little and with sharp edges elsewhere."""
+    """The surface of a mesh, smooth where it bends little, with sharp edges elsewhere."""
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat, count = mesh.faces.ravel(), len(mesh.vertices)
@@ -133,7 +134,7 @@ def creased(mesh: Mesh) -> Surface:
 
 
 def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Surface:
-    """A ring of round section that lies in the plane z = 0 around its frame's origin."""
+    """A torus in the plane z = 0 around its frame's origin."""
     around, across = np.meshgrid(np.arange(sides + 1) * 2 * math.pi / sides, np.arange(8) * math.pi / 4, indexing="ij")
     distance = radius + thickness / 2 * np.cos(across)
     height = thickness / 2 * np.sin(across)
@@ -142,13 +143,13 @@ def ring(radius: float, thickness: float, sides: int = 2 * SIDES) -> Surface:
 
 
 def tube(points: np.ndarray, radius: float) -> Surface:
-    """A tube along the path `points` (N, 3), thinned out to one point every `TUBE_STEP`; empty for a path without length."""
+    """A tube along the path `points` (N, 3), thinned to one point every `TUBE_STEP`; empty for a path without length."""
     path = thinned(points, TUBE_STEP)
     return EMPTY if len(path) < 2 else _pipe(path, radius)
 
 
 def thinned(points: np.ndarray, step: float) -> np.ndarray:
-    """Those of `points` (N, 3) that are at least `step` from the last one taken, and the first."""
+    """The first of `points` (N, 3), and each one that is at least `step` from the last one taken."""
     taken = list(points[:1])
     for point in points[1:]:
         if np.linalg.norm(point - taken[-1]) >= step:
@@ -157,7 +158,7 @@ def thinned(points: np.ndarray, step: float) -> np.ndarray:
 
 
 def of_shape(shape: Shape) -> Surface:
-    """The surface of a shape in its own frame. A plane has none: the ground is drawn by itself."""
+    """The surface of a shape in its own frame; empty for a plane, since the ground is drawn separately."""
     match shape:
         case Box(size):
             return box(size)
@@ -175,7 +176,7 @@ def of_shape(shape: Shape) -> Surface:
 
 
 def height_at(surface: Surface, x: float, y: float) -> float | None:
-    """Height of the highest face above or below the point (x, y), m; None where there is none."""
+    """The height of the highest face at (x, y), m; None if there is none."""
     corners = surface.triangles
     if not len(corners):
         return None
@@ -194,7 +195,7 @@ def height_at(surface: Surface, x: float, y: float) -> float | None:
 
 
 def _sheet(rows: int, columns: int) -> np.ndarray:
-    """Faces between neighbouring rows of points, each row closed to a loop."""
+    """Faces between neighbouring rows of points, where each row is a closed loop."""
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
     here, right = row * columns + column, row * columns + (column + 1) % columns
     below, diagonal = here + columns, right + columns
@@ -205,7 +206,7 @@ def _sheet(rows: int, columns: int) -> np.ndarray:
 def _pipe(path: np.ndarray, radius: float, sides: int = 8) -> Surface:
     ahead = np.gradient(path, axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
-    # A path that is nowhere vertical for long: z serves as the second direction of every section.
+    # Sections are spanned from z, or from x where the path is vertical.
     upright = np.abs(ahead[:, 2:]) > 0.99
     aside = np.cross(np.where(upright, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), ahead)
     aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)

@@ -1,8 +1,9 @@
-"""Keeps the stage in step with the run file: reads it, decides what to show, moves the robot."""
+"""Keeps the stage in step with the run file: reads events, chooses what to show, moves the robot."""
 
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Callable
 
 import numpy as np
@@ -18,13 +19,14 @@ from ddenv.scene.draw import Scenery, circle, flag, mark
 from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot
 from ddenv.scene.stage import Stage
 from ddenv.world.placement import spawn_pose
+from ddenv.world.scenario import Goal, Spawn
 
-READ_EVERY = 0.1  # s between looks into the run file
-LOOK_FOR_ENGINE = 1.0  # s between looks whether an engine is at work
+READ_EVERY = 0.1  # time between reads of the run file, s
+LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
 
 
 class Player:
-    """Shows one run on a stage. `say(name=..., title=..., models=..., time=...)` gets the words that go with the picture."""
+    """Shows one run on a stage. `say(name=..., title=..., models=..., time=...)` receives the caption of the picture."""
 
     def __init__(self, run: RunFile, stage: Stage, say: Callable[..., None]) -> None:
         self._run, self._stage, self._say = run, stage, say
@@ -44,7 +46,7 @@ class Player:
         self._evidence: int | None = None
         self._set_scene(scenario.robot.spawn, scenario.goal)
 
-    def _set_scene(self, spawn, goal) -> None:
+    def _set_scene(self, spawn: Spawn, goal: Goal) -> None:
         start = (spawn.x, spawn.y, self._scenery.height(spawn.x, spawn.y))
         end = (goal.x, goal.y, self._scenery.height(goal.x, goal.y))
         set_up(self._stage, view(start, end))
@@ -53,7 +55,7 @@ class Player:
         self._scenery.place_robot(self._start)
 
     def tick(self, now: float) -> None:
-        """Brings the stage up to the time `now`, s of a clock that never goes back. Raises UserError for a damaged run file."""
+        """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
         if now - self._read_at >= READ_EVERY:
             self._read_at = now
             self._read(now)
@@ -63,7 +65,7 @@ class Player:
         if now - self._looked_at >= LOOK_FOR_ENGINE:
             self._looked_at = now
             self._engine = engine_is_alive(self._run.path)
-        # A killed engine leaves its rows behind. Rows are read before events, so that their tests are known.
+        # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
         self._live = self._run.live() if self._engine else []
         self._state = fold(self._run.events(self._state.revision), self._state)
         following = shot(self._state, self._live, self._shot, now - self._ran_at)
@@ -77,23 +79,25 @@ class Player:
     def _cut(self, following: Shot, now: float) -> None:
         before, self._shot = self._shot, following
         self._scenery.show(following)
-        self._tell("")
+        self._caption(following, "")
         if before is not None and (before.kind, before.test) == (following.kind, following.test):
             return
         self._began, self._motions, self._trail = now, {}, []
-        if following.kind == "replay":
+        if following.kind == "replay" and following.test is not None:
             self._motions = {name: _rows(samples) for name, samples in self._run.motions(following.test).items()}
         robot = self._motions.get(ROBOT)
-        shown = following.kind == "replay" and following.test != self._state.evidence_test and robot is not None
-        self._scenery.trail(robot if shown else np.zeros((0, COLUMNS)))
+        # The path of the evidence is drawn anyway.
+        hidden = robot is None or following.test == self._state.evidence_test
+        self._scenery.trail(np.zeros((0, COLUMNS)) if robot is None or hidden else robot)
         if following.kind == "start" or (following.kind == "replay" and robot is None):
             self._scenery.place_robot(self._start)
 
     def _move(self, now: float) -> None:
-        if self._shot is None or self._shot.kind == "start":
+        shot = self._shot
+        if shot is None or shot.kind == "start":
             return
-        if self._shot.kind == "live":
-            self._follow_live()
+        if shot.kind == "live":
+            self._follow_live(shot)
             return
         robot = self._motions.get(ROBOT)
         if robot is None or not len(robot):
@@ -103,21 +107,21 @@ class Player:
         for name, samples in self._motions.items():
             if name != ROBOT and len(samples):
                 self._scenery.place_model(name, pose_at(samples, time))
-        self._tell(self._clock(time))
+        self._caption(shot, self._clock(time))
 
-    def _follow_live(self) -> None:
-        row = next((row for row in self._live if row.test == self._shot.test), None)
+    def _follow_live(self, shot: Shot) -> None:
+        row = next((row for row in self._live if row.test == shot.test), None)
         if row is None or (self._trail and row.time <= self._trail[-1][0]):
             return
         pose = live_pose(row)
         self._scenery.place_robot(pose)
         self._trail.append((row.time, *pose.position, *pose.quaternion))
         self._scenery.trail(np.array(self._trail))
-        self._tell(self._clock(row.time))
+        self._caption(shot, self._clock(row.time))
 
-    def _tell(self, time: str) -> None:
-        models = f"{len(self._shot.models)} of {len(self._elements)} models"
-        self._say(name=self._name, title=self._shot.title, models=models, time=time)
+    def _caption(self, shot: Shot, time: str) -> None:
+        models = f"{len(shot.models)} of {len(self._elements)} models"
+        self._say(name=self._name, title=shot.title, models=models, time=time)
 
     def _clock(self, time: float) -> str:
         return f"{time:.1f} s of {self._timeout:g} s"
@@ -131,5 +135,5 @@ class Player:
             mark(self._stage, "failure", (x, y, z), self._epsilon, colors.FAILURE)
 
 
-def _rows(samples) -> np.ndarray:
+def _rows(samples: array[float]) -> np.ndarray:
     return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)

@@ -1,7 +1,7 @@
-"""Serves the scene to browsers on this machine: a page, Meshcat's viewer, and one websocket that feeds it.
+"""Serves the scene to browsers on this machine: a page, Meshcat's viewer, and a websocket that feeds it.
 
-Meshcat's own server listens on all interfaces, takes drawing commands from any local program, and keeps every property
-ever set. This one listens on the loopback interface only, takes no commands, and lets no page from elsewhere read the scene.
+Meshcat's own server listens on all interfaces, accepts drawing commands from any local program, and keeps every property
+ever set. This one listens on the loopback interface only, accepts no commands, and lets no foreign page read the scene.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import meshcat
@@ -26,20 +27,20 @@ FIRST_PORT, TRIES = 7000, 1000
 _LOCAL_NAMES = ("localhost", LOOPBACK, "::1")
 _VIEWER = Path(meshcat.viewer_assets_path()) / "dist"
 _PAGE = Path(__file__).with_name("page.html")
-# A browser that is gone without a word is noticed after about so long, s.
+# Time between pings, s: lost browsers are noticed after about this time.
 _PING = 15
-# So many messages may wait for a slow browser before it misses some of the robot's steps.
+# Maximum number of messages waiting for a slow browser before it skips some of the robot's moves.
 _CROWDED = 100
 
 
 class Server:
-    """`welcome()` gives the messages that a new browser needs first."""
+    """Sends the scene to all browsers. `welcome()` returns the messages that a new browser needs first."""
 
     def __init__(self) -> None:
         self.viewers: set[_Feed] = set()
         self.welcome: Callable[[], list[bytes]] = list
         self.caption = ""
-        routes = [
+        routes: list[Any] = [
             (r"/", _Feed, {"server": self}),
             (r"/static/(?:index\.html)?", _Page, {"page": _PAGE.read_bytes()}),
             (r"/static/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
@@ -56,9 +57,9 @@ class Server:
             logging.getLogger(name).setLevel(logging.ERROR)
 
     def listen(self, port: int) -> str:
-        """Starts on `port`, or on the first free one from `FIRST_PORT` up if it is 0; returns the URL. Raises UserError."""
+        """Starts on `port`, or for 0 on the first free one from `FIRST_PORT` up; returns the URL. Raises UserError."""
         if not 0 <= port <= 65535:
-            raise UserError(f"--port: {port} is no port; use 1 to 65535, or 0 for a free one")
+            raise UserError(f"--port: {port} is not a port; use 1 to 65535, or 0 for a free one")
         for number in [port] if port else range(FIRST_PORT, FIRST_PORT + TRIES):
             try:
                 sockets = tornado.netutil.bind_sockets(number, LOOPBACK)
@@ -67,11 +68,11 @@ class Server:
             self._http.add_sockets(sockets)
             return f"http://{LOOPBACK}:{number}/static/"
         if port:
-            raise UserError(f"--port: port {port} cannot be used (taken, or not allowed); 0 takes a free one")
+            raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
         raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
 
     def send(self, message: bytes, newest_only: bool = False) -> None:
-        """Passes a drawing message on to every browser."""
+        """Sends a drawing message to every browser."""
         for viewer in tuple(self.viewers):
             viewer.pass_on(message, newest_only)
 
@@ -108,13 +109,13 @@ class _Feed(tornado.websocket.WebSocketHandler):
         if self.request.headers.get("Upgrade", "").lower() != "websocket":
             self.redirect("/static/")
             return
-        # Before Tornado's own check, which lets in a page whose name was made to lead here (its host is then the origin).
+        # Tornado's own check would let in a page whose host name was made to resolve to this machine (DNS rebinding).
         if not self.check_origin(self.request.headers.get("Origin", f"http://{LOOPBACK}")):
             raise tornado.web.HTTPError(403)
         await super().get(*args, **kwargs)
 
     def check_origin(self, origin: str) -> bool:
-        # Any page in the user's browser can reach a loopback port: only our own page, also through a tunnel, may read.
+        # Any page in the user's browser can reach a loopback port; only our own page may read, also through a tunnel.
         try:
             return urlsplit(origin).hostname in _LOCAL_NAMES
         except ValueError:
@@ -128,13 +129,13 @@ class _Feed(tornado.websocket.WebSocketHandler):
         self._server.viewers.add(self)
 
     def on_message(self, _: str | bytes) -> None:
-        """Browsers have no say here."""
+        """Ignores everything that browsers send."""
 
     def on_close(self) -> None:
         self._server.viewers.discard(self)
 
     def pass_on(self, message: bytes | str, newest_only: bool = False) -> None:
-        """Sends `message`; a `newest_only` one is dropped while too many are still on their way."""
+        """Sends `message`; drops a `newest_only` one while too many messages are waiting."""
         if newest_only and self._on_the_way > _CROWDED:
             return
         try:
@@ -145,7 +146,7 @@ class _Feed(tornado.websocket.WebSocketHandler):
         self._on_the_way += 1
         sent.add_done_callback(self._arrived)
 
-    def _arrived(self, sent: asyncio.Future) -> None:
+    def _arrived(self, sent: asyncio.Future[None]) -> None:
         self._on_the_way -= 1
-        # Asked for, or asyncio complains of an error that nobody looked at; a broken connection is closed by itself.
+        # Retrieved, or asyncio would warn about it; a broken connection closes itself.
         sent.exception()

@@ -1,9 +1,9 @@
-"""What the scene shows now: pure functions from the run's state and the tests that run to a `Shot`, and from time to poses."""
+"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, and from time to poses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,16 +12,16 @@ from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import Live
 from ddenv.world.pose import Pose
 
-SPEED = 4.0  # a replay is so many times as fast as the robot was
-PAUSE = 2.0  # a replay stands still so long at its end, s
-HOLD = 3.0  # between two tests the last one stays on the screen for so long, s
+SPEED = 4.0  # of a replay, relative to real time
+PAUSE = 2.0  # at the end of a replay, s
+HOLD = 3.0  # how long a finished test stays on screen until the next one starts, s
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """What is shown: a test as it runs ("live"), a finished test again ("replay"), or the robot at its start ("start").
+    """What is shown: a running test ("live"), a replay of a finished one ("replay"), or the robot at its start ("start").
 
-    Of the elements, `models` are in the test shown, `left_out` are kept so far but not in this test, `removed` are gone.
+    Elements: `models` are in the test, `left_out` in the environment but not in the test, `removed` are removed.
     """
 
     kind: str
@@ -33,11 +33,12 @@ class Shot:
 
 
 def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, idle: float = math.inf) -> Shot:
-    """What to show, `idle` s after a test was last seen running. Stays with the `previous` test while it runs."""
+    """What to show, `idle` s after a test was last running. Stays with the `previous` test while it runs."""
     running = [row.test for row in live if _is_running(state, row.test)]
     if running:
-        stay = previous is not None and previous.kind == "live" and previous.test in running
-        return _of_test(state, "live", state.tests[(previous.test if stay else running[0]) - 1])
+        stays = previous is not None and previous.kind == "live" and previous.test in running
+        number = previous.test if stays and previous is not None and previous.test else running[0]
+        return _of_test(state, "live", state.tests[number - 1])
     working = state.status in ("baseline", "running")
     if working and previous is not None and previous.kind == "live" and idle < HOLD:
         return previous
@@ -68,14 +69,14 @@ def _of_test(state: RunState, kind: str, test: Test) -> Shot:
         original = state.baseline is not None and test.id == state.baseline.failure_test
         name = "the failure f" if original else "the failure in what is left"
         models = frozenset(state.environment)
-    elif test.phase == "round" and state.round is not None and test.round == state.round.number:
+    elif test.candidate is not None and state.round is not None and test.round == state.round.number:
         candidate = state.round.candidates[test.candidate]
         name, models = f"round {test.round} · {candidate.label}", frozenset(candidate.models)
     elif test.phase == "round":
         name, models = f"round {test.round}", frozenset(state.environment)
     elif test.phase == "confirm":
         name = f"what is left without {test.without}" if test.without else "what is left, in full"
-        models = frozenset(state.environment) - {test.without}
+        models = frozenset(name for name in state.environment if name != test.without)
     words = [name, f"test {test.id}"]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")
@@ -89,26 +90,26 @@ def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], 
 
 
 def replay_time(elapsed: float, length: float) -> float:
-    """Simulated time s to show, `elapsed` s after the replay of a run of `length` s began; it begins again for ever."""
+    """The simulated time to show, s, `elapsed` s after the replay of a run of `length` s started; it repeats forever."""
     length = max(0.0, length)
     return min(length, elapsed % (length / SPEED + PAUSE) * SPEED)
 
 
 def pose_at(samples: np.ndarray, time: float) -> Pose:
-    """The pose at simulated `time` s, between the two nearest rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
+    """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
     after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
     if len(samples) == 1:
         return _pose(samples[0, 1:])
     first, second = samples[after - 1], samples[after]
     span = second[0] - first[0]
     part = float(np.clip((time - first[0]) / span, 0.0, 1.0)) if span > 0 else 1.0
-    # A rotation has two quaternions: the one on the same side is the short way round.
+    # Of the two quaternions of a rotation, the one on the same side gives the shorter path.
     sign = -1.0 if first[4:] @ second[4:] < 0 else 1.0
     quaternion = (1 - part) * first[4:] + part * sign * second[4:]
     return _pose(np.concatenate([(1 - part) * first[1:4] + part * second[1:4], quaternion]))
 
 
-def _pose(values: Sequence[float]) -> Pose:
+def _pose(values: Iterable[float]) -> Pose:
     x, y, z, *quaternion = map(float, values)
     length = math.hypot(*quaternion) or 1.0
     w, i, j, k = (part / length for part in quaternion)
@@ -116,5 +117,5 @@ def _pose(values: Sequence[float]) -> Pose:
 
 
 def live_pose(row: Live) -> Pose:
-    """Where the robot of a running test is."""
+    """The robot's pose in a running test."""
     return _pose(row.pose)
