@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from inspect import isawaitable
 
 # Only what hangs takes so long (s): a slow machine is no bug.
 PATIENCE = 300.0
@@ -20,9 +21,9 @@ def wait_until(true: Callable[[], object], what: Callable[[], object] = str) -> 
         time.sleep(PERIOD)
 
 
-async def eventually(true: Callable[[], Awaitable[object]], what: Callable[[], object] = str) -> None:
-    """As `wait_until`, while the event loop goes on."""
+async def eventually(true: Callable[[], object], what: Callable[[], object] = str) -> None:
+    """As `wait_until`, while the event loop goes on; what `true()` gives may have to be awaited."""
     deadline = time.monotonic() + PATIENCE
-    while not await true():
+    while not (await found if isawaitable(found := true()) else found):
         assert time.monotonic() < deadline, what()
         await asyncio.sleep(PERIOD)

@@ -2,9 +2,11 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import yaml
@@ -18,17 +20,18 @@ from tests.waiting import PATIENCE, wait_until
 WALL = str(DATA / "wall.yaml")
 
 
-@pytest.fixture(scope="module")
-def reduced(tmp_path_factory):
+@pytest.fixture(scope="session")
+def reduced(made_once):
     """A finished reduction of the small world: its folder and its summary."""
-    folder = tmp_path_factory.mktemp("reduced")
-    os.environ["DDENV_HOME"] = str(folder)
-    try:
-        done = ddenv("run", WALL, "--json", "--jobs", 2, "--output", folder / "minimal.sdf")
-    finally:
-        del os.environ["DDENV_HOME"]
-    assert done.returncode == 0, done.stderr
-    return folder, json.loads(done.stdout)
+
+    def make(folder):
+        home = os.environ | {"DDENV_HOME": str(folder)}
+        done = ddenv("run", WALL, "--json", "--jobs", 2, "--output", folder / "minimal.sdf", env=home)
+        assert done.returncode == 0, done.stderr
+        (folder / "summary.json").write_text(done.stdout)
+
+    folder = made_once("reduced", make)
+    return folder, json.loads((folder / "summary.json").read_text())
 
 
 def test_a_reduction_finds_the_two_that_matter(reduced):
@@ -100,6 +103,7 @@ def test_a_finished_run_resumes_to_its_summary(reduced):
     assert json.loads(done.stdout) == summary
 
 
+@pytest.mark.programs
 def test_an_sdf_world_runs_with_a_spawn_and_a_goal(home):
     done = ddenv("test", DATA / "wall.sdf", "--spawn", "0,0,0.45,0", "--goal", "4,0", "--timeout", 5)
     assert done.returncode == 0, done.stderr
@@ -117,6 +121,7 @@ def test_a_world_in_which_the_robot_does_not_fail_ends_with_1(home):
     assert summary["models_after"] == 6
 
 
+@pytest.mark.programs
 def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     process = subprocess.Popen(
         [sys.executable, "-m", "ddenv", "run", WALL, "--json"],
@@ -177,13 +182,11 @@ def _finished(run):
         return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
 
 
-def test_a_second_engine_is_refused(reduced):
-    _, summary = reduced
-    from pathlib import Path
-
-    with engine_lock(Path(summary["run_file"])):
-        done = ddenv("resume", summary["run_file"])
-    _is_one_line(done, "another engine is working on this run")
+def test_a_second_engine_is_refused(reduced, tmp_path):
+    # Another process may be looking at the run that all share.
+    run = Path(shutil.copy(reduced[1]["run_file"], tmp_path))
+    with engine_lock(run):
+        _is_one_line(ddenv("resume", run), "another engine is working on this run")
 
 
 def _is_one_line(done, words):
@@ -316,7 +319,6 @@ def test_a_malformed_world_is_told_with_its_line(home):
 
 def test_a_newer_run_file_is_refused(reduced, tmp_path):
     import sqlite3
-    from pathlib import Path
 
     copy = tmp_path / "newer.ddenv"
     copy.write_bytes(Path(reduced[1]["run_file"]).read_bytes())

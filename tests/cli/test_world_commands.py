@@ -7,7 +7,7 @@ import pytest
 from ddenv.cli.world_check import lines, report
 from ddenv.map.names import width
 from ddenv.world.read import parse_world
-from tests.command import ddenv
+from tests.command import ddenv, in_process
 from tests.conftest import DATA
 
 WORLD = b"""<sdf version='1.6'><world name='hall'>
@@ -152,8 +152,8 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("words", "said"), WRONG.values(), ids=WRONG.keys())
-def test_mistakes_get_one_line(words, said):
-    done = ddenv("world", *words)
+def test_mistakes_get_one_line(monkeypatch, capsys, words, said):
+    done = in_process(monkeypatch, capsys, "world", *words)
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1 and done.stdout == ""

@@ -19,14 +19,18 @@ PAGE = (ROOT / "docs/any-simulator.md").read_text()
 SCENARIO = ROOT / "docs/examples/any_simulator/scenario.yaml"
 
 
-@pytest.fixture(scope="module")
-def reduced(tmp_path_factory):
+@pytest.fixture(scope="session")
+def reduced(made_once):
     """The run file of the example, and what the command printed."""
-    run = tmp_path_factory.mktemp("example") / "run.ddenv"
     (command,) = re.findall(r"\$ ddenv (run .*)", PAGE)
-    done = ddenv(*command.split(), "--output", run, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-    return run, done.stdout
+
+    def make(folder):
+        done = ddenv(*command.split(), "--output", folder / "run.ddenv", cwd=ROOT)
+        assert done.returncode == 0, done.stderr
+        (folder / "printed").write_text(done.stdout)
+
+    folder = made_once("example", make)
+    return folder / "run.ddenv", (folder / "printed").read_text()
 
 
 def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):

@@ -20,6 +20,7 @@ from ddenv.runs.programs import start_engine
 from ddenv.runs.scenarios import load_parts
 from tests.engine.test_pool import EVERYTHING, result, workers
 from tests.robot.external.own import FAMILY, SLEEP, TOKEN, own_scenario, processes_with
+from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until
 
 COMMAND = "DDENV_WORLD="
@@ -91,7 +92,7 @@ def test_a_command_that_went_missing_is_told(tmp_path):
         pool.close()
 
 
-@pytest.mark.parametrize("way", ["killed", "terminated", "stopped"])
+@pytest.mark.parametrize("way", slow(pytest.mark.programs, ["killed", "terminated", "stopped"], but=["killed"]))
 def test_an_engine_that_ends_takes_its_commands_along(tmp_path, token, way):
     run = tmp_path / "run.ddenv"
     create_run(own_scenario(tmp_path, FAMILY + SLEEP), run)
@@ -121,6 +122,7 @@ BREAKS = """
 """
 
 
+@pytest.mark.programs
 def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_path):
     run = tmp_path / "run.ddenv"
     create_run(own_scenario(tmp_path, BREAKS, "{world}", baseline_runs=3, iterations=1), run)
@@ -153,6 +155,7 @@ def _resume(run: Path) -> subprocess.CompletedProcess:
     return subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
 
 
+@pytest.mark.programs
 def test_where_all_of_the_baseline_breaks_there_is_nothing_to_reduce(tmp_path):
     run = tmp_path / "run.ddenv"
     create_run(own_scenario(tmp_path, "import sys; print('no licence', file=sys.stderr); sys.exit(7)"), run)

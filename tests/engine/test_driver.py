@@ -76,6 +76,7 @@ def story(state):
     return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
 
 
+@pytest.mark.programs
 @every_method
 def test_workers_never_change_the_result(tmp_path, method):
     for salt in range(5):

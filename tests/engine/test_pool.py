@@ -3,7 +3,6 @@
 import math
 import os
 import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -42,6 +41,7 @@ def workers(pool):
     return [int(pid) for pid in pool._pool._pool_manager.worker_manager.workers]
 
 
+@pytest.mark.programs
 def test_an_idle_worker_that_dies_is_replaced_and_all_have_what_makes_drake_fast(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     before, pool = dict(os.environ), Pool(*parts(), 2)
@@ -58,7 +58,7 @@ def _test_a_dying_worker(pool):
     first = workers(pool)
     for pid in workers(pool):
         os.kill(pid, signal.SIGKILL)
-    time.sleep(0.5)
+    wait_until(lambda: not set(first) & set(workers(pool)))
     pool.submit(2, EVERYTHING, 0)
     assert result(pool)[1].outcome == "failed"
     assert not set(first) & set(workers(pool))

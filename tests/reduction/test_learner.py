@@ -125,6 +125,7 @@ def followed(weights):
     return np.array(told), np.array(at_first), np.array(truth)
 
 
+@pytest.mark.rates
 def test_its_chances_are_right_on_average():
     """Of all models that it gives a chance of about a half while it works, about a half are needed, and so on."""
     told, _, needed = followed(1.0 / np.arange(1, 31))

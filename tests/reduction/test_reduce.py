@@ -205,6 +205,7 @@ def test_the_library_needs_neither_drake_nor_a_screen():
     assert done.stdout.strip() == "('a', 'e') []", done.stderr
 
 
+@pytest.mark.examples
 def test_the_guides_examples_run():
     """Each Python block of the library's page runs as printed, and prints what stands below it."""
     page = (ROOT / "docs" / "library.md").read_text()
@@ -217,6 +218,7 @@ def test_the_guides_examples_run():
         assert done.stdout.splitlines() == shown
 
 
+@pytest.mark.examples
 def test_the_guides_package_works_as_printed(tmp_path):
     """Put where pip would put it, its schema is used by name."""
     page = (ROOT / "docs" / "library.md").read_text()

@@ -75,6 +75,7 @@ def test_the_estimate_is_near_the_truth_and_never_the_truth(world_of, husky, sce
     assert pairs[-1][0].heading == pytest.approx(2 * math.atan2(pairs[-1][1][7], pairs[-1][1][4]), abs=0.1)
 
 
+@pytest.mark.rates
 def test_a_compass_that_points_wrong_leads_the_robot_astray(world_of, husky, scenario_of):
     sections = {"goal": {"x": 8, "y": 0, "tolerance": 0.6}, "failure": {"timeout": 20.0}}
     good = Template(world_of(), husky, scenario_of(sensors=NOISE, **sections))

@@ -198,6 +198,7 @@ def test_noticing_changes_no_bit_of_a_run_with_moving_models(world_of, add, husk
     assert bits(bare) == bits(result)
 
 
+@pytest.mark.rates
 def test_noticing_changes_no_bit_of_a_run_in_the_ditch(ditch, ditch_world, monkeypatch):
     keep = frozenset(ditch_world.elements())
     for seed in (0, 3):
@@ -326,6 +327,7 @@ def test_reach_is_that_of_the_farthest_part_however_the_joints_stand():
     assert reach(model_of("robot", base, hand, arm, joints=(grip, hinge))) == pytest.approx(2 + 0.2 * math.sqrt(3))
 
 
+@pytest.mark.rates
 def test_the_stride_does_not_matter(ditch, ditch_world, monkeypatch):
     keep = frozenset(ditch_world.elements())
     first = ditch.run(keep, seed=3).first_touched

@@ -109,7 +109,7 @@ def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     assert {failed[number].failure for number in np.flatnonzero(similar)} == {"stuck"}
 
 
-@each_often
+@each_witnessed
 def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
     scenario = part(name).scenario
     world = parse_world(script(name)[name](repaired=True).encode(), Path("repaired"))
@@ -131,7 +131,7 @@ def shows_f(name: str, keep: set[str], seeds: range) -> list[bool]:
     return [judge(part(name).template.run(frozenset(keep), seed), failure(name)).outcome == "similar" for seed in seeds]
 
 
-@each_witnessed
+@each_often
 def test_few_models_show_the_same_failure_and_none_of_them_can_be_removed(name):
     assert sum(shows_f(name, MINIMAL[name], range(4))) >= 2
     for left_out in MINIMAL[name]:

@@ -22,6 +22,7 @@ from tornado.websocket import websocket_connect
 
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import Live
+from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until
 
 
@@ -107,6 +108,7 @@ async def test_a_browser_gets_the_scene_and_its_words(writer, start_scene):
     assert words["title"] == "the failure f · test 1 · similar · replay at 4×"
 
 
+@pytest.mark.programs
 async def test_a_running_test_is_followed(writer, start_scene):
     writer.baseline()
     writer.round()
@@ -122,6 +124,7 @@ async def test_a_running_test_is_followed(writer, start_scene):
     await messages(url, titled("the failure f"))
 
 
+@pytest.mark.programs
 async def test_rows_of_a_killed_engine_are_not_live(writer, start_scene):
     writer.baseline()
     writer.round()
@@ -140,6 +143,7 @@ async def test_pages_from_elsewhere_are_refused(writer, start_scene):
         assert error.value.code == 403, origin
 
 
+@pytest.mark.programs
 async def test_a_name_made_to_lead_here_is_refused(writer, start_scene):
     url = url_of(start_scene(writer.path))
     with pytest.raises(HTTPClientError) as error:
@@ -153,6 +157,7 @@ async def test_own_pages_are_welcome_also_through_a_tunnel(writer, start_scene):
         assert await messages(url, headers={"Origin": origin})
 
 
+@pytest.mark.programs
 async def test_browsers_come_and_go(writer, start_scene):
     writer.baseline()
     process = start_scene(writer.path)
@@ -161,12 +166,13 @@ async def test_browsers_come_and_go(writer, start_scene):
         assert await messages(url)
     connection = await websocket_connect(feed_of(url))
     connection.protocol.stream.close()
-    await asyncio.sleep(0.3)
-    assert process.poll() is None
     assert await messages(url)
+    assert process.poll() is None
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", slow(pytest.mark.programs, [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], but=[signal.SIGINT])
+)
 async def test_ends_cleanly(writer, start_scene, number):
     writer.baseline()
     process = start_scene(writer.path)
@@ -197,6 +203,7 @@ def test_ends_with_its_parent(writer):
             os.kill(int(parent.stdout.split()[0]), signal.SIGKILL)
 
 
+@pytest.mark.programs
 def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
     first = url_of(start_scene(writer.path))
     second = url_of(start_scene(writer.path))
@@ -208,7 +215,12 @@ def test_a_chosen_port_and_the_next_free_one(writer, start_scene):
 
 
 @pytest.mark.parametrize(
-    "words", [["missing.ddenv"], [], [__file__], [__file__, "--port", "many"], [__file__, "--wrong"]]
+    "words",
+    slow(
+        pytest.mark.programs,
+        [["missing.ddenv"], [], [__file__], [__file__, "--port", "many"], [__file__, "--wrong"]],
+        but=[[__file__]],
+    ),
 )
 def test_user_errors_are_one_line(start_scene, words):
     process = start_scene(*words)
@@ -219,6 +231,7 @@ def test_user_errors_are_one_line(start_scene, words):
     assert process.stdout.read() == ""
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("port", ["-1", "70000", "99999999999"])
 def test_ports_that_do_not_exist(writer, start_scene, port):
     process = start_scene(writer.path, "--port", port)
@@ -226,6 +239,7 @@ def test_ports_that_do_not_exist(writer, start_scene, port):
     assert process.stderr.read().count("\n") == 1
 
 
+@pytest.mark.programs
 def test_a_damaged_run_file_is_one_line(writer, start_scene):
     writer.run.append("nonsense", {})
     process = start_scene(writer.path)
@@ -235,6 +249,7 @@ def test_a_damaged_run_file_is_one_line(writer, start_scene):
     assert error.count("\n") == 1
 
 
+@pytest.mark.programs
 async def test_a_run_file_that_is_damaged_while_shown(writer, start_scene):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))

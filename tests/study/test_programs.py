@@ -52,6 +52,7 @@ def engine_of(run):
         return [event.data["pid"] for event in file.events() if event.kind == "engine_started"][-1]
 
 
+@pytest.mark.programs
 def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, monkeypatch):
     (tmp_path / "robot.sh").write_text(ROBOT)
     made, most = tmp_path / "made", tmp_path / "most"

@@ -8,7 +8,6 @@ import shutil
 import signal
 import sqlite3
 import threading
-import time
 
 import pytest
 
@@ -227,20 +226,24 @@ def test_an_engine_that_was_left_and_begins_only_now_is_waited_for(alone, lab, m
     gate = threading.Event()
     start = lab.start_engine
 
-    def let_go(mine):
-        # Some time after the new one has given up.
-        wait_until(lambda: mine.poll() is not None)
-        time.sleep(0.3)
-        gate.set()
+    look, mine, looks = Progress.look, [], []
+
+    def let_go(self, running, *others):
+        look(self, running, *others)
+        if mine and mine[0].poll() is not None:
+            looks.append(running)
+        # The study has seen that the new one has given up.
+        if len(looks) > 1:
+            gate.set()
 
     def late(*words, **options):
         monkeypatch.setattr("ddenv.study.work.start_engine", start)
         orphan(lab, *alone, gate)
-        mine = start(*words, **options)
-        threading.Thread(target=let_go, args=(mine,)).start()
-        return mine
+        mine.append(start(*words, **options))
+        return mine[0]
 
     monkeypatch.setattr("ddenv.study.work.start_engine", late)
+    monkeypatch.setattr(Progress, "look", let_go)
     code, words = study(*alone)
     gate.set()
     assert code == 0, words

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
+from tests.waiting import eventually
 
 
 class Session:
@@ -24,8 +25,7 @@ class Session:
         for key in keys:
             await self.pilot.press(key)
         await self.pilot.pause()
-        while self.app.is_running and self.screen.sending:
-            await self.pilot.pause(0.01)
+        await eventually(lambda: not (self.app.is_running and self.screen.sending))
 
     async def look(self):
         """Lets the screen see what was written, without waiting for its clock."""

@@ -9,13 +9,19 @@ from textual.screen import Screen
 from textual.widgets import Label
 
 from ddenv.workbench.background import is_open, tell
+from tests.waiting import eventually
 
 
 class Panel(Vertical):
-    """Closes slowly: what is in it has gone before."""
+    """Closes when it may: what is in it has gone before."""
+
+    def __init__(self):
+        super().__init__()
+        self.may_close = asyncio.Event()
+        self.may_close.set()
 
     async def on_unmount(self):
-        await asyncio.sleep(0.3)
+        await self.may_close.wait()
 
 
 class Page(Screen):
@@ -43,12 +49,14 @@ async def test_an_open_screen_is_told(page):
 
 
 async def test_a_screen_that_is_being_closed_is_told_nothing_more(page):
+    panel = page.query_one(Panel)
+    panel.may_close.clear()
     closing = asyncio.ensure_future(page.app.pop_screen()())
-    while list(page.query(Label)):
-        await asyncio.sleep(0.01)
+    await eventually(lambda: not page.query(Label))
     assert not closing.done()
     assert not is_open(page)
     await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    panel.may_close.set()
     await closing
     await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
 

@@ -31,6 +31,7 @@ from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
 from ddenv.workbench.setup.open_file import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
+from tests.tiers import slow
 
 NAMES = [
     "[bold]loud[/bold]",
@@ -80,7 +81,7 @@ def steering(app):
     ]
 
 
-@pytest.mark.parametrize("size", [(120, 36), (80, 24)])
+@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(120, 36), (80, 24)], but=[(80, 24)]))
 async def test_no_name_steers_the_terminal(runs, size):
     data = fake_run.scenario(name="evil \x1b]0;title\x07 [bold]\u202e")
     data["description"] = "\x1b[31m\u202e\n[red]"
@@ -96,7 +97,7 @@ async def test_no_name_steers_the_terminal(runs, size):
         assert "not done" in session.said()
         for key in ("2", "4", "5", "h", "slash", "E", "R", "y", "question_mark"):
             await session.press(key)
-            await session.pilot.pause(0.02)
+            await session.pilot.pause()
             assert steering(session.app) == []
             while not isinstance(session.app.screen, RunScreen):
                 session.app.pop_screen()
@@ -244,7 +245,7 @@ KEYS = [
 SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 
 
-@pytest.mark.parametrize("watch", [True, False], ids=["watch", "guide"])
+@pytest.mark.parametrize("watch", slow(pytest.mark.fuzz, [True, False], but=[False]), ids=["watch", "guide"])
 async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
     started = starts(monkeypatch)
     monkeypatch.setattr("ddenv.workbench.run.processes.Scene.start", lambda self: None)
@@ -335,7 +336,7 @@ def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encodin
     check_terminal()
 
 
-@pytest.mark.parametrize("key", ["o", "y", "l", "h"])
+@pytest.mark.parametrize("key", slow(pytest.mark.pictures, ["o", "y", "l", "h"], but=["h"]))
 async def test_dialogs_survive_terminals_without_room(run, key):
     fake_run.guided(run)
     async with Attached(run) as session:

@@ -1,6 +1,5 @@
 """A screen looks at a run file: whatever becomes of the file, it neither writes, nor waits, nor falls over."""
 
-import asyncio
 import os
 import sqlite3
 
@@ -13,6 +12,7 @@ from ddenv.workbench.app import Workbench
 from ddenv.workbench.run import poll as polling
 from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.run.poll import Poll
+from tests.waiting import eventually
 
 
 def look(poll):
@@ -174,8 +174,7 @@ async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run
     answers = []
     for kind in ("pause", "resume", "stop"):
         poll.send(kind, {}, lambda id, error: answers.append((id, error)))
-    while len(answers) < 3:
-        await asyncio.sleep(0.01)
+    await eventually(lambda: len(answers) == 3)
     assert answers == [(1, ""), (2, ""), (3, "")]
     assert [command.kind for command in run.file.commands()] == ["pause", "resume", "stop"]
 
@@ -184,8 +183,7 @@ async def test_a_watched_run_is_sent_nothing(run):
     watching = Poll(run.path, watch=True)
     answers = []
     watching.send("stop", {}, lambda id, error: answers.append((id, error)))
-    while not answers:
-        await asyncio.sleep(0.01)
+    await eventually(lambda: answers)
     assert answers[0][0] == 0 and "--watch" in answers[0][1]
     assert run.file.commands() == []
     watching.close()

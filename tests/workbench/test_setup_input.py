@@ -7,6 +7,7 @@ from setup_session import Opened
 from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
+from tests.tiers import slow
 
 GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
 STRANGE = "[bold]x[/] \x1b[31m\u202eסוף" + "m" * 300
@@ -83,7 +84,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, started):
         assert started == []
 
 
-@pytest.mark.parametrize("size", [(20, 5), (63, 40), (200, 17)], ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(20, 5), (63, 40), (200, 17)], but=[(63, 40)]), ids=str)
 async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
     async with Opened(size) as session:
         assert session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"

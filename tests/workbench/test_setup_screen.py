@@ -13,6 +13,7 @@ from ddenv.workbench.run.methods import KINDS
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.open_file import OpenFile
+from tests.tiers import slow
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):
@@ -156,7 +157,7 @@ async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
 PANES = {"f2": ("#choice", "#preview"), "f3": ("#preview",), "f4": ("#fields", "#explained")}
 
 
-@pytest.mark.parametrize("size", [(64, 18), (109, 40), (120, 30)], ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(64, 18), (109, 40), (120, 30)], but=[(64, 18)]), ids=str)
 async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
     async with Opened(size) as session:
         for key, shown in PANES.items():
@@ -174,7 +175,7 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
         assert session.app.focused.id == "epsilon"
 
 
-@pytest.mark.parametrize("size", [(120, 36), (200, 60)], ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
 async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
     async with Opened(size) as session:
         for id in ("#choice", "#preview", "#fields", "#explained"):
@@ -182,7 +183,9 @@ async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, siz
         assert session.screen.query_one(WorldMap).size.height >= size[1] * 4 // 10
 
 
-@pytest.mark.parametrize("size", [(64, 18), (80, 24), (120, 36), (200, 60)], ids=str)
+@pytest.mark.parametrize(
+    "size", slow(pytest.mark.pictures, [(64, 18), (80, 24), (120, 36), (200, 60)], but=[(80, 24)]), ids=str
+)
 async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
     async with Opened(size) as session:
         for key in ("f2", "f4", "f9"):

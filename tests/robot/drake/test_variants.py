@@ -62,6 +62,7 @@ def rubble() -> tuple[World, Model, Scenario]:
     return *load_parts(scenario), short
 
 
+@pytest.mark.rates
 def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_any_order():
     world, robot, scenario = rubble()
     names = world.elements()

@@ -13,6 +13,7 @@ from ddenv.robot.result import RunResult
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import box_model, joint_of, link_of, model_of, wedge
+from tests.tiers import slow
 
 BOARD = "0.9 0.09 0.04"
 SECTIONS = {"failure": {"timeout": 4.0}, "goal": {"x": 9, "y": 0}}
@@ -78,9 +79,9 @@ def bits(result: RunResult, *left_out: str) -> tuple:
     return result.outcome, result.trajectory.tobytes(), motions
 
 
-@pytest.mark.parametrize("far", FAR.values(), ids=FAR.keys())
+@pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air"]))
 def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template, far):
-    near = (cube("near", 1.2, 0.0, 0.15), cube("beside", 1.5, 1.5, 0.4))
+    near, far = (cube("near", 1.2, 0.0, 0.15), cube("beside", 1.5, 1.5, 0.4)), FAR[far]
     names = {model.name for model in (*near, *far)}
     both = template(*near, *far)
     with_it, without = run(both, *names), run(both, *names - {"far"})
