@@ -2,10 +2,14 @@
 
 import re
 
+import fake_run
+import pytest
+from rich.cells import cell_len
 from rich.console import Console
 from rich.segment import Segment
 from rich.style import Style
-from textual._compositor import ChopsUpdate, LayoutUpdate
+from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
+from textual.app import App
 from textual.geometry import Region
 from textual.strip import Strip
 
@@ -29,18 +33,20 @@ def sent(written, update):
 def shown(*sequences):
     """The cells (character, codes of its style) on a terminal that was sent all this, by (row, column)."""
     cells, codes, row, column = {}, (), 0, 0
-    for numbers, letter, text in re.findall(r"\x1b\[([0-9;]*)([A-Za-z])|([^\x1b]+)", "".join(sequences)):
+    written = re.sub(r"\x1b\]8;[^\x1b]*\x1b\\\\|\n", "", "".join(sequences))
+    for numbers, letter, text in re.findall(r"\x1b\[([0-9;]*)([A-Za-z])|([^\x1b]+)", written):
         if letter == "H":
             row, column = (int(number) - 1 for number in numbers.split(";"))
         elif letter == "m":
             parts = re.findall(r"[34]8;2;\d+;\d+;\d+|\d+", numbers)
+            parts = parts or ["0"]
             codes = () if parts[0] == "0" else codes
             for part in parts if parts[0] != "0" else parts[1:]:
                 kind = part[:1] if part[:1] in "34" else part
                 codes = (*(code for code in codes if code[:1] != kind), part)
         for char in text:
-            cells[row, column] = char, frozenset(codes)
-            column += 1
+            cells[row, column] = char, frozenset(codes) - {"39", "49"}
+            column += cell_len(char)
     return cells
 
 
@@ -93,3 +99,90 @@ async def test_all_is_sent_again_to_a_terminal_that_was_left_or_resized(monkeypa
         await pilot.resize_terminal(100, 30)
         await pilot.pause()
         assert len(forgotten) >= 2
+
+
+class Stranger(ChopsUpdate):
+    """An update of a kind that only a later release of Textual has."""
+
+
+def test_textual_draws_what_is_of_an_unknown_kind():
+    written, known = Written(), layout([("left right", PLAIN)])
+    sent(written, known)
+    stranger = Stranger([{0: Strip([Segment("night", PLAIN)])}], [(0, 0, 5)], [[5]])
+    assert written.fewer(stranger) is stranger
+    assert written.fewer(None) is None
+    # What it wrote is not known: all is sent again.
+    assert "left right" in sent(written, known)
+
+
+def test_textual_draws_what_is_made_in_another_way():
+    written, known = Written(), layout([("left right", PLAIN)])
+    sent(written, known)
+    update = ChopsUpdate([{0: Strip([Segment("night", PLAIN)])}], [(0, 0, 5)], [[5]])
+    fewer = written.fewer(update)
+    update.spans = [(0, 0, 5, "something new")]
+    update.render_segments = lambda console: "drawn by Textual"
+    assert fewer.render_segments(CONSOLE) == "drawn by Textual"
+    assert "left right" in sent(written, known)
+
+
+# The contract with Textual's compositor, which is not public. If a release of Textual breaks it, the workbench still works,
+# since Textual then draws by itself, but it sends more: read `textual/_compositor.py` and mend `terminal/written.py`.
+
+
+@pytest.fixture
+async def updates(run, monkeypatch):
+    """All that Textual wants drawn while a run is looked at, and the terminal is resized."""
+    found = []
+    monkeypatch.setattr(App, "_display", lambda app, screen, update: found.append(update))
+    monkeypatch.setattr(Workbench, "_display", lambda app, screen, update: found.append(update))
+    fake_run.mid_round(run)
+    async with Workbench(run.path).run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        await pilot.press("down", "1", "right", "question_mark")
+        await pilot.press("escape")
+        await pilot.resize_terminal(100, 30)
+        await pilot.pause()
+        await pilot.press("tab", "2")
+        await pilot.pause()
+    return [update for update in found if update is not None]
+
+
+async def test_textual_asks_the_app_to_display_updates_of_both_kinds(updates):
+    assert callable(getattr(App, "_display", None)), "App._display is gone: nothing goes through written.py any more"
+    assert {type(update) for update in updates} == {LayoutUpdate, ChopsUpdate}
+    assert all(isinstance(update, CompositorUpdate) for update in updates)
+
+
+async def test_updates_say_where_their_strips_are(updates):
+    for update in updates:
+        if type(update) is LayoutUpdate:
+            assert isinstance(update.region, Region)
+            # More than once: what cannot be read is drawn by Textual after that.
+            assert all(iter(line) is not line for line in update.strips)
+            assert all(isinstance(strip, Strip) for line in update.strips for strip in line)
+            continue
+        assert len(update.chops) == len(update.chop_ends)
+        for y, left, right in update.spans:
+            assert 0 <= left <= right
+            assert len(update.chops[y]) == len(update.chop_ends[y])
+            assert all(strip is None or isinstance(strip, Strip) for strip in update.chops[y].values())
+
+
+def hidden(codes):
+    """Whether text has the colour of its ground: a blank is sent instead."""
+    return any(f"48{code[2:]}" in codes for code in codes if code.startswith("38;"))
+
+
+async def test_the_terminal_shows_what_textual_itself_would_show(updates):
+    written = Written()
+    ours, theirs = {}, {}
+    for number, update in enumerate(updates):
+        if type(update) is LayoutUpdate:
+            # As the app does when the terminal is resized.
+            written.forget()
+        ours |= shown(written.fewer(update).render_segments(CONSOLE))
+        theirs |= shown(update.render_segments(CONSOLE))
+        seen = {place: cell for place, cell in theirs.items() if cell[0] != " " and not hidden(cell[1])}
+        assert {place: ours[place] for place in seen} == seen, f"update {number}, {type(update).__name__}"
+        assert all(ours[place][0] == " " for place in theirs.keys() - seen.keys())

@@ -120,7 +120,7 @@ class ExportScreen(ModalScreen[None]):
         self.action_write()
 
     @on(Button.Pressed, "#export-close")
-    def _closed(self) -> None:
+    def _close_pressed(self) -> None:
         self.dismiss()
 
     def action_write(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from textwrap import wrap
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -39,8 +39,8 @@ MARK = "marked"
 INDENT = 10
 
 
-class Tree(DataTable):
-    """With a cursor of whole rows, home and end mean the first and the last of them."""
+class Tree(DataTable[Text]):
+    """The cursor is a whole row: home and end go to the first and the last one."""
 
     def action_scroll_home(self) -> None:
         self.action_scroll_top()
@@ -104,10 +104,10 @@ class History(Screen[int | None]):
         self._show_decisions(state.decisions)
         if (state.nodes, state.node) != (self._tree, self._here):
             at = self.under_cursor
-            followed = at is None or at.number == self._here
+            stays = None if at is None or at.number == self._here else at.number
             self._tree, self._here = state.nodes, state.node
             self._rows = branches.rows(state.nodes, state.node)
-            self._fill(self._here if followed else at.number)
+            self._fill(self._here if stays is None else stays)
 
     def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
         """Whole: this is where they are read."""
@@ -195,7 +195,12 @@ class History(Screen[int | None]):
         except UserError as error:
             self._refuse(str(error))
             return
-        self.app.push_screen(Question(question), lambda yes: self.dismiss(node.number) if yes else None)
+
+        def answered(yes: bool | None) -> None:
+            if yes:
+                self.dismiss(node.number)
+
+        self.app.push_screen(Question(question), answered)
 
     def action_mark(self) -> None:
         node = self.under_cursor
@@ -234,7 +239,7 @@ def _as_it_is(line: Text, width: int) -> Text:
     return line.copy()
 
 
-def _side(name: str) -> str:
+def _side(name: str) -> Literal["left", "right"]:
     return "right" if name in ("#", "tests") else "left"
 
 

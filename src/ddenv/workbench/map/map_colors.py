@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from textual.color import Color, ColorParseError
 
@@ -176,10 +176,11 @@ def plain(back: int = PLAIN, fore: int = PLAIN) -> Palette:
     """For a terminal without colours: all is told by letters and fillings."""
     native = back == PLAIN
     faint = fore if native else packed(blend(unpacked(back), unpacked(fore), 0.4))
-    return Palette(NONE, back, fore, faint, *[fore] * 8, native=native)
+    names = ("path", "original", "live", "dull", "selected", "start", "goal", "failure")
+    return Palette(NONE, back, fore, faint, native=native, **dict.fromkeys(names, fore))
 
 
-def palette_of(app: App, back: Color, fore: Color) -> Palette:
+def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
     """The one for a widget's background and text colour in the app's theme and terminal."""
     native = app.native_ansi_color
     ground, text = (PLAIN, PLAIN) if native else (packed(back.rgb), packed(fore.rgb))
@@ -188,12 +189,12 @@ def palette_of(app: App, back: Color, fore: Color) -> Palette:
         return plain(ground, text)
     if native or system in ("standard", "windows"):
         return sixteen(ground, text)
-    marks = (_variable(app, "primary"), _variable(app, "success"), _variable(app, "error"))
-    accent = _variable(app, "accent") or (255, 215, 80)
-    return mixed(back.rgb, fore.rgb, accent=accent, marks=marks if all(marks) else None)
+    start, goal, failure = _variable(app, "primary"), _variable(app, "success"), _variable(app, "error")
+    marks = (start, goal, failure) if start and goal and failure else None
+    return mixed(back.rgb, fore.rgb, accent=_variable(app, "accent") or (255, 215, 80), marks=marks)
 
 
-def _variable(app: App, name: str) -> RGB | None:
+def _variable(app: App[Any], name: str) -> RGB | None:
     """A colour of the theme, where it is one."""
     try:
         return Color.parse(app.theme_variables.get(name, "")).rgb

@@ -156,7 +156,11 @@ class RunsScreen(Screen[None]):
             self._complain("its engine is at work: open the run and stop it first")
         else:
             words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log goes, too."
-            self.app.push_screen(Question(words, final=True), lambda yes: self._delete(run.path) if yes else None)
+            self.app.push_screen(Question(words, final=True), lambda yes: self._answered(bool(yes), run.path))
+
+    def _answered(self, yes: bool, path: Path) -> None:
+        if yes:
+            self._delete(path)
 
     @work(thread=True, group="delete")
     def _delete(self, path: Path) -> None:

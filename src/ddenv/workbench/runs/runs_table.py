@@ -113,7 +113,7 @@ def moment(time: float) -> str:
     return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
 
 
-class RunTable(DataTable):
+class RunTable(DataTable[Text]):
     """One row a run; only cells that changed are drawn again."""
 
     BINDINGS: ClassVar = [
@@ -126,6 +126,7 @@ class RunTable(DataTable):
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._runs: list[Recent] = []
         self._wide = 0
+        self._name_width = NARROWEST_NAME
         self._cells: dict[str, list[str]] = {}
 
     @property
@@ -162,8 +163,8 @@ class RunTable(DataTable):
         self._cells = {}
         columns = self._columns()
         name = self._wide - sum(column[1] + AROUND for column in columns) - AROUND - 1
-        self._name = max(NARROWEST_NAME, name)
-        self.add_column("name", width=self._name, key="name")
+        self._name_width = max(NARROWEST_NAME, name)
+        self.add_column("name", width=self._name_width, key="name")
         for title, width, number, _ in columns:
             self.add_column(Text(title, justify="right" if number else "left"), width=width, key=title)
         for run in self._runs:
@@ -189,7 +190,7 @@ class RunTable(DataTable):
 
     def _row(self, run: Recent) -> list[str]:
         words = [shortened(say(run), width) for _, width, _, say in self._columns()]
-        return [shortened(plain(run.path.stem), self._name), *words]
+        return [shortened(plain(run.path.stem), self._name_width), *words]
 
     def _drawn(self, cells: list[str]) -> list[Text]:
         numbers = [False, *(number for _, _, number, _ in self._columns())]

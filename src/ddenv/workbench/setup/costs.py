@@ -35,7 +35,7 @@ def past_of(scenario: Scenario, folder: Path) -> Past:
         paths = sorted(folder.glob("*.ddenv"), key=lambda path: -path.stat().st_mtime)
     except OSError:
         return Past()
-    found = []
+    found: list[tuple[list[float], float | None]] = []
     for path in paths[:LOOKED_AT]:
         if len(found) < ENOUGH and (told := _told(path, scenario)) is not None:
             found.append(told)

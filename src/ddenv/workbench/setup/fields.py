@@ -192,7 +192,7 @@ class OptionsForm(Vertical):
                 continue
             field = self.query_one(f"#{id}")
             field.remove_class("-wrong")
-            if _text(field) != text:
+            if isinstance(field, Input | Select) and str(field.value) != text:
                 field.value = text
 
     def show_fields(self, show: bool) -> None:

@@ -1,4 +1,8 @@
-"""What was written to the terminal: of all that widgets draw again, only the cells that changed are sent."""
+"""The cells that were written to the terminal: of all that widgets draw again, only cells that changed are sent.
+
+This leans on two classes inside Textual, which say what is drawn; tests/workbench/test_written.py is the contract with them.
+Textual itself draws any other update.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +13,17 @@ from typing import NamedTuple
 
 from rich.cells import cell_len
 from rich.color import ColorSystem
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.style import Style
 from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
 from textual.strip import Strip
 
-# So many unchanged cells between changed ones are written again: to go elsewhere takes as many letters.
+# Fewer unchanged cells than this between changed ones are written again: to move the cursor takes as many letters.
 GAP = 4
-# What is remembered of styles.
+# The maximum number of styles whose codes are remembered.
 MOST_STYLES = 4096
+# What an update raises that is not made as it was when this was written.
+STRANGE = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 SYSTEMS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "windows": ColorSystem.WINDOWS}
 RESET = "\x1b[0m"
 CLOSED = "\x1b]8;;\x1b\\"
@@ -26,7 +32,7 @@ UNSEEN = ("", "1", "2", "1;2")
 
 
 class Pen(NamedTuple):
-    """The codes of a style: of attributes and of the colours of text and ground, and a link. "*" is any colour of text."""
+    """The codes of a style: attributes, the colours of text and ground, and a link. "*" is any colour of text."""
 
     attributes: str = ""
     fore: str = "39"
@@ -49,7 +55,7 @@ PLAIN = Pen()
 
 @dataclass(slots=True)
 class _Row:
-    """The cells of a row; "" in `chars` is one of which nothing is known, or the second half of a wide character."""
+    """The cells of a row; "" in `chars` is an unknown cell, or the second half of a wide character."""
 
     chars: list[str] = field(default_factory=list)
     pens: list[Pen | None] = field(default_factory=list)
@@ -71,17 +77,18 @@ class Written:
     def forget(self) -> None:
         """Something else was written, or the terminal was resized."""
         self._rows.clear()
+        self._pen = PLAIN
 
     def fewer(self, update: RenderableType | None) -> RenderableType | None:
-        """The same update, that writes only what is not there yet."""
-        if isinstance(update, ChopsUpdate | LayoutUpdate):
+        """The same update, but it writes only what is not there yet. An update of an unknown kind is returned as it is."""
+        if type(update) is ChopsUpdate or type(update) is LayoutUpdate:
             return _Fewer(self, update)
         if update is not None:
             self.forget()
         return update
 
     def sequence(self, update: ChopsUpdate | LayoutUpdate, console: Console) -> str:
-        """What to write, and all of it is taken as written."""
+        """The codes to write, which then count as written."""
         strips = _of_layout(update) if isinstance(update, LayoutUpdate) else _of_chops(update)
         parts = [part for x, y, strip in strips for part in self._changes(x, y, strip, console)]
         return "".join([*parts, self._turn(PLAIN)])
@@ -95,7 +102,7 @@ class Written:
         if old_chars == chars and old_pens == pens:
             return
         row.chars[x:end], row.pens[x:end] = chars, pens
-        # Terminals do not agree on what is wide: such a piece is written as a whole, from its first cell on.
+        # Terminals do not agree on which characters are wide: such a piece is written as a whole, from its first cell on.
         known = simple and "" not in old_chars
         for first, last in _differing(old_chars, chars, old_pens, pens) if known else [(0, len(chars))]:
             yield _move(x + first, y)
@@ -144,16 +151,25 @@ class Written:
         if pen is None:
             if len(self._pens) >= MOST_STYLES:
                 self._pens.clear()
-            pen = self._pens[style] = _pen(style, SYSTEMS.get(console.color_system, ColorSystem.TRUECOLOR))
+            pen = self._pens[style] = _pen(style, SYSTEMS.get(console.color_system or "", ColorSystem.TRUECOLOR))
         return pen
 
 
 class _Fewer(CompositorUpdate):
+    """An update that is drawn in fewer cells; one that cannot be read is drawn by Textual, in full."""
+
     def __init__(self, written: Written, update: ChopsUpdate | LayoutUpdate) -> None:
         self._written, self._update = written, update
 
     def render_segments(self, console: Console) -> str:
-        return self._written.sequence(self._update, console)
+        try:
+            return self._written.sequence(self._update, console)
+        except STRANGE:
+            self._written.forget()
+            return self._update.render_segments(console)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield self._update
 
 
 def _pen(style: Style | None, system: ColorSystem) -> Pen:
