@@ -16,6 +16,7 @@ from textual.widgets import DataTable, Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.state import Decision, Node
+from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
@@ -174,7 +175,7 @@ class History(Screen[int | None]):
         node = self.under_cursor
         if node is None:
             return
-        names = guiding.first_of([plain(shorten(name, 40)) for name in node.environment], 12)
+        names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
         text = Text(f"{guiding.place(node)}: {how}", "bold", no_wrap=True)
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
@@ -247,5 +248,5 @@ HOW = {
     "start": "where the run began",
     "reduced": "reduced to what shows f",
     "adopted": "a try by hand that showed f",
-    "accepted": "another failure, taken for as good as f",
+    "accepted": "another failure, accepted in place of f",
 }

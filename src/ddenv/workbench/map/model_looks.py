@@ -12,7 +12,7 @@ from ddenv.map import arrays as np
 from ddenv.map.cells import Signs
 from ddenv.map.paint import RGB, Canvas
 from ddenv.map.raster import EMPTY
-from ddenv.runfile.state import Candidate, RunState, partition_letter
+from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
 from ddenv.workbench.map.map_colors import (
     FLOOR,
     FLOOR_OUT,
@@ -66,8 +66,8 @@ class Kept:
     sensed: dict[str, int] = field(default_factory=dict)
 
 
-def kept(state: RunState, candidate: Candidate | None) -> Kept:
-    """What the map needs of a run's state; `candidate` may be the user's own trial, too."""
+def kept(state: RunState, candidate: Candidate | Trial | None) -> Kept:
+    """What the map needs of a run's state; the models of `candidate` stand out."""
     partitions = state.round.partitions if state.round else ()
     parts = {name: index for index, part in enumerate(partitions) for name in part}
     shown = frozenset(candidate.models) if candidate else None
@@ -192,14 +192,14 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
 
 
 def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:
-    """Dots where removed models stood: `removed` is their owner grid. They hide nothing that is kept, but floors.
+    """Dots where removed models stood: `removed` is their owner grid. Of what is kept they hide only floors.
 
-    Which cells they are in, shape (rows, columns).
+    Returns which cells have dots, shape (rows, columns).
     """
     if not len(how.kinds):
         return np.zeros(canvas.chars.shape, dtype=bool)
     solid = np.append(~np.isin(how.kinds, (FLOOR, FLOOR_OUT, PROTECTED, REMOVED)), False)
-    gone = np.maximum(removed[0::2], removed[1::2]) != EMPTY
+    gone: np.ndarray = np.maximum(removed[0::2], removed[1::2]) != EMPTY
     gone &= ~solid[grid[0::2]] & ~solid[grid[1::2]]
     canvas.chars[gone] = GONE
     canvas.fore[gone] = color
