@@ -368,6 +368,7 @@ async def test_names_are_text_and_never_markup(runs):
     run.close()
 
 
+@pytest.mark.screens
 async def test_the_footer_keeps_to_its_width(run):
     fake_run.finished(run)
     async with Attached(run, (64, 18)) as session:

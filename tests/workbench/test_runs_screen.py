@@ -93,6 +93,7 @@ async def test_every_run_says_how_it_stands(several):
         assert "2 of 11 models left" in listed.about() and "crate_00" in listed.about()
 
 
+@pytest.mark.screens
 async def test_the_list_follows_what_happens(several, runs):
     async with Listed(several) as listed:
         await listed.choose("new")
@@ -104,6 +105,7 @@ async def test_the_list_follows_what_happens(several, runs):
         assert listed.table.chosen.path.stem == "new"
 
 
+@pytest.mark.screens
 @pytest.mark.parametrize("size", [(64, 12), (20, 5)], ids=str)
 async def test_small_terminals_show_what_there_is_room_for(several, size):
     async with Listed(several, size) as listed:
@@ -125,6 +127,7 @@ async def test_enter_opens_a_run_and_w_watches_it(several):
         assert listed.app.screen.run.stem == "crates-1"
 
 
+@pytest.mark.screens
 async def test_c_opens_the_setup_screen_with_its_settings(several, scenarios):
     async with Listed(several) as listed:
         await listed.choose("done")
@@ -133,6 +136,7 @@ async def test_c_opens_the_setup_screen_with_its_settings(several, scenarios):
         await listed.app.workers.wait_for_complete()
 
 
+@pytest.mark.screens
 async def test_what_cannot_be_done_says_why(several):
     async with Listed(several) as listed:
         await listed.choose("broken")
@@ -163,6 +167,7 @@ async def test_d_deletes_after_a_question(several, runs):
         assert "done" not in listed.rows()
 
 
+@pytest.mark.screens
 async def test_slash_filters_and_escape_goes_back(several):
     async with Listed(several) as listed:
         await listed.press("slash", *"NE")

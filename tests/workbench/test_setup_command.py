@@ -104,6 +104,7 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
         assert asked_by(shlex.split(shown)) == [session.made(), session.app.screen.run]
 
 
+@pytest.mark.screens
 async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_path, asked_by):
     folder = tmp_path / "my worlds"
     folder.mkdir()
@@ -123,6 +124,7 @@ async def test_a_bare_world_and_how_it_is_read_are_part_of_it(scenarios, tmp_pat
         assert run.stem == "it-s-1"
 
 
+@pytest.mark.screens
 async def test_what_is_wrong_has_no_command_to_copy(scenarios):
     async with Opened() as session:
         session.fill(timeout="soon")

@@ -13,6 +13,7 @@ GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
 STRANGE = "[bold]x[/] \x1b[31m\u202eסוף" + "m" * 300
 
 
+@pytest.mark.screens
 async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
     async with Opened() as session:
         session.fill(jobs="3")
@@ -23,6 +24,7 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
             assert [(command.kind, command.data) for command in run.commands()] == [("step", {"unit": "round"})]
 
 
+@pytest.mark.screens
 @pytest.mark.parametrize(
     ("models", "told"),
     [("", "None of its models can be removed"), (fake_run.box("one", 3, 3), "1 model: a run can only find")],
@@ -41,6 +43,7 @@ async def test_worlds_with_little_in_them(scenarios, runs, started, models, told
         assert len(started) == bool(models)
 
 
+@pytest.mark.screens
 async def test_a_folder_that_cannot_be_written_is_told_in_one_line(scenarios, tmp_path, monkeypatch, started):
     (tmp_path / "file").touch()
     monkeypatch.setenv("DDENV_HOME", str(tmp_path / "file"))
@@ -72,6 +75,7 @@ NAMES = (
 )
 
 
+@pytest.mark.screens
 async def test_names_that_cannot_be_files_are_told(scenarios, started):
     async with Opened() as session:
         for name, words in NAMES:
@@ -84,7 +88,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, started):
         assert started == []
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(20, 5), (63, 40), (200, 17)], but=[(63, 40)]), ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(20, 5), (63, 40), (200, 17)], but=[(63, 40)]), ids=str)
 async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
     async with Opened(size) as session:
         assert session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"

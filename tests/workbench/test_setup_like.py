@@ -40,6 +40,7 @@ async def test_it_starts_from_the_run_file_alone(made, runs, started):
         assert started[0][0] == "crates-2.ddenv"
 
 
+@pytest.mark.screens
 async def test_what_is_gone_cannot_be_saved(made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
@@ -48,6 +49,7 @@ async def test_what_is_gone_cannot_be_saved(made, tmp_path, monkeypatch):
         assert "does not exist any more" in session.app.screen.query_one("#wrong").render().plain
 
 
+@pytest.mark.screens
 async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, runs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = runs / "crates-1.ddenv"
@@ -61,6 +63,7 @@ async def test_what_is_still_there_has_a_command_once_it_is_saved(scenarios, run
         assert session.told("command").endswith("crates.yaml --iterations 9")
 
 
+@pytest.mark.screens
 async def test_a_damaged_run_is_told_in_the_preview(runs):
     (runs / "bad.ddenv").write_text("no run")
     async with Opened(screen=lambda: SetupScreen(like=runs / "bad.ddenv")) as session:

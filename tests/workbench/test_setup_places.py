@@ -29,6 +29,7 @@ class Places:
         return self.session.told("picking")
 
 
+@pytest.mark.screens
 async def test_a_scenarios_own_places_are_told_and_replaced(scenarios, started):
     async with Opened() as session:
         places = Places(session)
@@ -59,6 +60,7 @@ async def test_a_scenarios_own_places_are_told_and_replaced(scenarios, started):
         assert (scenario.robot.spawn.yaw, scenario.goal.x) == (1.571, 5.0)
 
 
+@pytest.mark.screens
 async def test_the_robot_is_put_on_what_stands_there(scenarios):
     own = fake_run.scenario()
     own["robot"]["spawn"]["z"] = 0.25
@@ -74,6 +76,7 @@ async def test_the_robot_is_put_on_what_stands_there(scenarios):
             assert session.value("spawn_z") == z
 
 
+@pytest.mark.screens
 async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path):
     path = tmp_path / "bare.sdf"
     path.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -89,6 +92,7 @@ async def test_a_bare_world_asks_for_all_three_in_turn(scenarios, tmp_path):
         assert session.told("command").startswith("$ ddenv run")
 
 
+@pytest.mark.screens
 async def test_a_place_without_ground_keeps_the_height(scenarios):
     text = fake_run.world_text().decode().replace(fake_run.GROUND, "")
     (scenarios / "crates.sdf").write_text(text)
@@ -99,6 +103,7 @@ async def test_a_place_without_ground_keeps_the_height(scenarios):
         assert session.value("spawn_x") == "50"
 
 
+@pytest.mark.screens
 async def test_keys_for_the_map_are_letters_in_a_field(scenarios):
     async with Opened() as session:
         field = session.screen.query_one("#name")

@@ -64,6 +64,7 @@ async def test_an_opened_world_is_offered_the_next_time(scenarios, tmp_path):
         assert session.screen.preview.choice.path == path
 
 
+@pytest.mark.screens
 async def test_what_cannot_be_read_and_what_is_bundled_is_not_remembered(scenarios, tmp_path):
     broken = tmp_path / "broken.sdf"
     broken.write_text("<sdf")

@@ -75,6 +75,7 @@ async def test_the_key_asks_for_a_name_and_never_overwrites_unasked(scenarios, t
     assert recent_files() == [taken]
 
 
+@pytest.mark.screens
 async def test_a_folder_that_cannot_be_written_is_told(scenarios, tmp_path):
     async with Opened() as session:
         await session.press("f7")

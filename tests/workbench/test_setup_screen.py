@@ -43,6 +43,7 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started)
         assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
 
 
+@pytest.mark.screens
 async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios, started):
     async with Opened() as session:
         for kind, name in zip(KINDS, ("splitting", "timeseg", "timestep"), strict=True):
@@ -53,6 +54,7 @@ async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios
         assert (reduction.algorithm, reduction.pair) == ("splitting", "timeseg/timestep")
 
 
+@pytest.mark.screens
 async def test_a_description_that_does_not_fit_says_so(scenarios):
     own = fake_run.scenario() | {"description": "far " * 60 + "end"}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
@@ -63,6 +65,7 @@ async def test_a_description_that_does_not_fit_says_so(scenarios):
             assert whole or len(told.splitlines()) == 2
 
 
+@pytest.mark.screens
 async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios, started):
     own = fake_run.scenario() | {"failure": {"early_stop": True}}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
@@ -74,6 +77,7 @@ async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios,
         assert not session.made().failure.early_stop
 
 
+@pytest.mark.screens
 async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
     async with Opened() as session:
         assert session.explained() == ("algorithm ddenv", explanation("algorithm", "ddenv"))
@@ -90,6 +94,7 @@ async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
         assert session.explained() == ("prioritization random", explanation("prioritization", "random"))
 
 
+@pytest.mark.screens
 async def test_another_scenario_brings_its_own_explanation(scenarios):
     other = fake_run.scenario(name="other")
     other["reduction"] |= {"algorithm": "probdd", "prior": "uniform"}
@@ -100,6 +105,7 @@ async def test_another_scenario_brings_its_own_explanation(scenarios):
         assert session.screen.form.texts["prior"] == "uniform"
 
 
+@pytest.mark.screens
 async def test_each_field_says_what_it_means_and_costs(scenarios):
     async with Opened() as session:
         await session.press("f9")
@@ -115,6 +121,7 @@ async def test_each_field_says_what_it_means_and_costs(scenarios):
         assert session.explained()[1].endswith("A candidate without f costs 8 tests.")
 
 
+@pytest.mark.screens
 async def test_rarely_used_settings_are_opened_and_closed(scenarios):
     async with Opened() as session:
         more = session.screen.query_one("#more")
@@ -141,6 +148,7 @@ UNUSED = {
 }
 
 
+@pytest.mark.screens
 async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
     async with Opened() as session:
         for algorithm, (unused, words, beside) in UNUSED.items():
@@ -157,7 +165,7 @@ async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
 PANES = {"f2": ("#choice", "#preview"), "f3": ("#preview",), "f4": ("#fields", "#explained")}
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(64, 18), (109, 40), (120, 30)], but=[(64, 18)]), ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(64, 18), (109, 40), (120, 30)], but=[(64, 18)]), ids=str)
 async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
     async with Opened(size) as session:
         for key, shown in PANES.items():
@@ -175,7 +183,7 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
         assert session.app.focused.id == "epsilon"
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
 async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
     async with Opened(size) as session:
         for id in ("#choice", "#preview", "#fields", "#explained"):
@@ -184,7 +192,7 @@ async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, siz
 
 
 @pytest.mark.parametrize(
-    "size", slow(pytest.mark.pictures, [(64, 18), (80, 24), (120, 36), (200, 60)], but=[(80, 24)]), ids=str
+    "size", slow(pytest.mark.screens, [(64, 18), (80, 24), (120, 36), (200, 60)], but=[(80, 24)]), ids=str
 )
 async def test_every_name_and_the_start_button_are_whole_at_every_size(scenarios, size):
     async with Opened(size) as session:
@@ -208,6 +216,7 @@ async def test_an_open_list_shows_all_its_names(scenarios):
         assert session.screen.region.contains_region(region)
 
 
+@pytest.mark.screens
 async def test_a_long_explanation_scrolls(scenarios):
     async with Opened((64, 18)) as session:
         await session.press("enter", "down", "end", "enter")
@@ -219,6 +228,7 @@ async def test_a_long_explanation_scrolls(scenarios):
         assert panel.scroll_offset.y == 0
 
 
+@pytest.mark.screens
 async def test_the_start_button_starts(scenarios, started):
     async with Opened((80, 24)) as session:
         session.screen.query_one("#start", Button).press()
@@ -257,6 +267,7 @@ async def test_wrong_input_is_told_beside_the_field_and_nothing_is_written(scena
         assert len(started) == 1
 
 
+@pytest.mark.screens
 async def test_a_taken_name_is_refused(scenarios, run, started):
     async with Opened() as session:
         session.fill(name="crates-1")
@@ -265,6 +276,7 @@ async def test_a_taken_name_is_refused(scenarios, run, started):
         assert session.app.focused.id == "name"
 
 
+@pytest.mark.screens
 async def test_a_broken_scenario_is_told_in_the_preview(scenarios, started):
     (scenarios / "crates.yaml").write_text("name: x\nwrold: y\n")
     async with Opened() as session:
@@ -302,6 +314,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert started == [("crates-1.ddenv", 4, {"accept_mode": "automatic"})]
 
 
+@pytest.mark.screens
 async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, started):
     own = {
         "failure": {"timeout": 12, "epsilon": 0.25},
@@ -327,6 +340,7 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         assert [session.value(id) for id in (*fields, "jobs")] == ["12", "0.25", "9", "5", "4", "2"]
 
 
+@pytest.mark.screens
 async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path):
     other = tmp_path / "other.sdf"
     other.write_bytes((scenarios / "crates.sdf").read_bytes())
@@ -338,6 +352,7 @@ async def test_typed_places_are_marked_in_the_next_world_too(scenarios, tmp_path
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
 
 
+@pytest.mark.screens
 async def test_the_file_dialog_can_be_cancelled_and_filters(scenarios, tmp_path, monkeypatch):
     monkeypatch.chdir(scenarios)
     (scenarios / "notes.txt").write_text("x")
@@ -350,6 +365,7 @@ async def test_the_file_dialog_can_be_cancelled_and_filters(scenarios, tmp_path,
         assert session.app.screen is session.screen
 
 
+@pytest.mark.screens
 async def test_recent_runs_are_listed_and_opened(scenarios, runs):
     fake_run.finished(fake_run.FakeRun(runs / "old.ddenv")).close()
     async with Opened() as session:
@@ -363,6 +379,7 @@ async def test_recent_runs_are_listed_and_opened(scenarios, runs):
         await session.app.workers.wait_for_complete()
 
 
+@pytest.mark.screens
 async def test_a_damaged_run_is_not_opened(scenarios, runs):
     (runs / "bad.ddenv").write_text("no run")
     async with Opened() as session:
@@ -371,6 +388,7 @@ async def test_a_damaged_run_is_not_opened(scenarios, runs):
         assert any("is not a ddenv run file" in notice.message for notice in session.app._notifications)
 
 
+@pytest.mark.screens
 async def test_help_and_quit(scenarios):
     async with Opened() as session:
         await session.press("f1")
@@ -379,6 +397,7 @@ async def test_help_and_quit(scenarios):
         assert session.app._exit
 
 
+@pytest.mark.screens
 async def test_letters_can_be_typed_into_fields(scenarios):
     async with Opened() as session:
         field = session.screen.query_one("#name", Input)
@@ -388,12 +407,14 @@ async def test_letters_can_be_typed_into_fields(scenarios):
         assert field.value == "q?"
 
 
+@pytest.mark.screens
 async def test_without_scenarios_the_way_out_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr("ddenv.world.load.SCENARIOS", tmp_path / "none")
     async with Opened() as session:
         assert "ctrl+o" in session.screen.query_one(WorldMap).notice
 
 
+@pytest.mark.screens
 async def test_too_small(scenarios):
     async with Opened((40, 10)) as session:
         assert session.screen.query_one("#small").display
@@ -406,6 +427,7 @@ LOST = (
 )
 
 
+@pytest.mark.screens
 async def test_what_cannot_be_found_is_told_with_the_remedy_that_the_workbench_takes(scenarios, tmp_path, started):
     path = tmp_path / "depot.world"
     path.write_text(f"<sdf version='1.6'><world name='w'>{LOST}</world></sdf>")

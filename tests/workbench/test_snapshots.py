@@ -67,15 +67,15 @@ MOMENTS = [baseline, fake_run.mid_round, fake_run.waiting, fake_run.confirming, 
 by_name = lambda value: value.__name__ if callable(value) else str(value)  # noqa: E731
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, SIZES, but=[USUAL]), ids=str)
-@pytest.mark.parametrize("theme", slow(pytest.mark.pictures, THEMES, but=["ddenv"]))
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, SIZES, but=[USUAL]), ids=str)
+@pytest.mark.parametrize("theme", slow(pytest.mark.screens, THEMES, but=["ddenv"]))
 def test_run_screen(snap_compare, run, theme, size):
     fake_run.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme))
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, [SMALL, USUAL], but=[SMALL]), ids=str)
-@pytest.mark.parametrize("moment", slow(pytest.mark.pictures, MOMENTS, but=[fake_run.waiting]), ids=by_name)
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
+@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_run.waiting]), ids=by_name)
 def test_moments_of_a_run(snap_compare, run, moment, size):
     moment(run)
     if moment is not fake_run.finished:
@@ -83,7 +83,7 @@ def test_moments_of_a_run(snap_compare, run, moment, size):
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown())
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 def test_run_screen_without_its_engine(snap_compare, run):
     fake_run.mid_round(run)
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
@@ -109,13 +109,13 @@ OPENED = {
 }
 
 
-@pytest.mark.parametrize("name", slow(pytest.mark.pictures, OPENED, but=["help", "history"]))
+@pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["help", "history"]))
 @pytest.mark.parametrize(
     ("theme", "size"),
     [
         pytest.param("ddenv", SMALL, id="dark"),
-        pytest.param("ddenv-light", USUAL, id="light", marks=pytest.mark.pictures),
-        pytest.param("ansi-dark", SMALL, id="ansi", marks=pytest.mark.pictures),
+        pytest.param("ddenv-light", USUAL, id="light", marks=pytest.mark.screens),
+        pytest.param("ansi-dark", SMALL, id="ansi", marks=pytest.mark.screens),
     ],
 )
 def test_what_a_key_opens(snap_compare, run, name, theme, size):
@@ -123,34 +123,34 @@ def test_what_a_key_opens(snap_compare, run, name, theme, size):
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 @pytest.mark.parametrize("name", ["history", "compare", "runs"])
 def test_what_a_key_opens_where_there_is_room(snap_compare, run, name):
     fake_run.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=LARGE, run_before=shown("ddenv", *OPENED[name]))
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 @pytest.mark.parametrize("pane", ["2", "3", "4", "5"])
 def test_panes_where_there_is_little_room(snap_compare, run, pane):
     fake_run.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", pane))
 
 
-@pytest.mark.parametrize("size", slow(pytest.mark.pictures, SIZES, but=[LARGE]), ids=str)
-@pytest.mark.parametrize("theme", slow(pytest.mark.pictures, THEMES, but=["ddenv-light"]))
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, SIZES, but=[LARGE]), ids=str)
+@pytest.mark.parametrize("theme", slow(pytest.mark.screens, THEMES, but=["ddenv-light"]))
 def test_setup_screen(snap_compare, scenarios, runs, theme, size):
     fake_run.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     assert snap_compare(Workbench(), terminal_size=size, run_before=shown(theme))
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 @pytest.mark.parametrize("pane", ["f3", "f4"])
 def test_panes_of_the_setup_screen(snap_compare, scenarios, pane):
     assert snap_compare(Workbench(), terminal_size=SMALL, run_before=shown("ddenv", pane))
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
     folder = tmp_path / "work"
     folder.mkdir()
@@ -177,7 +177,7 @@ def reduced_by(algorithm, runs):
     return run
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 def test_run_screen_of_another_algorithm(snap_compare, runs):
     run = reduced_by("splitting", runs)
     run.hold()
@@ -185,14 +185,14 @@ def test_run_screen_of_another_algorithm(snap_compare, runs):
     run.close()
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 @pytest.mark.parametrize("size", [(20, 5), (60, 20)], ids=str)
 def test_too_small_says_what_it_needs(snap_compare, run, size):
     fake_run.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=settled)
 
 
-@pytest.mark.pictures
+@pytest.mark.screens
 def test_no_color(snap_compare, run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
     fake_run.guided(run).hold()
