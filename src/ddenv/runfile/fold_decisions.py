@@ -14,13 +14,13 @@ NAMED, LONGEST = 3, 40
 
 def pinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    words = f"pinned {told(models)}"
+    words = f"pinned {listed(models)}"
     return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
 
 
 def unpinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    words = f"unpinned {told(models)}"
+    words = f"unpinned {listed(models)}"
     return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
 
 
@@ -30,7 +30,7 @@ def trial_started(state: RunState, data: Data, at: float) -> Changes:
         raise ValueError(trial.number)
     inside = frozenset(trial.models)
     without = [name for name in state.environment if name not in inside]
-    what = f"without {told(without)}" if 0 < len(without) <= trial.size else f"with {told(trial.models)} alone"
+    what = f"without {listed(without)}" if 0 < len(without) <= trial.size else f"with {listed(trial.models)} alone"
     words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
     return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
 
@@ -83,7 +83,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
     # Models that are not in this environment cannot stay pinned.
     gone = state.pinned.difference(node.environment)
     if gone:
-        words += f"; unpinned {told([name for name in state.elements if name in gone])}"
+        words += f"; unpinned {listed([name for name in state.elements if name in gone])}"
     # A failure accepted after this node does not count as f here.
     judged = with_outcomes(state, data) if "outcomes" in data else state
     return {
@@ -227,7 +227,7 @@ def place(node: Node) -> str:
     return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
 
 
-def told(models: Sequence[str]) -> str:
+def listed(models: Sequence[str]) -> str:
     """The first few names of `models`."""
     shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
     more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""

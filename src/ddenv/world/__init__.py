@@ -1,1 +1,1 @@
-"""SDF in, SDF out: worlds and scenarios as plain data."""
+"""Reads SDF and URDF files into plain data, checks them, and writes SDF; and scenario files."""

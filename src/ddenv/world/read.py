@@ -24,7 +24,7 @@ from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
 from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
-# Elements that would hide models or change them in ways that this reader cannot follow, with the error message.
+# Elements that add or join models in a way that is not supported, with the error message.
 REFUSED = {
     "population": "<population> is not supported; write its models out",
     "joint": "joints between models are not supported; put both models into one",

@@ -73,15 +73,15 @@ class Converted:
 def convert(world: World, mesh_folder: str) -> Converted:
     """`world` as SDF 1.9, its meshes in the folder `mesh_folder` beside it."""
     out = Converted()
-    files: dict[Mesh, str] = {}
+    files = _MeshFiles(mesh_folder)
     ElementTree.register_namespace("drake", DRAKE)
     root = Element("sdf", version="1.9")
     inside = SubElement(root, "world", name=_clean(world.name) or "world")
     SubElement(inside, "gravity").text = _numbers(world.gravity)
     names = _unique(model.name for model in world.models)
     for name, model in zip(names, with_ground_boxes(world).models, strict=True):
-        _model(inside, name, model, files, mesh_folder)
-    for mesh, name in files.items():
+        _model(inside, name, model, files)
+    for mesh, name in files.names.items():
         out.meshes[name] = obj(mesh)
     ElementTree.indent(root)
     out.text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
@@ -105,7 +105,18 @@ def write_converted(world: World, path: Path) -> list[Path]:
     return list(files)
 
 
-def _model(parent: Element, name: str, model: Model, files: dict[Mesh, str], folder: str) -> None:
+@dataclass
+class _MeshFiles:
+    """The files of meshes in `folder`, by mesh."""
+
+    folder: str
+    names: dict[Mesh, str] = field(default_factory=dict)
+
+    def name(self, mesh: Mesh) -> str:
+        return self.names.setdefault(mesh, f"{self.folder}/mesh_{len(self.names) + 1}.obj")
+
+
+def _model(parent: Element, name: str, model: Model, files: _MeshFiles) -> None:
     element = SubElement(parent, "model", name=name)
     if model.static:
         SubElement(element, "static").text = "true"
@@ -114,14 +125,14 @@ def _model(parent: Element, name: str, model: Model, files: dict[Mesh, str], fol
     _pose(element, model.pose)
     names = dict(zip((link.name for link in model.links), _unique(link.name for link in model.links), strict=True))
     for link in model.links:
-        _link(element, names[link.name], link, model, files, folder)
+        _link(element, names[link.name], link, model, files)
     joint_names = _unique((joint.name for joint in model.joints), taken=names.values())
     poses = {link.name: link.pose for link in model.links}
     for joint_name, joint in zip(joint_names, model.joints, strict=True):
         _joint(element, joint_name, joint, model, poses[joint.child], names)
 
 
-def _link(parent: Element, name: str, link: Link, model: Model, files: dict[Mesh, str], folder: str) -> None:
+def _link(parent: Element, name: str, link: Link, model: Model, files: _MeshFiles) -> None:
     element = SubElement(parent, "link", name=name)
     _pose(element, model.pose.inverse() @ link.pose)
     if not model.gravity:
@@ -130,31 +141,31 @@ def _link(parent: Element, name: str, link: Link, model: Model, files: dict[Mesh
         _inertia(element, link.inertia, link.pose)
     back = link.pose.inverse()
     for collision, own in zip(link.collisions, _unique(one.name for one in link.collisions), strict=True):
-        _collision(element, own, collision, back, files, folder)
+        _collision(element, own, collision, back, files)
     for visual, own in zip(link.visuals, _unique(one.name for one in link.visuals), strict=True):
-        _visual(element, own, visual, back, files, folder)
+        _visual(element, own, visual, back, files)
 
 
-def _collision(parent: Element, name: str, one: Collision, back: Pose, files: dict[Mesh, str], folder: str) -> None:
+def _collision(parent: Element, name: str, one: Collision, back: Pose, files: _MeshFiles) -> None:
     element = SubElement(parent, "collision", name=name)
     _pose(element, back @ one.pose)
-    _geometry(element, one.shape, files, folder)
+    _geometry(element, one.shape, files)
     friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
     for tag in ("mu", "mu2"):
         SubElement(friction, tag).text = repr(one.mu)
 
 
-def _visual(parent: Element, name: str, one: Visual, back: Pose, files: dict[Mesh, str], folder: str) -> None:
+def _visual(parent: Element, name: str, one: Visual, back: Pose, files: _MeshFiles) -> None:
     element = SubElement(parent, "visual", name=name)
     _pose(element, back @ one.pose)
-    _geometry(element, one.shape, files, folder)
+    _geometry(element, one.shape, files)
     if one.color is not None:
         material = SubElement(element, "material")
         for tag in ("ambient", "diffuse"):
             SubElement(material, tag).text = _numbers(one.color)
 
 
-def _geometry(parent: Element, shape: Shape, files: dict[Mesh, str], folder: str) -> None:
+def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
     geometry = SubElement(parent, "geometry")
     if not isinstance(shape, Mesh):
         kind, sizes = _primitive(shape)
@@ -163,8 +174,7 @@ def _geometry(parent: Element, shape: Shape, files: dict[Mesh, str], folder: str
             SubElement(element, name).text = _numbers(values)
         return
     element = SubElement(geometry, "mesh")
-    name = files.setdefault(shape, f"{folder}/mesh_{len(files) + 1}.obj")
-    SubElement(element, "uri").text = name
+    SubElement(element, "uri").text = files.name(shape)
     if parent.tag == "collision":
         SubElement(element, f"{{{DRAKE}}}declare_convex")
 

@@ -86,7 +86,7 @@ WRONG = {
     "one axis": ((joint("universal"),), "needs an <axis2>"),
     "same axes": (
         (joint("universal", "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>1 1 0</xyz></axis2>"),),
-        "right angles",
+        "perpendicular",
     ),
     "screw": ((joint("screw"),), "'screw' is not supported .*--ignore joint"),
 }

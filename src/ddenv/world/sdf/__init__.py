@@ -1,1 +1,1 @@
-"""Reading and writing SDF: one file an idea; `ddenv.world.read` is the way in."""
+"""Reads SDF elements into plain data; the entry point is `ddenv.world.read`."""

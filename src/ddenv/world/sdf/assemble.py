@@ -9,9 +9,9 @@ from ddenv.world.model import Joint, Link, Model, is_ground
 from ddenv.world.pose import ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import WORLD, Scope, pose_of
-from ddenv.world.sdf.joints import Stand, check_tree, read_joints
+from ddenv.world.sdf.includes import Part
+from ddenv.world.sdf.joints import JointSite, LinkPose, check_tree, read_joints
 from ddenv.world.sdf.links import Site, read_link
-from ddenv.world.sdf.parts import Part
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, numbers, text_of, truth
 
 # Maximum speed of a link at rest in `<state>`, m/s and rad/s.
@@ -58,7 +58,7 @@ def assemble(part: Part, name: str, outer: Scope, saved: Saved | None, context: 
     if not builder.links:
         builder.links.append(_nothing(part.element, actual, static, context))
     if saved is not None:
-        _note_move(list(builder.stands.values()), saved, context)
+        _note_move(list(builder.poses.values()), saved, context)
     spans = [(one.start, one.end) for one in (part.at, None if saved is None else saved.element) if one is not None]
     model = Model(
         name=name,
@@ -91,7 +91,7 @@ class _Builder:
         self.joints: list[Joint] = []
         self.elements: list[Element] = []
         self.self_collide: list[bool] = []
-        self.stands: dict[str, Stand] = {}
+        self.poses: dict[str, LinkPose] = {}
 
     def add(self, scope: Scope, spot: Spot) -> None:
         """Adds everything in `scope`, whose frame is at `spot`. Raises UserError."""
@@ -109,7 +109,7 @@ class _Builder:
         for part in scope.parts:
             self._add_part(part, scope, spot)
         if not self.static:
-            self.joints += read_joints(scope, spot.nominal, spot.prefix, self.stands, self.context)
+            self.joints += read_joints(JointSite(scope, spot.nominal, spot.prefix, self.poses), self.context)
         if spot.saved is not None:
             self._note_unknown(scope, spot.saved)
 
@@ -118,15 +118,15 @@ class _Builder:
         name = spot.prefix + own
         if own == WORLD:
             raise complain(element, "the name 'world' is reserved by SDF; choose another")
-        if name in self.stands:
+        if name in self.poses:
             raise complain(element, "this link name is used twice; give each link of the model its own name")
         local = scope.place(element)
-        stand = Stand(spot.nominal @ local, spot.actual @ local)
+        pose = LinkPose(spot.nominal @ local, spot.actual @ local)
         if spot.saved is not None and own in spot.saved.links:
-            stand = Stand(stand.nominal, spot.saved.links[own])
-        self.stands[name] = stand
+            pose = LinkPose(pose.nominal, spot.saved.links[own])
+        self.poses[name] = pose
         self.elements.append(element)
-        site = Site(name, stand.actual, local, spot.scale, not self.static)
+        site = Site(name, pose.actual, local, spot.scale, not self.static)
         self.links.append(read_link(element, scope, site, self.context))
 
     def _add_part(self, part: Part, scope: Scope, spot: Spot) -> None:
@@ -187,9 +187,9 @@ def _held(model: Model, element: Element, context: Context) -> Model:
     return replace(model, static=True, links=links, joints=())
 
 
-def _note_move(stands: list[Stand], saved: Saved, context: Context) -> None:
-    distances = [math.dist(stand.nominal.position, stand.actual.position) for stand in stands]
-    turns = [abs(_half_turn(stand.nominal.inverse() @ stand.actual)) for stand in stands]
+def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
+    distances = [math.dist(pose.nominal.position, pose.actual.position) for pose in poses]
+    turns = [abs(_half_turn(pose.nominal.inverse() @ pose.actual)) for pose in poses]
     farthest = max(distances, default=0.0)
     if farthest > MOVED:
         context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{farthest:.2f} m away")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ddenv.world.pose import HERE, Pose
 from ddenv.world.sdf.context import Context, version
-from ddenv.world.sdf.parts import Part, parts
+from ddenv.world.sdf.includes import Part, parts
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
 # Maximum distance from the origin of a frame, m: larger numbers lose their millimetres.
@@ -49,16 +49,16 @@ class Scope:
     def pose(self, name: str, asker: Element) -> Pose:
         """The pose of the frame called `name`; errors point at `asker`. Raises UserError."""
         # A loop, since chains of frames may be longer than Python's stack.
-        way: dict[str, Element | Part] = {}
+        chain: dict[str, Element | Part] = {}
         at, asked_by = name, asker
         while not self._is_known(at):
-            if at in way:
-                names = [*way, at][list(way).index(at) :]
+            if at in chain:
+                names = [*chain, at][list(chain).index(at) :]
                 raise complain(asker, f"the frames form a cycle: {shown(names)}")
-            way[at] = self._find(at, asked_by)
-            at, asked_by = self._base(at, way[at])
+            chain[at] = self._find(at, asked_by)
+            at, asked_by = self._base(at, chain[at])
         pose = self._poses.get(at, HERE)
-        for each, thing in reversed(way.items()):
+        for each, thing in reversed(chain.items()):
             pose = pose @ self._local(each, thing, asker)
             self._poses[each] = pose
         return pose

@@ -9,35 +9,47 @@ from ddenv.world.model import Joint
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.sdf.context import Context, note_unread, refuse, version
 from ddenv.world.sdf.frames import OWN, WORLD, Scope, shown
-from ddenv.world.sdf.parts import Part
+from ddenv.world.sdf.includes import Part
 from ddenv.world.sdf.xml import Element, complain, floats, name_of, number, numbers, text_of, truth
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal")
-WITH_AXIS = ("revolute", "continuous", "prismatic", "universal")
 LIMITED = ("revolute", "prismatic")
 # Simulators write "unlimited" as a number at least this large, or as -1; SDF's own default is infinite.
 UNLIMITED = 1e15
 
 
 @dataclass(frozen=True)
-class Stand:
+class LinkPose:
     """A link's pose in the world: `nominal` as in its model, `actual` after `<state>`."""
 
     nominal: Pose
     actual: Pose
 
 
-def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand], context: Context) -> list[Joint]:
-    """The joints directly inside the model at nominal `pose`; `stands` are its links by full name. Raises UserError."""
+@dataclass(frozen=True)
+class JointSite:
+    """The model that directly contains joints: its frames, its nominal `pose` and the `prefix` of its names in the world.
+
+    `links` are the poses of all links of the outermost model, by full name.
+    """
+
+    scope: Scope
+    pose: Pose
+    prefix: str
+    links: dict[str, LinkPose]
+
+
+def read_joints(site: JointSite, context: Context) -> list[Joint]:
+    """The joints directly inside the model at `site`. Raises UserError."""
     joints, names = [], set()
-    for element in scope.element.findall("joint"):
+    for element in site.scope.element.findall("joint"):
         note_unread(element, context)
         if name_of(element) in names:
             raise complain(element, "this joint name is used twice; give each joint of the model its own name")
         names.add(name_of(element))
         kind = element.get("type", "")
         if kind in KINDS:
-            joints.append(_joint(element, kind, scope, pose, prefix, stands, context))
+            joints.append(_joint(element, kind, site, context))
         elif context.ignores("joint"):
             context.note("ignored", element, f"a '{kind}' joint is left out by --ignore: its links move freely")
         else:
@@ -45,31 +57,23 @@ def read_joints(scope: Scope, pose: Pose, prefix: str, stands: dict[str, Stand],
     return joints
 
 
-def _joint(
-    element: Element,
-    kind: str,
-    scope: Scope,
-    model_pose: Pose,
-    prefix: str,
-    stands: dict[str, Stand],
-    context: Context,
-) -> Joint:
-    parent, child = (_end(element, tag, scope, prefix, stands, context) for tag in ("parent", "child"))
+def _joint(element: Element, kind: str, site: JointSite, context: Context) -> Joint:
+    parent, child = (_end(element, tag, site, context) for tag in ("parent", "child"))
     if parent == child:
         raise complain(element, f"joins '{child}' to itself")
     # By element, not by name: something else in the model may have the same name.
-    nominal = model_pose @ scope.place(element, text_of(element.find("child")))
-    moved = stands[child].actual @ stands[child].nominal.inverse()
+    nominal = site.pose @ site.scope.place(element, text_of(element.find("child")))
+    moved = site.links[child].actual @ site.links[child].nominal.inverse()
     axis = element.find("axis")
     if kind in ("revolute", "prismatic", "universal") and axis is None:
         raise complain(element, f"a {kind} joint needs an <axis>")
-    first = _axis(axis, scope, model_pose, nominal)
-    second = _second_axis(element, first, scope, model_pose, nominal) if kind == "universal" else None
+    first = _axis(axis, site, nominal)
+    second = _second_axis(element, first, site, nominal) if kind == "universal" else None
     limit = None if axis is None or kind not in LIMITED else axis.find("limit")
     dynamics = None if axis is None else axis.find("dynamics")
     _note_unlimited(element, kind, context)
     joint = Joint(
-        name=prefix + name_of(element),
+        name=site.prefix + name_of(element),
         kind=kind,
         parent=parent,
         child=child,
@@ -84,31 +88,31 @@ def _joint(
     )
     if limit is not None and (joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf):
         raise complain(limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}")
-    return _relative_to_start(joint, first, stands)
+    return _relative_to_start(joint, first, site.links)
 
 
-def _end(element: Element, tag: str, scope: Scope, prefix: str, stands: dict[str, Stand], context: Context) -> str:
+def _end(element: Element, tag: str, site: JointSite, context: Context) -> str:
     """The full name of the link at one end of a joint, or `world`."""
     child = element.find(tag)
     name = text_of(child)
     if tag == "parent" and name == WORLD:
         return WORLD
-    link = link_of(scope, name, element, context) if name else None
-    if link is None or prefix + link not in stands:
+    link = link_of(site.scope, name, element, context) if name else None
+    if link is None or site.prefix + link not in site.links:
         raise complain(element if child is None else child, f"<{tag}> is not a link of this model: '{name[:80]}'")
-    return prefix + link
+    return site.prefix + link
 
 
-def _axis(axis: Element | None, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
+def _axis(axis: Element | None, site: JointSite, joint_pose: Pose) -> Vector:
     """The unit vector of an `<axis>` in the world frame, at the nominal poses."""
     element = None if axis is None else axis.find("xyz")
     unit = (0.0, 0.0, 1.0) if element is None else _unit(element)
     if element is not None and element.get("expressed_in"):
-        return (model_pose @ scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
+        return (site.pose @ site.scope.pose(element.get("expressed_in", ""), element)).rotate(unit)
     in_model = (
         axis is not None and version(axis) < (1, 7) and truth(axis, "use_parent_model_frame", version(axis) < (1, 5))
     )
-    return (model_pose if in_model else joint_pose).rotate(unit)
+    return (site.pose if in_model else joint_pose).rotate(unit)
 
 
 def _unit(element: Element) -> Vector:
@@ -119,25 +123,25 @@ def _unit(element: Element) -> Vector:
     return x / length, y / length, z / length
 
 
-def _second_axis(element: Element, first: Vector, scope: Scope, model_pose: Pose, joint_pose: Pose) -> Vector:
+def _second_axis(element: Element, first: Vector, site: JointSite, joint_pose: Pose) -> Vector:
     axis2 = element.find("axis2")
     if axis2 is None:
         raise complain(element, "a universal joint needs an <axis2>")
-    second = _axis(axis2, scope, model_pose, joint_pose)
+    second = _axis(axis2, site, joint_pose)
     along = sum(a * b for a, b in zip(first, second, strict=True))
     if abs(along) > 1e-3:
-        raise complain(axis2, "the two axes of a universal joint must be at right angles")
+        raise complain(axis2, "the two axes of a universal joint must be perpendicular")
     x, y, z = (b - along * a for a, b in zip(first, second, strict=True))
     length = math.sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
 
-def _relative_to_start(joint: Joint, axis: Vector, stands: dict[str, Stand]) -> Joint:
+def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -> Joint:
     """`joint` with limits relative to the actual poses of its links; `axis` is at the nominal ones."""
     if math.isinf(joint.lower) and math.isinf(joint.upper):
         return joint
-    parent = stands.get(joint.parent, Stand(Pose(), Pose()))
-    child = stands[joint.child]
+    parent = links.get(joint.parent, LinkPose(Pose(), Pose()))
+    child = links[joint.child]
     seen = parent.nominal @ parent.actual.inverse() @ child.actual
     if joint.kind == "prismatic":
         moved = [a - b for a, b in zip(seen.position, child.nominal.position, strict=True)]
@@ -205,14 +209,14 @@ def check_tree(joints: list[Joint], element: Element) -> None:
     # Every link has at most one parent: each path upwards ends at the root, at a link known to be safe, or in a loop.
     safe: set[str] = set()
     for start in parents:
-        way: dict[str, None] = {}
+        path: dict[str, None] = {}
         at: str | None = start
         while at is not None and at not in safe:
-            if at in way:
-                raise complain(element, f"joints close a loop: {shown([*way, at][list(way).index(at) :])}")
-            way[at] = None
+            if at in path:
+                raise complain(element, f"joints close a loop: {shown([*path, at][list(path).index(at) :])}")
+            path[at] = None
             at = parents.get(at)
-        safe.update(way)
+        safe.update(path)
 
 
 def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
