@@ -72,15 +72,16 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
 
 def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], simulated: float) -> float:
     """CPU time (s) of simulating a run with these wheel speeds."""
-    built, context, period = template._built, template._plant_context, template._clock.command_period
+    shared, period = template._context, template._clock.command_period
+    built, context = shared.built, shared.plant_context
     present = keep | template._always
     kept = [body for name, body in built.moving.items() if name in present]
     template._sleeping = False
     try:
-        template._presence.remove(template._names - present)
+        shared.presence.remove(template._names - present)
         with template._asleep(kept, present):
             motors = built.plant.get_desired_state_input_port(built.robot.instance)
-            simulator = Simulator(built.diagram, template._context)
+            simulator = Simulator(built.diagram, shared.diagram_context)
 
             def advance() -> None:
                 for number, told in enumerate(speeds, start=1):

@@ -1,21 +1,19 @@
-"""The robot's own side of a run: what it measures, where it believes it is, and how its controller wants to move."""
+"""The robot's own side of a run: what it measures, its pose estimate, and the commands of its controller."""
 
 from __future__ import annotations
 
-from typing import Any
-
 from ddenv.robot.clock import Clock, Tick
 from ddenv.robot.drake.drive import Drive
-from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
+from ddenv.robot.protocol import Drives, Reading, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
 from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
 from ddenv.world.scenario import Sensors
 
 
 class Autonomy:
-    """The sensors, the filter and the controller of one run. The controller sees what is measured, never the truth.
+    """The sensors, the pose filter and the controller of one run. The controller gets measurements, never the truth.
 
-    `arrived` is when (s) the controller came to believe that the robot is at its goal, None before.
+    `arrived` is the time (s) when the controller first reported that the robot is at its goal, None before.
     """
 
     def __init__(
@@ -26,9 +24,9 @@ class Autonomy:
         skid: float,
         clock: Clock,
         start: tuple[float, float, float],
-        controller: Any,
+        controller: Drives,
     ) -> None:
-        """`start` (x, y in m, heading in rad) is what the robot knows of its place when it starts."""
+        """`start` (x, y in m, heading in rad, world frame) is the pose estimate at the start."""
         self.arrived: float | None = None
         self._suite = suite
         self._left = [number for number, left in enumerate(drive.left) if left]
@@ -42,14 +40,14 @@ class Autonomy:
         self._advanced = 0
         self._wheels = (0.0,) * len(drive.joints)
         self._imu = Imu(0.0, 0.0, 0.0)
-        # What was measured since the last command.
+        # Measured since the last command.
         self._new_wheels: tuple[float, ...] | None = None
         self._new_imu: Imu | None = None
         self._new_compass: float | None = None
         self._new_scan: Scan | None = None
 
     def sense(self, tick: Tick, truth: Truth, scan: Scan | None) -> None:
-        """What is due at `tick` is measured, and the filter takes it in."""
+        """Takes the measurements that are due at `tick`, and updates the pose estimate."""
         if tick.odometry:
             self._wheels = self._new_wheels = self._suite.odometry(truth.wheels)
         if tick.imu:
@@ -64,7 +62,7 @@ class Autonomy:
             self._new_scan = scan
 
     def command(self, tick: Tick) -> Twist | WheelSpeeds:
-        """What the controller wants until it is asked again. Raises ControllerFailed."""
+        """The controller's command, valid until the next one. Raises ControllerFailed."""
         reading = Reading(
             time=tick.time,
             estimate=self._filter.estimate,
@@ -93,6 +91,6 @@ class Autonomy:
         self._advanced = step
 
     def _rim_speed(self, wheels: list[int]) -> float:
-        """How fast the rims of `wheels` go, on average, m/s."""
+        """The mean speed of the rims of `wheels`, m/s."""
         measured = self._wheels
         return self._radius * sum([measured[number] for number in wheels]) / len(wheels)

@@ -1,4 +1,4 @@
-"""When in a run something is due."""
+"""The clock of a run: at which steps of the plant it records, commands and measures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ddenv.world.scenario import Scenario
 
 
 class Tick(NamedTuple):
-    """A step of the plant at which something is due, its time (s), and what that is."""
+    """A step of the plant at which something is due, its time (s), and what is due."""
 
     step: int
     time: float
@@ -25,10 +25,10 @@ class Tick(NamedTuple):
 
 @dataclass(frozen=True)
 class Clock:
-    """Time counted in steps of the plant, so that every run does everything at the same instants to the last bit.
+    """Time counted in steps of the plant, so that everything happens at the same instants in every run, to the last bit.
 
     `step` is in s; `last` is the step at which time is up. Each of the others is the number of steps between two rows of the
-    recording, two commands, two readings of a sensor.
+    recording, two commands, or two readings of a sensor.
     """
 
     step: float
@@ -81,7 +81,7 @@ class Clock:
 
     def _tick(self, step: int) -> Tick:
         def due(steps: int | None) -> bool:
-            return bool(steps) and step % steps == 0
+            return steps is not None and step % steps == 0
 
         return Tick(
             step=step,

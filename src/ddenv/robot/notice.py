@@ -1,36 +1,38 @@
-"""When a run's robot first noticed each model: had it in view of its range sensor, or touched it."""
+"""When the robot first noticed each model in a run: had it in view, or touched it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Context
 
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.surroundings import Surroundings
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
-# Rows of a recording that are looked at together: enough to spread the cost of numpy's calls over.
+# Rows of a recording that are processed together, which shares the overhead of NumPy's calls.
 TOGETHER = 32
-# The least part of a direction along an axis: one that is along the other axis still has a crossing, far away.
+# The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
 PARALLEL = 1e-12
 
 
-def distances(low: np.ndarray, high: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """How far (...) the boxes from `low` to `high` (..., 3) along the world's axes are from the points `eye` (..., 3), m."""
-    return np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1)
+def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
+    """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
+    return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
 
 
 def first_in_view(
-    low: np.ndarray, high: np.ndarray, eyes: np.ndarray, headings: np.ndarray, view_range: float, view_angle: float
-) -> np.ndarray:
-    """In which row (N,) each of N boxes is in view for the first time, see `in_view`; -1 for those that never are.
+    low: Floats, high: Floats, eyes: Floats, headings: Floats, view_range: float, view_angle: float
+) -> Integers:
+    """The first row (N,) in which each of N boxes is in view, see `in_view`; -1 for boxes that never are.
 
-    `low` and `high` (T, N, 3), `eyes` (T, 3), all in m, and `headings` (T,) in rad have a row for each instant.
+    `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
     """
     first = np.full(low.shape[1], -1)
     for start in range(0, len(eyes), TOGETHER):
@@ -45,16 +47,14 @@ def first_in_view(
     return first
 
 
-def in_view(
-    low: np.ndarray, high: np.ndarray, eye: np.ndarray, heading: np.ndarray, view_range: float, view_angle: float
-) -> np.ndarray:
-    """Of which boxes (...) some part is in view of `eye`: within `view_range` (m) and, seen from above, the field of view.
+def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float) -> Booleans:
+    """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above, in the field of view.
 
-    `low` and `high` (..., 3) are the boxes' corners, `eye` (..., 3) is where it is looked from, m, and `heading` (...) the middle
-    of the field of view, rad, all in the world frame; `view_angle` is its full width, rad. A box that is above, below or
-    around `eye` is in the field of view.
+    `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and `heading` (...) rad the middle of the
+    field of view, all in the world frame; `view_angle` (rad) is its full width. A box above, below or around `eye` is always in
+    the field of view.
     """
-    seen = distances(low, high, eye) <= view_range
+    seen: Booleans = distances(low, high, eye) <= view_range
     if view_angle >= math.tau:
         return seen
     eye, heading = np.broadcast_to(eye, low.shape)[seen], np.broadcast_to(heading, seen.shape)[seen]
@@ -62,7 +62,7 @@ def in_view(
     drop = np.maximum(np.maximum(low[:, 2], -high[:, 2]), 0.0)
     x, y = np.clip(0.0, low[:, :2], high[:, :2]).T
     offset = np.arctan2(y, x) - heading
-    # What is nearest within the field of view is the nearest of the whole box, or lies on an edge of the field.
+    # The nearest visible point is the nearest point of the whole box, or lies on an edge of the field of view.
     shown = np.abs(offset - math.tau * np.round(offset / math.tau)) <= view_angle / 2
     shown |= (x == 0) & (y == 0)
     for edge in (heading - view_angle / 2, heading + view_angle / 2):
@@ -71,8 +71,8 @@ def in_view(
     return seen
 
 
-def _ways(low: np.ndarray, high: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """How far (N,) from the origin rectangles (N, 2) begin along `direction` (N,), rad; infinite for those beside it, m."""
+def _ways(low: Floats, high: Floats, direction: Floats) -> Floats:
+    """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m; infinite where the ray misses."""
     ray = np.column_stack([np.cos(direction), np.sin(direction)])
     ray = np.where(np.abs(ray) < PARALLEL, PARALLEL, ray)
     enter = np.maximum(np.minimum(low / ray, high / ray).max(axis=1), 0.0)
@@ -80,13 +80,13 @@ def _ways(low: np.ndarray, high: np.ndarray, direction: np.ndarray) -> np.ndarra
     return np.where(leave >= enter, enter, np.inf)
 
 
-# While the robot is this near to where it was, only what it can touch by that is looked at, m.
+# While the robot stays this near to where it was, only what it can touch from there is checked, m.
 STRIDE = 0.5
 NOWHERE = (math.inf, math.inf, math.inf)
 
 
 class Notice:
-    """The models that are noticed in one run; `first_touched` tells when each was, s."""
+    """The models that the robot notices in one run. `first_touched` maps a model to the time (s) when it was first touched."""
 
     def __init__(
         self,
@@ -97,29 +97,29 @@ class Notice:
         kept: Sequence[Body],
         present: frozenset[str],
     ) -> None:
-        """`present` are the models that are there; `kept` are those of them that move, as `sleep` has them."""
+        """`present` are the models that are kept; `kept` are the moving ones among them, in the order of `sleep`."""
         self.first_touched: dict[str, float] = {}
         self._around = around
         self._sensors = sensors
         self._context = plant_context
         self._sleep = sleep
         self._moving = np.array([body.name for body in kept], dtype=object)
-        self._present = np.array([name in present for name in around.names], dtype=bool)
+        self._present: Booleans = np.array([name in present for name in around.names], dtype=bool)
         self._untouched = self._present.copy()
-        self._solid = np.array([any(body.bounds) for body in kept], dtype=bool)
+        self._solid: Booleans = np.array([any(body.bounds) for body in kept], dtype=bool)
         self._untouched_moving = self._solid.copy()
-        # The boxes around what never moves within the stride, and how far from where the robot can touch none of it.
+        # Boxes of what never moves within the stride; and within `_free` m of `_free_start` the robot touches none of it.
         self._low = self._high = np.empty((0, 3))
         self._stride_start = self._free_start = NOWHERE
         self._free = 0.0
         self._views: list[tuple[float, Vector, float]] = []
-        self._boxes: list[tuple[np.ndarray, np.ndarray]] = []
+        self._boxes: list[tuple[Floats, Floats]] = []
 
     def feel(self, now: float, place: Vector) -> None:
-        """Notices what the robot, whose first link is at `place` (m), touches at the time `now` (s).
+        """Notes what the robot touches at the time `now` (s); `place` (m) is the position of its first link.
 
-        To be called when the motors have their command: then the contacts are those which the next step needs in any case,
-        worked out once, with the same bits. What is touched only between two calls is missed.
+        Call it after the motors got their command: then Drake computes the contacts that the next step needs in any case, once and
+        with the same bits. Contacts that begin and end between two calls are missed.
         """
         if not (self._reaches(place) or self._reaches_moving(place)):
             return
@@ -130,7 +130,7 @@ class Notice:
             self._stride_start = self._free_start = NOWHERE
 
     def look(self, now: float, place: Vector, heading: float) -> None:
-        """Writes down from where, and in which direction (rad), the robot looks at the time `now` (s)."""
+        """Notes where the robot is at the time `now` (s), and in which direction (rad) it looks."""
         if not self._sensors.view_range:
             return
         self._views.append((now, place, heading))
@@ -138,8 +138,8 @@ class Notice:
             self._boxes.append(self._sleep.boxes())
 
     def first_sensed(self, measured: Mapping[str, float]) -> dict[str, float]:
-        """When (s) each model was seen or touched first, in the order of time; `measured` is when the lidar first met it."""
-        # All rows at once: looking at each in its time would cost many times as much.
+        """When (s) each model was first in view or touched, in order of time; `measured` is when the lidar first hit it."""
+        # All rows at once: checking each at its time would cost many times as much.
         first = dict(self.first_touched)
         for name, met in measured.items():
             first[name] = min(met, first.get(name, math.inf))
@@ -148,7 +148,7 @@ class Notice:
         return dict(sorted(first.items(), key=lambda item: item[1]))
 
     def _reaches(self, place: Vector) -> bool:
-        """Whether the robot might touch anything for the first time that never moves."""
+        """Whether the robot might touch something that never moves and that it has not touched yet."""
         if math.dist(place, self._free_start) < self._free:
             return False
         if not math.dist(place, self._stride_start) < STRIDE:
@@ -156,13 +156,13 @@ class Notice:
             apart = distances(self._around.low, self._around.high, np.array(place))
             near = self._untouched & (apart < self._around.reach + STRIDE)
             self._low, self._high = self._around.low[near], self._around.high[near]
-        apart = float(distances(self._low, self._high, np.array(place)).min(initial=math.inf)) - self._around.reach
+        gap = float(distances(self._low, self._high, np.array(place)).min(initial=math.inf)) - self._around.reach
         self._free_start = place
-        self._free = min(apart, STRIDE - math.dist(place, self._stride_start))
-        return apart < 0
+        self._free = min(gap, STRIDE - math.dist(place, self._stride_start))
+        return gap < 0
 
     def _reaches_moving(self, place: Vector) -> bool:
-        """Whether the robot might touch anything for the first time that moves."""
+        """Whether the robot might touch a moving model that it has not touched yet."""
         if not self._untouched_moving.any():
             return False
         apart = distances(*self._sleep.boxes(), np.array(place))
@@ -172,8 +172,8 @@ class Notice:
         """The models that the robot touches for the first time."""
         robot, owners = self._around.robot, self._around.owners
         try:
-            results = self._around.contacts.Eval(self._context)
-        # Contacts that cannot be worked out are for the step that needs them to report.
+            results: Any = self._around.contacts.Eval(self._context)
+        # If the contacts cannot be computed, the next step reports it.
         except (RuntimeError, ValueError, SystemExit):
             return
         for number in range(results.num_point_pair_contacts()):
@@ -181,12 +181,12 @@ class Notice:
             name, other = owners.get(pair.id_A.get_value()), pair.id_B
             if name is None:
                 name, other = owners.get(other.get_value()), pair.id_A
-            # Most contacts are with what the robot stands on: no more is asked about them.
+            # Most contacts are with the ground that the robot stands on: they fail the cheaper checks, which come first.
             if name is not None and name not in self.first_touched and other.get_value() in robot:
                 yield name
 
     def _seen(self) -> Iterator[tuple[str, float]]:
-        """The models that were in view, with the time (s) of the first; a model may come twice."""
+        """The models that were in view, with the time (s) when they first were; a model may come twice."""
         if not self._views:
             return
         times, places, headings = zip(*self._views, strict=True)

@@ -1,4 +1,4 @@
-"""The failure oracle: did a run show f, the failure that is being debugged?"""
+"""The failure oracle: how a run failed, and whether it shows f, the failure that is being debugged."""
 
 from __future__ import annotations
 
@@ -7,35 +7,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.robot.result import RunResult
 from ddenv.world.pose import Pose, Vector
 
-# A robot that leans more than this stands on its wheels no more, rad.
+# A robot that leans more than this no longer stands on its wheels, rad.
 LEAN = math.radians(60)
 
-# Going down so far (m) in so short a time (s) is falling: 1.7 m/s down is faster than wheels go down any slope that they hold on
-# to, and whatever falls freely goes down 1.8 m in that time.
+# Descending this far (m) within this time (s) is a fall: 1.7 m/s downwards is faster than wheels descend any slope on which they
+# have grip, and a free fall covers 1.8 m in that time.
 DROP, DROP_SECONDS = 1.0, 0.6
-# A robot may be put down from above its ground when a run begins, s.
+# A robot may drop onto the ground when a run begins, s.
 SETTLING = 1.0
 
-# Within half a robot's length (m) of its end for so long (s). A robot that gets on leaves such a circle in a second or two; one
-# that tries in vain to get free, back and forth, stays. It is shorter than what `Stuck` waits for, so that a run that was cut
-# is stuck here as well.
+# Within half a robot's length (m) of its end for this time (s). A moving robot leaves such a circle in a second or two; one that
+# rocks back and forth to get free stays. The time is shorter than what `Stuck` waits for, so that a run that was cut short is
+# stuck here as well.
 STILL, STILL_SECONDS = 0.5, 6.0
 
 
-def kind_of(trajectory: np.ndarray, fell: bool, arrived: float | None) -> str:
+def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     """How a run that did not reach its goal failed. `trajectory` (N, 8) is as in `RunResult`.
 
-    `fell` says that the robot is below everything that it could stand on, `arrived` is when (s) it began to believe that it is at
-    the goal, if ever. The first of these that is true:
+    `fell` is True if the robot is below everything that it could stand on. `arrived` is the time (s) when its controller first
+    reported that it is at the goal, None if it never did. Returns the first of these that is true:
 
     fell         below everything, or more than 1 m down at once and not up again
-    tipped over  what was up at the start leans more than 60 degrees at the end
-    lost         it came to believe that it has arrived, and was not stuck by then: wheels that spin in a rut take nobody anywhere
-    stuck        in the last 6 s (or the last half of a shorter run) never more than 0.5 m from its end
-    out of time  still on its way
+    tipped over  at the end it leans more than 60 degrees from how it stood at the start
+    lost         its pose estimate reached the goal, and it was not stuck by then: wheels that spin in a rut also move the estimate
+    stuck        in the last 6 s (or the second half of a shorter run) never more than 0.5 m from its end
+    out of time  still moving
     """
     if fell or _dropped(trajectory):
         return "fell"
@@ -46,22 +47,23 @@ def kind_of(trajectory: np.ndarray, fell: bool, arrived: float | None) -> str:
     return "stuck" if _is_still(trajectory) else "out of time"
 
 
-def _dropped(trajectory: np.ndarray) -> bool:
-    """Whether it fell down somewhere and ended about as far down or farther."""
+def _dropped(trajectory: Floats) -> bool:
+    """Whether the robot fell somewhere, and ended at least about as far down."""
     times, heights = trajectory[:, 0], trajectory[:, 3]
     before = np.searchsorted(times, times - DROP_SECONDS - 1e-9)
     fallen = (heights[before] - heights > DROP) & (times[before] >= SETTLING) & (heights[before] - heights[-1] > DROP)
     return bool(fallen.any())
 
 
-def _lean(trajectory: np.ndarray) -> float:
+def _lean(trajectory: Floats) -> float:
     """The angle between the vertical and the axis of the robot that was vertical at the start, rad."""
-    start, end = (Pose(quaternion=tuple(map(float, trajectory[row, 4:]))) for row in (0, -1))
+    (w, x, y, z), (ew, ex, ey, ez) = (trajectory[row, 4:].tolist() for row in (0, -1))
+    start, end = Pose(quaternion=(w, x, y, z)), Pose(quaternion=(ew, ex, ey, ez))
     up = end.rotate(start.inverse().rotate((0.0, 0.0, 1.0)))
     return math.acos(max(-1.0, min(1.0, up[2])))
 
 
-def _is_still(trajectory: np.ndarray) -> bool:
+def _is_still(trajectory: Floats) -> bool:
     times = trajectory[:, 0]
     since = times[-1] - min(STILL_SECONDS, (times[-1] - times[0]) / 2)
     last = trajectory[times >= since, 1:4]
@@ -70,41 +72,41 @@ def _is_still(trajectory: np.ndarray) -> bool:
 
 @dataclass(frozen=True)
 class Failure:
-    """f: where the robot was when its time ran out (`position`, m), and how it got there.
+    """f: where the robot was when its time ran out (`position`, m, world frame), and how it got there.
 
-    `trajectory` has shape (N, 8), see `RunResult`. A run is similar within `epsilon` m of f: at its end
-    (`similarity` "end-pose"), or also on average along the way ("trajectory").
+    `trajectory` (N, 8) is as in `RunResult`. A run shows f if it ends within `epsilon` (m) of `position` and, with `similarity`
+    "trajectory" instead of "end-pose", is also on average within `epsilon` of the trajectory.
     """
 
     position: Vector
-    trajectory: np.ndarray
+    trajectory: Floats
     epsilon: float
     similarity: str = "end-pose"
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """`outcome` is "similar", "other", "pass" or "error"; `distance` between the ends, `trajectory_distance` on average, m."""
+    """`outcome` is "similar", "other", "pass" or "error". `distance` (m) is between the ends, `trajectory_distance` (m) the mean."""
 
     outcome: str
     distance: float
     trajectory_distance: float
 
 
-def medoid(positions: np.ndarray) -> int:
-    """The index of the position (N, 3) that is nearest to all the others together."""
+def medoid(positions: Floats) -> int:
+    """The index of the medoid: the one of `positions` (N, 3) with the least sum of distances to all others."""
     return int(np.argmin(np.linalg.norm(positions[:, None] - positions[None, :], axis=2).sum(axis=1)))
 
 
 def judge(result: RunResult, failure: Failure) -> Judgement:
-    """What came out of a run, seen from f (paper, `is_similar_failure`)."""
+    """The outcome of a run with regard to f (`is_similar_failure` of the paper)."""
     judgement = judge_trajectory(result.trajectory, failure)
     if result.outcome == "failed":
         return judgement
     return Judgement(result.outcome, judgement.distance, judgement.trajectory_distance)
 
 
-def judge_trajectory(trajectory: np.ndarray, failure: Failure) -> Judgement:
+def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
     """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure ("other")."""
     distance = float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
     along = trajectory_distance(trajectory, failure.trajectory)
@@ -112,8 +114,8 @@ def judge_trajectory(trajectory: np.ndarray, failure: Failure) -> Judgement:
     return Judgement("similar" if similar else "other", distance, along)
 
 
-def trajectory_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Mean distance between two trajectories at equal times, m; the shorter one (of a run that was cut) waits at its end."""
+def trajectory_distance(a: Floats, b: Floats) -> float:
+    """The mean distance of two trajectories (N, 8) at equal times, m. A shorter one, of a run that was cut, waits at its end."""
     times = np.union1d(a[:, 0], b[:, 0])
     gaps = [np.interp(times, a[:, 0], a[:, axis]) - np.interp(times, b[:, 0], b[:, axis]) for axis in (1, 2, 3)]
     return float(np.linalg.norm(gaps, axis=0).mean())

@@ -1,12 +1,12 @@
-"""What a controller is given, and what it gives back: the seam between the robot and whoever drives it.
+"""The interface of a controller: what it gets at the start and at every step, and what it returns.
 
-A controller is a class. It is made anew for each run and asked for a command once every period:
+A controller is a class. Each run makes a new one, and asks it for a command once every period:
 
     class Follow:
         def __init__(self, setup: Setup) -> None: ...
         def step(self, reading: Reading) -> Twist | WheelSpeeds: ...
 
-It may have an attribute `arrived`, True once it believes that the robot has reached its goal.
+It may have an attribute `arrived`, True once its pose estimate says that the robot has reached its goal.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STOP = Twist(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class WheelSpeeds:
-    """Angular speeds (rad/s, positive forward) of wheel joints by name; a wheel that is not named stands still."""
+    """Angular speeds of the wheel joints by name, rad/s, positive forward. A wheel that is not named stands still."""
 
     speeds: Mapping[str, float]
 
@@ -39,9 +39,9 @@ class WheelSpeeds:
 class Reading(NamedTuple):
     """What the robot knows at `time` (simulated s).
 
-    `wheels` (rad/s) are the measured speeds of the wheel joints in the order of `Setup.joints`, `compass` (rad) the heading in the
-    world frame. A sensor that has not measured since the last step gives None. `estimate` is what the robot's own filter
-    makes of compass, IMU and odometry.
+    `estimate` is the robot's pose estimate, filtered from odometry, IMU and compass. `wheels` (rad/s) are the measured speeds of
+    the wheel joints in the order of `Setup.joints`, positive forward. `compass` (rad) is the heading in the world frame. A
+    sensor that has not measured since the last step is None.
     """
 
     time: float
@@ -54,13 +54,14 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What a controller knows before it starts.
+    """What a controller knows before the run starts.
 
-    The goal is reached within `tolerance` (m) of `goal` (x, y in m, world frame), the robot starts at `start` (x, y, heading).
-    `joints` are the wheels' joints, `left` tells the side of each; `radius` (m) is theirs, `track` (m) how far left and right are
-    apart. `footprint` (m) is how far the robot reaches from its origin: ahead, behind, to its left, to its right. `period` is in
-    s, the limits `speed`, `acceleration` and `turn_rate` in m/s, m/s^2 and rad/s. `settings` is the scenario's section
-    `controller` and `options` what it says for an own controller. `seed` is that of the run.
+    The goal is reached within `tolerance` (m) of `goal` (x, y in m, world frame). The robot starts at `start` (x, y in m, heading in
+    rad, world frame). `joints` are the wheel joints, `left` is True for those on the left side; `radius` (m) is the wheels' radius,
+    `track` (m) the distance between left and right ones. `footprint` (m) is how far the robot extends from its origin: ahead,
+    behind, to its left, to its right. `period` (s) is the time between two commands; `speed` (m/s), `acceleration` (m/s^2) and
+    `turn_rate` (rad/s) are limits. `settings` is the scenario's section `controller`, `options` are the scenario's options for a
+    controller of your own. `seed` is the seed of the run.
     """
 
     goal: tuple[float, float]
@@ -81,6 +82,6 @@ class Setup:
 
 
 class Drives(Protocol):
-    """A controller."""
+    """Anything that drives a robot."""
 
     def step(self, reading: Reading) -> Twist | WheelSpeeds: ...

@@ -1,33 +1,165 @@
-"""One run: sense, estimate, command and simulate until the goal is reached or time is up."""
+"""One run: simulate, sense, estimate and command until the goal is reached, time is up, or something breaks."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from ddenv.robot.autonomy import Autonomy
-from ddenv.robot.clock import Clock, Tick
+from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.drake.drive import Drive
 from ddenv.robot.drake.plant import Body, Built
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.result import Progress, Recording, RunResult
+from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
 from ddenv.world.scenario import Controller, Scenario
 
-PoseRow = tuple[float, ...]
+# The outcome, the failure, and whether the run was cut short.
+End = tuple[str, str, bool]
+
+
+@dataclass(frozen=True)
+class RunParts:
+    """What one run consists of besides the plant.
+
+    `kept` are the moving models whose motion is recorded. With `stuck` the run is cut short once the robot is stuck for good.
+    """
+
+    scenario: Scenario
+    drive: Drive
+    sleep: Sleep
+    notice: Notice
+    autonomy: Autonomy
+    lidar: Lidar | None
+    stuck: Stuck | None
+    kept: Sequence[Body]
+    seed: int
+
+
+class Run:
+    """One run in a prepared context: start poses are set, removed models are switched off."""
+
+    def __init__(self, context: RunContext, parts: RunParts) -> None:
+        built = context.built
+        self._parts = parts
+        self._clock = context.clock
+        self._floor = context.floor
+        motors = built.plant.get_desired_state_input_port(built.robot.instance)
+        # The motors ignore the wheels' desired positions, which come first, and follow their desired speeds.
+        self._commanded = np.zeros(motors.size())
+        self._motors = motors.FixValue(context.plant_context, self._commanded)
+        self._observer = Observer(built, parts.drive, context.plant_context)
+        self._simulator = Simulator(built.diagram, context.diagram_context)
+        self._recording = Recording()
+
+    def execute(self, progress: Progress | None) -> RunResult:
+        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is passed on."""
+        started = time.perf_counter()
+        parts = self._parts
+        outcome, failure, cut, seconds = self._loop(progress)
+        trajectory = self._recording.trajectory()
+        if outcome == "failed":
+            failure = kind_of(trajectory, fell=failure == "fell", arrived=parts.autonomy.arrived)
+        return RunResult(
+            outcome=outcome,
+            failure=failure,
+            trajectory=trajectory,
+            motions=self._recording.motions(),
+            simulated_seconds=seconds,
+            wall_seconds=time.perf_counter() - started,
+            seed=parts.seed,
+            first_sensed=parts.notice.first_sensed(parts.lidar.first_seen if parts.lidar else {}),
+            first_touched=parts.notice.first_touched,
+            cut=cut,
+        )
+
+    def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
+        """The outcome, the failure, whether the run was cut short, and when (s) it ended."""
+        parts = self._parts
+        sleep, notice, autonomy, lidar = parts.sleep, parts.notice, parts.autonomy, parts.lidar
+        for tick in self._clock.ticks:
+            problem = self._simulate(tick.time) if tick.step else ""
+            if problem:
+                return "error", problem, False, tick.time
+            sleep.tick(tick.step)
+            if parts.kept:
+                # Sleep has just moved the models that are played back.
+                self._observer.look()
+            pose = self._observer.robot()
+            truth = self._observer.truth(pose)
+            end = self._end(pose, tick)
+            if end is not None or tick.record:
+                self._record(tick.time, pose, progress)
+                notice.look(tick.time, pose[:3], truth.heading)
+            if end is None:
+                scan = lidar.scan(tick.time, pose, *sleep.poses()) if tick.lidar and lidar else None
+                autonomy.sense(tick, truth, scan)
+                end = self._command(tick) if tick.command else None
+            if end is not None or tick.record:
+                notice.feel(tick.time, pose[:3])
+            if end is not None:
+                return *end, tick.time
+        raise AssertionError("the clock's last tick ends every run")
+
+    def _end(self, pose: PoseRow, tick: Tick) -> End | None:
+        """How the run ends if it ends at this tick, else None."""
+        goal, stuck = self._parts.scenario.goal, self._parts.stuck
+        if math.hypot(goal.x - pose[0], goal.y - pose[1]) <= goal.tolerance:
+            return "pass", "", False
+        if pose[2] < self._floor:
+            return "failed", "fell", False
+        if tick.step >= self._clock.last:
+            return "failed", "", False
+        if stuck is not None and tick.record and stuck.update(tick.time, pose):
+            return "failed", "", True
+        return None
+
+    def _simulate(self, until: float) -> str:
+        """Simulates up to the time `until` (s). Returns what went wrong, or ""."""
+        try:
+            self._simulator.AdvanceTo(until)
+        # Drake raises SystemExit when one of its own checks fails.
+        except (RuntimeError, ValueError, SystemExit) as error:
+            if not self._observer.look() or "nan" in str(error).lower():
+                return "not-finite"
+            return (str(error).strip() or type(error).__name__).splitlines()[0]
+        return "" if self._observer.look() else "not-finite"
+
+    def _command(self, tick: Tick) -> End | None:
+        """Sets the wheel speeds that the controller wants. Returns how the run ends if the controller fails."""
+        parts = self._parts
+        try:
+            speeds = parts.drive.wheel_speeds(parts.autonomy.command(tick), parts.scenario.controller.skid)
+        except ControllerFailed as failed:
+            return "error", str(failed), False
+        # Setting the same speeds again would only make Drake compute everything anew.
+        if (self._commanded[len(speeds) :] == speeds).all():
+            return None
+        self._commanded[len(speeds) :] = speeds
+        data: Any = self._motors.GetMutableData()
+        data.get_mutable_value().SetFromVector(self._commanded)
+        return None
+
+    def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
+        self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._parts.kept})
+        if progress is not None:
+            progress(now, pose)
 
 
 class Observer:
-    """Reads one context of the plant."""
+    """Reads poses, and what ideal sensors would measure, from one context of the plant."""
 
     def __init__(self, built: Built, drive: Drive, plant_context: Context) -> None:
         plant, base = built.plant, built.robot.base
@@ -42,27 +174,29 @@ class Observer:
         self.look()
 
     def look(self) -> bool:
-        """Reads the state as it is now; returns whether all of it still consists of numbers."""
+        """Reads the state as it is now. Returns whether it is finite."""
         self._state = self._plant.GetPositionsAndVelocities(self._context).tolist()
-        # No sum of numbers comes near the largest one.
+        # A sum of finite states does not overflow: none comes near the largest float.
         return math.isfinite(sum(self._state))
 
     def pose(self, body: Body) -> PoseRow:
-        """x, y, z (m), qw, qx, qy, qz of the first link of a model in the world frame, as of the last look."""
+        """The pose of a model's first link in the world frame, as of the last look: x, y, z (m), qw, qx, qy, qz."""
         if not body.base.is_floating_base_body():
             place = self._plant.EvalBodyPoseInWorld(self._context, body.base)
-            return (*place.translation().tolist(), *place.rotation().ToQuaternion().wxyz().tolist())
+            x, y, z = place.translation().tolist()
+            qw, qx, qy, qz = place.rotation().ToQuaternion().wxyz().tolist()
+            return x, y, z, qw, qx, qy, qz
         return self._floating(body.base.floating_positions_start())
 
     def robot(self) -> PoseRow:
-        """The pose of the robot."""
+        """The pose of the robot's first link, as in `pose`."""
         return self._floating(self._place)
 
     def truth(self, pose: PoseRow) -> Truth:
         """What the robot's sensors would measure without noise at its `pose`."""
         _, _, _, qw, qx, qy, qz = pose
         state, spin = self._state, self._spin
-        # The gyro is fixed to the body: it measures the turning about the body's own z axis, given here in the world frame.
+        # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here in the world frame.
         up_x, up_y, up_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
         return Truth(
             heading=math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)),
@@ -73,21 +207,41 @@ class Observer:
         )
 
     def _floating(self, start: int) -> PoseRow:
-        # As the plant holds it: continuous, never jumping to the opposite quaternion, but not quite of unit length.
+        # The plant's own quaternion: continuous, never jumping to its negative, but not exactly of unit length.
         qw, qx, qy, qz, x, y, z = self._state[start : start + 7]
         length = math.hypot(qw, qx, qy, qz)
         return x, y, z, qw / length, qx / length, qy / length, qz / length
 
 
-# Who stays within so many m and rad for so long (s) is stuck. Wheels that slip in a rut rock a robot by less; one that turns on the
-# spot, or backs up, leaves these limits in a fraction of a second.
+# A robot that stays within this distance (m) and angle (rad) for this time (s) is stuck. Wheels that slip in a rut rock a robot by
+# less; a robot that turns on the spot or backs up leaves these limits in a fraction of a second.
 RADIUS = 0.05
 ANGLE = math.radians(5)
 SECONDS = 8.0
 
 # The controller `costmap` first stands still for its patience, clears its map and waits as long again before it backs up and
-# turns: whoever watches must be more patient than that.
+# turns: nobody may call it stuck before that.
 PATIENCES = 3.0
+
+
+class Stuck:
+    """Finds out whether a robot is stuck for good, from the recorded poses of one run.
+
+    It is a guess: a robot may still come free later. So runs that were not cut short confirm what a reduction leaves.
+    """
+
+    def __init__(self, seconds: float = SECONDS) -> None:
+        """`seconds` is how long the robot must not have moved."""
+        self._seconds = seconds
+        self._since = 0.0
+        self._place: PoseRow | None = None
+
+    def update(self, now: float, pose: PoseRow) -> bool:
+        """Whether the robot is stuck at `now` (s). Call it for each recorded pose, in order of time."""
+        if self._place is None or _has_left(self._place, pose):
+            self._since, self._place = now, pose
+        # Times are sums of steps: 8 s may come out 1e-15 s short.
+        return now - self._since >= self._seconds - 1e-6
 
 
 def seconds_for(controller: Controller) -> float:
@@ -95,165 +249,9 @@ def seconds_for(controller: Controller) -> float:
     return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS
 
 
-class Stuck:
-    """Is told each recorded pose of one run, in order of time.
-
-    It is a guess: a robot may still come free later. That is why full runs confirm what is left after runs that were cut.
-    """
-
-    def __init__(self, seconds: float = SECONDS) -> None:
-        self._seconds = seconds
-        self._since = 0.0
-        self._place: PoseRow | None = None
-
-    def update(self, now: float, pose: PoseRow) -> bool:
-        """Whether the robot is stuck at `now` (s); `pose` is x, y, z (m), qw, qx, qy, qz."""
-        if self._place is None or _has_left(self._place, pose):
-            self._since, self._place = now, pose
-        # Times are sums of steps: what is due in 8 s may come 1e-15 s early.
-        return now - self._since >= self._seconds - 1e-6
-
-
 def _has_left(place: PoseRow, pose: PoseRow) -> bool:
     if math.dist(place[:3], pose[:3]) > RADIUS:
         return True
-    # A rotation has two quaternions.
+    # The quaternions q and -q are the same rotation.
     likeness = abs(sum(a * b for a, b in zip(place[3:], pose[3:], strict=True)))
     return 2 * math.acos(min(1.0, likeness)) > ANGLE
-
-
-# Outcome, failure, and whether the run was cut short.
-End = tuple[str, str, bool]
-
-
-class Run:
-    """One run in a context that has been prepared: start poses set, removed models switched off.
-
-    `kept` are the moving models that it records; `floor` (m) is the height below which the robot has fallen out of the world. With
-    `stuck` the run ends as soon as that finds the robot stuck for good.
-    """
-
-    def __init__(
-        self,
-        built: Built,
-        context: Context,
-        scenario: Scenario,
-        drive: Drive,
-        clock: Clock,
-        sleep: Sleep,
-        notice: Notice,
-        autonomy: Autonomy,
-        lidar: Lidar | None,
-        stuck: Stuck | None,
-        floor: float,
-        kept: Sequence[Body],
-        seed: int,
-    ) -> None:
-        self._goal = scenario.goal
-        self._skid = scenario.controller.skid
-        self._drive = drive
-        self._clock = clock
-        self._sleep = sleep
-        self._notice = notice
-        self._autonomy = autonomy
-        self._lidar = lidar
-        self._stuck = stuck
-        self._floor = floor
-        self._kept = kept
-        self._seed = seed
-        self._context = built.plant.GetMyMutableContextFromRoot(context)
-        motors = built.plant.get_desired_state_input_port(built.robot.instance)
-        # The wheels' positions, which no motor minds, and their speeds.
-        self._told = np.zeros(motors.size())
-        self._motors = motors.FixValue(self._context, self._told)
-        self._observer = Observer(built, drive, self._context)
-        self._simulator = Simulator(built.diagram, context)
-        self._recording = Recording()
-
-    def execute(self, progress: Progress | None) -> RunResult:
-        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is the caller's."""
-        started = time.perf_counter()
-        outcome, failure, cut, seconds = self._loop(progress)
-        trajectory = self._recording.trajectory()
-        if outcome == "failed":
-            failure = kind_of(trajectory, fell=failure == "fell", arrived=self._autonomy.arrived)
-        return RunResult(
-            outcome=outcome,
-            failure=failure,
-            trajectory=trajectory,
-            motions=self._recording.motions(),
-            simulated_seconds=seconds,
-            wall_seconds=time.perf_counter() - started,
-            seed=self._seed,
-            first_sensed=self._notice.first_sensed(self._lidar.first_seen if self._lidar else {}),
-            first_touched=self._notice.first_touched,
-            cut=cut,
-        )
-
-    def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
-        """Outcome, failure, whether the run was cut short, and when (s) it ended."""
-        for tick in self._clock.ticks:
-            problem = self._simulate(tick.time) if tick.step else ""
-            if problem:
-                return "error", problem, False, tick.time
-            self._sleep.tick(tick.step)
-            if self._kept:
-                # What is played back has been put in its place.
-                self._observer.look()
-            pose = self._observer.robot()
-            truth = self._observer.truth(pose)
-            end = self._end(pose, tick)
-            if end is not None or tick.record:
-                self._record(tick.time, pose, progress)
-                self._notice.look(tick.time, pose[:3], truth.heading)
-            if end is None:
-                scan = self._lidar.scan(tick.time, pose, *self._sleep.poses()) if tick.lidar else None
-                self._autonomy.sense(tick, truth, scan)
-                end = self._command(tick) if tick.command else None
-            if end is not None or tick.record:
-                self._notice.feel(tick.time, pose[:3])
-            if end is not None:
-                return *end, tick.time
-        raise AssertionError("a clock's last tick ends the run")
-
-    def _end(self, pose: PoseRow, tick: Tick) -> End | None:
-        """How a run ends that ends here, or None."""
-        goal = self._goal
-        if math.hypot(goal.x - pose[0], goal.y - pose[1]) <= goal.tolerance:
-            return "pass", "", False
-        if pose[2] < self._floor:
-            return "failed", "fell", False
-        if tick.step >= self._clock.last:
-            return "failed", "", False
-        if self._stuck is not None and tick.record and self._stuck.update(tick.time, pose):
-            return "failed", "", True
-        return None
-
-    def _simulate(self, until: float) -> str:
-        """Simulates up to the time `until`; returns what went wrong, or ""."""
-        try:
-            self._simulator.AdvanceTo(until)
-        # Drake raises SystemExit where a condition of its own failed.
-        except (RuntimeError, ValueError, SystemExit) as error:
-            if not self._observer.look() or "nan" in str(error).lower():
-                return "not-finite"
-            return (str(error).strip() or type(error).__name__).splitlines()[0]
-        return "" if self._observer.look() else "not-finite"
-
-    def _command(self, tick: Tick) -> End | None:
-        """Turns the wheels as the controller wants; returns how the run ends if that fails."""
-        try:
-            speeds = self._drive.wheel_speeds(self._autonomy.command(tick), self._skid)
-        except ControllerFailed as failed:
-            return "error", str(failed), False
-        # What is told again would only have Drake work everything out anew.
-        if (self._told[len(speeds) :] == speeds).all():
-            return None
-        self._told[len(speeds) :] = speeds
-        self._motors.GetMutableData().get_mutable_value().SetFromVector(self._told)
-        return None
-
-    def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
-        self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._kept})
-        if progress is not None:
-            progress(now, pose)

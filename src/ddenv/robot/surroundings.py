@@ -1,4 +1,4 @@
-"""What of a world a robot can notice, worked out once for all runs."""
+"""What of a world the robot can touch or see, computed once for all runs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import OutputPort
 
+from ddenv.arrays import Booleans, Floats, Objects
 from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.drake.plant import Built
 from ddenv.robot.drake.shapes import solid_bounds
@@ -18,9 +19,9 @@ from ddenv.world.pose import Vector
 
 
 def reach(robot: Model) -> float:
-    """No point of the robot's geometry is farther than this from the origin of its first link, m.
+    """An upper bound of the distance (m) from the origin of the robot's first link to any point of its geometry.
 
-    Infinite for a robot with loose parts, or joints that slide without an end.
+    Infinite for a robot with loose parts or with unlimited sliding joints.
     """
     ways = _ways(robot)
     farthest = 0.0
@@ -37,9 +38,9 @@ def reach(robot: Model) -> float:
 
 
 def _ways(robot: Model) -> dict[str, tuple[Vector, float]]:
-    """For each link that hangs on the first one: the place of its joint, and the way there from joint to joint, m."""
+    """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
     ways = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
-    # Joints may stand in any order.
+    # A file may name its joints in any order.
     for _ in robot.joints:
         for joint in robot.joints:
             if joint.parent in ways and joint.child not in ways:
@@ -53,7 +54,7 @@ def _slide(joint: Joint) -> float:
     return max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
 
 
-# Room for how far surfaces sink into each other, and joints go beyond their limits, m.
+# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
 YIELD = 0.1
 
 
@@ -61,20 +62,21 @@ YIELD = 0.1
 class Surroundings:
     """One robot in one world.
 
-    `contacts` are those of the plant. `robot` are the numbers of the robot's geometries, `owners` tells the model by the
-    numbers of all others. The robot touches nothing that is more than `reach` (m) away from the origin of its first link.
-    `names` (N,) are the models with something that never moves, and `low` and `high` (N, 3) the boxes around that, m; a model
-    that is a ground has one more, without end and not `visible` (N,).
+    `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
+    geometry to the names of its models. The robot touches nothing beyond `reach` (m) from the origin of its first link.
+
+    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts. A
+    ground model has a second, endless box around all that is below its plane, which is not `visible` (N,).
     """
 
     contacts: OutputPort
     robot: frozenset[int]
     owners: dict[int, str]
     reach: float
-    names: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    visible: np.ndarray
+    names: Objects
+    low: Floats
+    high: Floats
+    visible: Booleans
 
     @classmethod
     def of(cls, world: World, robot: Model, built: Built) -> Surroundings:
@@ -92,8 +94,8 @@ class Surroundings:
         )
 
 
-def _boxes(model: Model) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
-    """Lowest and highest corner of what never moves of a model, and whether a robot can see it."""
+def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:
+    """The lowest and the highest corner (3,) of each box around the parts of `model` that never move, and if it is visible."""
     held = anchored(model)
     links = [link for link in model.links if model.static or link.name in held]
     collisions = tuple(collision for link in links for collision in link.collisions)
@@ -105,7 +107,7 @@ def _boxes(model: Model) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
 
 
 def _below(plane: Collision) -> Bounds:
-    """The box around all that is below `plane`."""
+    """The box around everything below `plane`."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     if plane.pose.rotation()[2, 2] > 1 - 1e-9:
         high[2] = plane.pose.position[2]

@@ -33,7 +33,7 @@ def test_the_husky_has_four_wheels(husky):
 
 
 def test_a_robot_that_is_static_is_refused(husky):
-    with pytest.raises(UserError, match="is static, and would never move"):
+    with pytest.raises(UserError, match="is static and cannot move"):
         find_drive(replace(husky, static=True))
 
 
@@ -96,12 +96,15 @@ REFUSED = {
     ),
     "both": (
         Wheels(left=FRONT.left, right=FRONT.left),
-        "robot.wheels: joint 'front_left_wheel' is named on both sides$",
+        "robot.wheels: joint 'front_left_wheel' is listed on both sides$",
     ),
-    "twice": (Wheels(left=FRONT.left * 2, right=FRONT.right), "robot.wheels: joint 'front_left_wheel' is named twice$"),
+    "twice": (
+        Wheels(left=FRONT.left * 2, right=FRONT.right),
+        "robot.wheels: joint 'front_left_wheel' is listed twice$",
+    ),
     "swapped": (
         Wheels(left=FRONT.right, right=FRONT.left),
-        "left wheels of 'husky' are not to the left of the right ones",
+        "left wheels of 'husky' must lie to the left of the right ones",
     ),
     "upright": (
         Wheels(left=("turret",), right=FRONT.right),
@@ -164,7 +167,7 @@ def test_joints_that_are_not_named_turn_freely(husky, world_of, scenario_of):
         robot={"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}, "wheels": FRONT.model_dump()}
     )
     template = Template(world_of(), husky, scenario)
-    assert template._built.plant.num_actuators() == 2
+    assert template._context.built.plant.num_actuators() == 2
     assert template.run(frozenset(), seed=1).outcome == "pass"
 
 

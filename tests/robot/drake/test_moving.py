@@ -36,8 +36,10 @@ ALL = frozenset({"in_the_way", "lower", "upper", "crate"})
 
 
 def position(boards: Template, name: str) -> np.ndarray:
-    plant = boards._built.plant
-    return plant.EvalBodyPoseInWorld(boards._plant_context, boards._built.moving[name].base).translation()
+    plant = boards._context.built.plant
+    return plant.EvalBodyPoseInWorld(
+        boards._context.plant_context, boards._context.built.moving[name].base
+    ).translation()
 
 
 def test_boards_at_rest_do_not_creep(boards):
@@ -91,10 +93,10 @@ def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box
     rows = template.run(frozenset({"pair"}), seed=1).motions["pair"]
     assert rows[0, 1:4] == pytest.approx([0, 3, 1])
     assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)
-    upper = template._built.plant.GetBodyByName("b")
-    assert template._built.plant.EvalBodyPoseInWorld(template._plant_context, upper).translation()[2] == pytest.approx(
-        0.3, abs=0.005
-    )
+    upper = template._context.built.plant.GetBodyByName("b")
+    assert template._context.built.plant.EvalBodyPoseInWorld(template._context.plant_context, upper).translation()[
+        2
+    ] == pytest.approx(0.3, abs=0.005)
     assert "pair" not in template.run(frozenset(), seed=1).motions
 
 

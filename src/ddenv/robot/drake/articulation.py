@@ -1,8 +1,9 @@
-"""The joints of models in Drake."""
+"""Joints, poses and inertias of our models as Drake's own types."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
@@ -11,6 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BallRpyJoint,
     FixedOffsetFrame,
+    Frame,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
@@ -21,40 +23,46 @@ from pydrake.multibody.tree import (
 )
 from pydrake.multibody.tree import Joint as DrakeJoint
 
+from ddenv.arrays import Floats
 from ddenv.world.model import Inertia, Joint, Link, Model
 from ddenv.world.pose import Pose
 
 
+def to_drake(array: Floats) -> Any:
+    """`array` itself: pydrake's type stubs declare arrays in a form that no NumPy array matches."""
+    return array
+
+
 def transform(pose: Pose) -> RigidTransform:
     """`pose` as Drake's transform."""
-    return RigidTransform(Quaternion(np.array(pose.quaternion)), np.array(pose.position))
+    return RigidTransform(Quaternion(to_drake(np.array(pose.quaternion))), to_drake(np.array(pose.position)))
 
 
 def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:
-    """`inertia` about the origin of the frame `link`, in its axes. Raises RuntimeError for impossible inertias."""
+    """`inertia` about the origin of the frame `link`, in its axes. Raises RuntimeError for an impossible inertia."""
     place = transform(link.inverse() @ inertia.pose)
     central = RotationalInertia(*inertia.moments, *inertia.products).ReExpress(place.rotation())
     return SpatialInertia.MakeFromCentralInertia(inertia.mass, place.translation(), central)
 
 
-# A joint with less play than this (rad or m) is fixed.
+# A joint with less play than this (rad or m) counts as fixed.
 PLAY = 1e-4
-# Drake's ball joint has roll, pitch and yaw, and locks where the child's x axis comes to lie along the parent's z axis. These
-# axes, the same on both sides, are at different angles to each axis of the world, so that no swing about one of those,
-# as of something that was hung up straight, leads there.
+# Drake's ball joint has roll, pitch and yaw, and locks (gimbal lock) where the child's x axis is parallel to the parent's z axis.
+# These joint axes, the same on both sides, are oblique to every axis of the world, so that no swing about one of those, like that
+# of something that hangs straight down, reaches the lock.
 BALL_AXES = np.array([[0.8, 0.0, -0.6], [0.36, 0.8, 0.48], [0.48, -0.6, 0.64]])
 
 Linked = dict[str, tuple[Link, RigidBody]]
 
 
 def is_fixed(joint: Joint) -> bool:
-    """Whether `joint` lets nothing move."""
+    """Whether `joint` allows no motion."""
     limited = joint.kind in ("revolute", "prismatic")
     return joint.kind == "fixed" or (limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper)
 
 
 def anchored(model: Model) -> frozenset[str]:
-    """The links of `model` that fixed joints hold in the world: they never move."""
+    """The names of the links of `model` that fixed joints attach to the world: they never move."""
     held = {"world"}
     fixed = [joint for joint in model.joints if is_fixed(joint)]
     while new := {joint.child for joint in fixed if joint.parent in held} - held:
@@ -63,39 +71,40 @@ def anchored(model: Model) -> frozenset[str]:
 
 
 def add_joint(plant: MultibodyPlant, joint: Joint, links: Linked, instance_name: str) -> None:
-    """Adds `joint` between two of `links`, or one of them and the world."""
-    # Both frames have the same axes in the start pose, so that every position of a joint is 0 there.
-    at = RigidTransform(RotationMatrix(_axes(joint)), np.array(joint.pose.position))
-    frames = []
+    """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError for an unknown kind."""
+    # Both frames have the same axes in the start pose, so that every joint position is 0 there.
+    at = RigidTransform(RotationMatrix(to_drake(_axes(joint))), to_drake(np.array(joint.pose.position)))
+    frames: list[Frame] = []
     for end, name in (("parent", joint.parent), ("child", joint.child)):
         pose, body = (Pose(), plant.world_body()) if name == "world" else (links[name][0].pose, links[name][1])
         place = transform(pose).inverse() @ at
         frames.append(plant.AddFrame(FixedOffsetFrame(f"{instance_name}/{joint.name}/{end}", body.body_frame(), place)))
-    plant.AddJoint(_joint(joint, frames))
+    parent, child = frames
+    plant.AddJoint(_joint(joint, parent, child))
 
 
-def _axes(joint: Joint) -> np.ndarray:
-    """The axes of a joint's frames in the world, as columns: the world's, where a kind of joint needs no others."""
+def _axes(joint: Joint) -> Floats:
+    """The axes (columns of a 3 x 3 matrix) of a joint's frames in the world frame; the world's own for most kinds."""
     if joint.kind == "universal":
         first, second = np.array(joint.axis), np.array(joint.axis2)
-        # Right angles to the last bit, which those of a file are not.
+        # Exactly orthogonal: the axes of a file are so only to a few digits.
         second = second - first * (first @ second)
         second /= math.sqrt(second @ second)
         return np.column_stack([first, second, np.cross(first, second)])
     return BALL_AXES if joint.kind == "ball" else np.eye(3)
 
 
-def _joint(joint: Joint, frames: list[FixedOffsetFrame]) -> DrakeJoint:
+def _joint(joint: Joint, parent: Frame, child: Frame) -> DrakeJoint:
     if is_fixed(joint):
-        return WeldJoint(joint.name, *frames, RigidTransform())
-    axis = np.array(joint.axis)
+        return WeldJoint(joint.name, parent, child, RigidTransform())
+    axis = to_drake(np.array(joint.axis))
     match joint.kind:
         case "revolute" | "continuous":
-            return RevoluteJoint(joint.name, *frames, axis, joint.lower, joint.upper, joint.damping)
+            return RevoluteJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
         case "prismatic":
-            return PrismaticJoint(joint.name, *frames, axis, joint.lower, joint.upper, joint.damping)
+            return PrismaticJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
         case "ball":
-            return BallRpyJoint(joint.name, *frames, joint.damping)
+            return BallRpyJoint(joint.name, parent, child, joint.damping)
         case "universal":
-            return UniversalJoint(joint.name, *frames, joint.damping)
+            return UniversalJoint(joint.name, parent, child, joint.damping)
     raise ValueError(f"joint '{joint.name}': {joint.kind} joints cannot be simulated")

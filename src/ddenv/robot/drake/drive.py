@@ -1,4 +1,4 @@
-"""The drive of a robot on wheels: which joints it drives, and how fast each turns for what is commanded."""
+"""The drive of a wheeled robot: which joints are wheels, and how fast each must turn for a command."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.robot.drake.articulation import is_fixed
 from ddenv.robot.protocol import Twist, WheelSpeeds
@@ -16,17 +17,17 @@ from ddenv.world.model import Capsule, Collision, Cylinder, Ellipsoid, Joint, Li
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Wheels
 
-# How much of a wheel's axis must lie across the robot at least: a swivel or a turret is no wheel.
+# How much of a wheel's axis must point sideways: a swivel or a turret is no wheel.
 ACROSS = 0.5
-# The least distance between left and right wheels, m.
+# The minimum distance between left and right wheels, m.
 NARROWEST = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Wheel joints by name in the model's order; `left` tells the side of each. Radius and track in m.
+    """The wheel joints by name, in the model's order; `left` is True for those on the left side. `radius` and `track` in m.
 
-    `signs` are 1 where a wheel that rolls forward turns about its joint's axis, and -1 where it turns against it.
+    `signs` are 1 for wheels whose joint velocity is positive when they roll forward, and -1 for the others.
     """
 
     joints: tuple[str, ...]
@@ -35,10 +36,10 @@ class Drive:
     track: float
     signs: tuple[float, ...]
 
-    def wheel_speeds(self, command: Twist | WheelSpeeds, skid: float) -> np.ndarray:
-        """Angular speeds (rad/s) of all wheels about the axes of their joints, shape (N,).
+    def wheel_speeds(self, command: Twist | WheelSpeeds, skid: float) -> Floats:
+        """The joint velocities (N,) of all wheels, rad/s.
 
-        `skid` is the part of a commanded turn that the ground lets through. Raises ValueError for a wheel that is not there.
+        `skid` is the ratio of the robot's turn rate to the one its wheels command. Raises ValueError for an unknown wheel.
         """
         if isinstance(command, WheelSpeeds):
             return self._by_name(command)
@@ -47,17 +48,21 @@ class Drive:
         sides = zip(self.left, self.signs, strict=True)
         return np.array([sign * (left if is_left else right) for is_left, sign in sides])
 
-    def _by_name(self, command: WheelSpeeds) -> np.ndarray:
+    def _by_name(self, command: WheelSpeeds) -> Floats:
         unknown = set(command.speeds) - set(self.joints)
         if unknown:
             raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
-        return np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs
+        speeds: Floats = np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs
+        return speeds
 
 
 def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
-    """The drive of `robot`: the joints in `wheels`, or else every joint that turns about one axis. Raises UserError."""
+    """The drive of `robot`: the joints in `wheels`, or else every joint that turns about one axis.
+
+    Raises UserError for a robot that is static, or whose joints are no wheels on two sides.
+    """
     if robot.static:
-        raise UserError(f"robot '{robot.name}': is static, and would never move; take <static> out of its file")
+        raise UserError(f"robot '{robot.name}': is static and cannot move; remove <static> from its file")
     sides = _placed(robot) if wheels is None else _named(robot, wheels)
     joints = [joint for joint in robot.joints if joint.name in sides]
     across = [robot.pose.inverse().rotate(joint.axis)[1] for joint in joints]
@@ -68,12 +73,14 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
                 f"robot '{robot.name}': joint '{joint.name}' is no wheel: its axis is not across the robot{hint}"
             )
         if joint.effort == 0.0:
-            raise UserError(f"robot '{robot.name}': wheel joint '{joint.name}' has an effort of 0; give it one in N m")
+            raise UserError(
+                f"robot '{robot.name}': wheel joint '{joint.name}' has an effort limit of 0; set one in N m"
+            )
     left = [_side(robot, joint) for joint in joints if sides[joint.name]]
     right = [_side(robot, joint) for joint in joints if not sides[joint.name]]
     track = sum(left) / len(left) - sum(right) / len(right)
     if track < NARROWEST:
-        raise UserError(f"robot.wheels: the left wheels of '{robot.name}' are not to the left of the right ones")
+        raise UserError(f"robot.wheels: the left wheels of '{robot.name}' must lie to the left of the right ones")
     return Drive(
         joints=tuple(joint.name for joint in joints),
         left=tuple(sides[joint.name] for joint in joints),
@@ -84,12 +91,12 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
 
 
 def turned_links(robot: Model, joints: tuple[str, ...]) -> frozenset[str]:
-    """The names of the links that `joints` turn: their child links, and what is fixed to those."""
+    """The names of the links that `joints` turn: their child links, and all links that are fixed to those."""
     return frozenset(link.name for joint in robot.joints if joint.name in joints for link in _wheel(robot, joint))
 
 
 def footprint(robot: Model) -> tuple[float, float, float, float]:
-    """How far the collisions of `robot` reach from its origin, m: ahead, behind, to its left, to its right."""
+    """How far the collision shapes of `robot` extend from its origin, m: ahead, behind, to its left, to its right."""
     frame = robot.pose.inverse()
     boxes = [shape_bounds(one.shape, frame @ one.pose) for one in robot.collisions]
     if not boxes:
@@ -104,7 +111,7 @@ def _turns(joint: Joint) -> bool:
 
 
 def _placed(robot: Model) -> dict[str, bool]:
-    """Every joint that turns about one axis, and whether it is on the left."""
+    """Every joint that turns about one axis, and whether it lies on the left."""
     sides = {joint.name: _side(robot, joint) > 0 for joint in robot.joints if _turns(joint)}
     if set(sides.values()) != {True, False}:
         raise UserError(
@@ -115,7 +122,7 @@ def _placed(robot: Model) -> dict[str, bool]:
 
 
 def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
-    """The joints that `wheels` names, and whether they are named on the left."""
+    """The joints that `wheels` lists, and whether they are listed on the left."""
     turning = [joint.name for joint in robot.joints if _turns(joint)]
     others = {joint.name: joint.kind for joint in robot.joints if not _turns(joint)}
     these = f"joints of '{robot.name}' that turn are {', '.join(turning)}" if turning else "none of its joints turns"
@@ -128,18 +135,18 @@ def _named(robot: Model, wheels: Wheels) -> dict[str, bool]:
     name, times = Counter([*wheels.left, *wheels.right]).most_common(1)[0]
     if times > 1:
         both = "on both sides" if name in wheels.left and name in wheels.right else "twice"
-        raise UserError(f"robot.wheels: joint '{name}' is named {both}")
+        raise UserError(f"robot.wheels: joint '{name}' is listed {both}")
     return dict.fromkeys(wheels.left, True) | dict.fromkeys(wheels.right, False)
 
 
 def _side(robot: Model, joint: Joint) -> float:
-    """How far left of the model's x axis `joint` is, m."""
+    """How far `joint` lies to the left of the model's x axis, m."""
     x, y, z = (a - b for a, b in zip(joint.pose.position, robot.pose.position, strict=True))
     return robot.pose.inverse().rotate((x, y, z))[1]
 
 
 def _wheel(robot: Model, joint: Joint) -> list[Link]:
-    """The child link of `joint`, and what is fixed to it."""
+    """The child link of `joint`, and all links that are fixed to it."""
     names = {joint.child}
     fixed = [each for each in robot.joints if is_fixed(each)]
     while new := {each.child for each in fixed if each.parent in names} - names:
@@ -148,6 +155,7 @@ def _wheel(robot: Model, joint: Joint) -> list[Link]:
 
 
 def _radius(robot: Model, joint: Joint) -> float:
+    """The radius of the wheel on `joint`, m."""
     collisions = [collision for link in _wheel(robot, joint) for collision in link.collisions]
     radii = [_round(collision, joint.axis) for collision in collisions]
     if not any(radii):
@@ -157,7 +165,7 @@ def _radius(robot: Model, joint: Joint) -> float:
 
 
 def _round(collision: Collision, axis: Vector) -> float:
-    """The radius of a wheel that turns about `axis`, m; 0 for a shape that no wheel has."""
+    """The radius of a wheel that turns about `axis`, m; 0 for a shape that is not round."""
     match collision.shape:
         case Cylinder(radius) | Sphere(radius) | Capsule(radius):
             return radius
@@ -171,6 +179,6 @@ def _round(collision: Collision, axis: Vector) -> float:
     return 0.0
 
 
-def _across(axis: Vector) -> np.ndarray:
-    """Takes from a vector its part along the unit vector `axis`, shape (3, 3)."""
+def _across(axis: Vector) -> Floats:
+    """The matrix (3, 3) that removes a vector's component along the unit vector `axis`."""
     return np.eye(3) - np.outer(axis, axis)

@@ -1,6 +1,6 @@
 """Builds Drake's plant from plain data: a world's models and one robot.
 
-What never moves is registered directly on the world body, which keeps its many boxes out of the tree of moving geometry.
+What never moves is registered on the world body, which keeps its many boxes out of Drake's tree of moving geometry.
 There is no visual geometry: nobody looks at a worker.
 """
 
@@ -26,9 +26,11 @@ from ddenv.world.scenario import Simulation
 
 @dataclass(frozen=True)
 class Body:
-    """A model in the plant: its links' bodies and start poses, the first link first, and the geometry of those that can move.
+    """A model in the plant, the first link first.
 
-    `bounds` are the boxes around the links, along each one's own axes; None for a link that cannot move or has no geometry.
+    `links` are the links' bodies, `poses` their start poses in the world frame, `geometry` the collision geometry of the links that
+    can move. `bounds` are the boxes around the links in each link's own frame; None for a link that cannot move or has no
+    geometry.
     """
 
     name: str
@@ -45,9 +47,10 @@ class Body:
 
 @dataclass(frozen=True)
 class Built:
-    """The plant of a world: `moving` holds the dynamic models in the file's order, `static` what never moves of each model.
+    """The plant of a world.
 
-    That is the geometry of static models, and of the links of dynamic ones that are fixed in the world.
+    `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
+    world. `moving` are the dynamic models in the order of the world file.
     """
 
     diagram: Diagram
@@ -67,7 +70,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         time_step=simulation.time_step,
         contact_model="point",
         discrete_contact_approximation=simulation.contact,
-        # Outputs that follow the state need no extra state, and nothing then has to be reset between two runs.
+        # Sampled outputs would be extra state to reset between two runs.
         use_sampled_output_ports=False,
     )
     builder = DiagramBuilder()
@@ -75,8 +78,8 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
     wheels = wheel_friction(robot, drive)
     static = {model.name: _add_static(plant, model, wheels) for model in world.models}
-    # The order in which moving models are added decides the order of the solver's unknowns, hence the last bits of every
-    # result: it is always the file's order, with the robot first.
+    # The order in which moving models are added is the order of the solver's unknowns, which decides the last bits of every
+    # result. It is always the file's order, with the robot first.
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
     _add_motors(plant, robot, drive, driver, motor_gain)
     moving = {
@@ -108,7 +111,7 @@ def _add_moving(
     geometry: list[GeometryId] = []
     bounds: list[Bounds | None] = []
     for link, body in zip(model.links, bodies, strict=True):
-        free = () if link.name in held else (link,)
+        free: tuple[Link, ...] = () if link.name in held else (link,)
         geometry += _register(plant, body, link.pose.inverse(), free, wheels, corners=wheels is not None)
         bounds.append(solid_bounds(link.collisions, link.pose.inverse()) if free else None)
     if not model.self_collide:
@@ -132,7 +135,7 @@ def _inertia(model: Model, link: Link) -> SpatialInertia:
 
 
 def _weighs(model: Model, link: Link) -> bool:
-    """Whether `link`, or anything that fixed joints hold to it, has a mass."""
+    """Whether `link`, or anything that fixed joints attach to it, has a mass."""
     together = {link.name}
     pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
     while new := {name for pair in pairs if pair & together for name in pair} - together:
@@ -149,13 +152,13 @@ def _add_motors(plant: MultibodyPlant, robot: Model, drive: Drive, body: Body, g
 def _register(
     plant: MultibodyPlant, body: RigidBody, frame: Pose, links: Iterable[Link], wheels: float | None, corners: bool
 ) -> list[GeometryId]:
-    """Registers the collisions of `links` on `body`; `frame` is the world seen from the body."""
+    """Registers the collisions of `links` on `body`; `frame` is the pose of the world in the body's frame."""
     identities = []
     for link in links:
         for collision in link.collisions:
             mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
             for shape, pose in drake_shapes(collision, corners):
-                # Drake wants names that differ; nobody reads them.
+                # Drake requires different names; nothing reads them.
                 name = str(plant.num_collision_geometries())
                 identities.append(
                     plant.RegisterCollisionGeometry(body, transform(frame @ pose), shape, name, surface(mu))

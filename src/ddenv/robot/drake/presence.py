@@ -1,4 +1,4 @@
-"""Which geometry touches which in a context: models are removed and put back without building the plant anew."""
+"""Which geometry can touch which in a context: removes models and puts them back without building a new plant."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ddenv.robot.drake.plant import Body, Built
 class Presence:
     """The collision filters of one context.
 
-    Moving models touch nothing but what they are joined to with `join`. Only pairs of different models are ever excluded and
-    allowed again, so that what is filtered within a model stays so. (Filters that Drake could take back itself would copy all
-    pairs of the world: 170 ms instead of 3 in a world of 1300 boxes.)
+    Moving models touch only what `join` has connected them with. Filters are only ever set between different models, so that the
+    filters within a model stay. (Drake's transient filters, which it could take back itself, copy all pairs of the world: 170 ms
+    instead of 3 in a world of 1300 boxes.)
     """
 
     def __init__(self, built: Built, context: Context) -> None:
@@ -31,9 +31,9 @@ class Presence:
         self.part(tuple(built.moving.values()), ())
 
     def remove(self, removed: frozenset[str]) -> None:
-        """From now on the world is without what never moves of the models `removed`; moving ones are simply not joined.
+        """Removes what never moves of the models `removed`, and puts back all others. Moving models are simply not joined.
 
-        Only what differs from the last time costs: a world is mostly run again, or with few models more or less.
+        Only the difference to the last call costs time: most runs keep nearly the same models as the run before.
         """
         gone, back = self._static(removed - self._removed), self._static(self._removed - removed)
         if gone:
@@ -46,7 +46,7 @@ class Presence:
 
     @contextmanager
     def without_robot(self) -> Iterator[None]:
-        """The world in which the robot touches nothing that is kept."""
+        """The robot touches nothing that is kept and never moves."""
         self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(self._ground, self._robot))
         try:
             yield
@@ -55,7 +55,7 @@ class Presence:
 
     @property
     def _ground(self) -> GeometrySet:
-        """All that never moves and is kept."""
+        """Everything that never moves and is kept."""
         if self._all_kept is None:
             self._all_kept = _set(self._kept.values())
         return self._all_kept
@@ -64,14 +64,14 @@ class Presence:
         return [geometry for name in names if (geometry := self._built.static.get(name))]
 
     def join(self, bodies: Sequence[Body], others: Sequence[Body], robot: bool = True) -> None:
-        """Lets `bodies` touch each other, `others`, what never moves and is kept, and the robot."""
+        """Lets `bodies` touch each other, `others`, what is kept and never moves, and with `robot` also the robot."""
         declaration = CollisionFilterDeclaration()
         for body, rest in self._pairs(bodies, others, robot):
             declaration.AllowBetween(body, rest)
         self._filters.Apply(declaration)
 
     def part(self, bodies: Sequence[Body], others: Sequence[Body]) -> None:
-        """Takes `join` back: `others` are those that `bodies` could touch besides each other."""
+        """Undoes `join`. `others` are the moving models that `bodies` could touch besides each other."""
         declaration = CollisionFilterDeclaration()
         for body, rest in self._pairs(bodies, others, True):
             declaration.ExcludeBetween(body, rest)
@@ -88,7 +88,7 @@ class Presence:
             yield mine, self._ground_of(body)
 
     def _ground_of(self, body: Body) -> GeometrySet:
-        """What never moves, but for the model's own links: a door does not touch its frame."""
+        """What is kept and never moves, without the model's own links: a door does not touch its frame."""
         if not self._built.static.get(body.name):
             return self._ground
         return _set(geometry for name, geometry in self._kept.items() if name != body.name)

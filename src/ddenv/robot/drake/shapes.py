@@ -1,4 +1,4 @@
-"""The shapes of collisions in Drake, and the small spheres on which moving ones rest."""
+"""Collision shapes in Drake, their surfaces, and the small spheres on which moving models rest."""
 
 from __future__ import annotations
 
@@ -14,32 +14,33 @@ from pydrake.geometry import Shape as DrakeShape
 from pydrake.geometry import Sphere as DrakeSphere
 from pydrake.multibody.plant import CoulombFriction
 
+from ddenv.arrays import Floats
+from ddenv.robot.drake.articulation import to_drake
 from ddenv.robot.drake.drive import Drive, turned_links
 from ddenv.world.extent import Bounds, shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
-# Every surface has the same compliance, written down because Drake would otherwise derive it from the masses of the
-# world, and removing a model would change the contacts of all others. Two such surfaces in series give 1e5 N/m: a
-# Husky sinks in by 1.4 mm.
+# Every surface has the same compliance. It is explicit because Drake would otherwise derive it from the masses in the world, and
+# removing a model would change the contacts of all others. Two such surfaces in series give 1e5 N/m: a Husky sinks in by 1.4 mm.
 STIFFNESS = 2e5  # N/m
 DISSIPATION = 5.0  # s/m, Hunt-Crossley
 
 
 def wheel_friction(robot: Model, drive: Drive) -> float:
-    """The friction coefficient of the robot's driven wheels, the largest if they differ."""
+    """The friction coefficient of the robot's driven wheels; the largest if they differ."""
     wheels = turned_links(robot, drive.joints)
     return max((one.mu for link in robot.links if link.name in wheels for one in link.collisions), default=0.0)
 
 
 def world_friction(mu: float, wheels: float) -> float:
-    """The coefficient that Drake is given for a surface of the world, so that the robot's wheels grip it as in Gazebo.
+    """The friction coefficient of a surface of the world in Drake, so that the robot's wheels grip it as in Gazebo.
 
     Gazebo's ODE takes the smaller of two surfaces' coefficients, m = min(mu, wheels). Drake combines a and b as
-    2 a b / (a + b), which is m for b = wheels and 1 / a = 2 / m - 1 / b. The robot's own surfaces keep their coefficients. So
-    contact with the wheels is exact. Between two surfaces of the world the combination lies between half the smaller and
-    the smaller (each taken as at most `wheels`), and is the smaller if the other is at least as rough as the wheels. Between
-    another part of the robot and the world it lies between half the smaller and twice the smaller.
+    2 a b / (a + b), which is m for b = wheels and 1 / a = 2 / m - 1 / b. The robot's own surfaces keep their coefficients, so
+    contact with the wheels is exact. Between two surfaces of the world, Drake's result lies between half the smaller coefficient and
+    the smaller one (with both limited to `wheels`); it is the smaller one if the other surface is at least as rough as the
+    wheels. Between the world and another part of the robot it lies between half the smaller and twice the smaller.
     """
     grip = min(mu, wheels)
     return 1.0 / (2.0 / grip - 1.0 / wheels) if grip > 0.0 else 0.0
@@ -48,7 +49,7 @@ def world_friction(mu: float, wheels: float) -> float:
 def surface(mu: float) -> ProximityProperties:
     """A surface with Drake's friction coefficient `mu`.
 
-    Static and dynamic friction are the same: a difference makes wheels stick and slip at the time step's rate.
+    Static and dynamic friction are equal: with a difference, wheels stick and slip at the rate of the time steps.
     """
     properties = ProximityProperties()
     AddContactMaterial(DISSIPATION, STIFFNESS, CoulombFriction(mu, mu), properties)
@@ -56,12 +57,13 @@ def surface(mu: float) -> ProximityProperties:
 
 
 CORNER_RADIUS = 0.002  # m
+# Around a cylinder's rim, and on a convex mesh at most.
 RIM_CORNERS = 8
 MESH_CORNERS = 32
 
 
 def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | None:
-    """The box around `collisions` along the axes of `frame` (the world seen from it); None if there are none."""
+    """The box around `collisions` along the axes of a frame; `frame` is the world's pose in it. None if there are none."""
     boxes = [shape_bounds(one.shape, frame @ one.pose) for one in collisions]
     if not boxes:
         return None
@@ -70,9 +72,9 @@ def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | Non
 
 
 def drake_shapes(collision: Collision, corners: bool) -> list[tuple[DrakeShape, Pose]]:
-    """What `collision` is in Drake, and where; with `corners` also the spheres on which it rests when it moves.
+    """The Drake shapes of `collision` and their poses; with `corners` also the spheres on which a moving model rests.
 
-    A face that rests on one point of contact alone would creep.
+    A face that rests on a single contact point would creep.
     """
     shape, pose = collision.shape, collision.pose
     shapes = [(drake_shape(shape), pose)]
@@ -82,6 +84,7 @@ def drake_shapes(collision: Collision, corners: bool) -> list[tuple[DrakeShape, 
 
 
 def drake_shape(shape: Shape) -> DrakeShape:
+    """`shape` as Drake's own. Raises ValueError for a shape that cannot be simulated."""
     match shape:
         case Box(size):
             return DrakeBox(*size)
@@ -94,12 +97,12 @@ def drake_shape(shape: Shape) -> DrakeShape:
         case Ellipsoid(radii):
             return DrakeEllipsoid(*radii)
         case Mesh(origin, vertices):
-            return Convex(points=np.asfortranarray(vertices.T, dtype=float), label=origin)
+            return Convex(points=to_drake(np.asfortranarray(vertices.T, dtype=float)), label=origin)
     raise ValueError(f"{type(shape).__name__} cannot be simulated")
 
 
 def corners_of(shape: Shape) -> list[Vector]:
-    """Centres of spheres just inside the corners of `shape`, in its frame; none for what has no flat face."""
+    """The centres of spheres just inside the corners of `shape`, in its frame, m; none for a shape without flat faces."""
     match shape:
         case Box(size):
             x, y, z = (max(side / 2 - CORNER_RADIUS, 0.0) for side in size)
@@ -114,7 +117,7 @@ def corners_of(shape: Shape) -> list[Vector]:
 
 
 def _mesh_corners(mesh: Mesh) -> list[Vector]:
-    """At most 32 of a convex mesh's vertices, far from each other, each moved inside the faces that meet in it."""
+    """Up to `MESH_CORNERS` vertices of a convex mesh, far from each other, each moved inside the faces that meet there."""
     edges = mesh.vertices[mesh.faces[:, 1:]] - mesh.vertices[mesh.faces[:, :1]]
     normals = np.cross(edges[:, 0], edges[:, 1])
     areas = np.linalg.norm(normals, axis=1)
@@ -125,18 +128,18 @@ def _mesh_corners(mesh: Mesh) -> list[Vector]:
     for number in used[_spread(mesh.vertices[used], MESH_CORNERS)]:
         vertex = mesh.vertices[number]
         around = normals[(faces == number).any(axis=1)]
-        # As deep as the sphere's radius behind each face; least squares where more than three of them meet.
+        # At the sphere's radius behind each face; least squares where more than three faces meet.
         inward = -CORNER_RADIUS * np.linalg.lstsq(around, np.ones(len(around)), rcond=1e-3)[0]
-        # In a needle's point that would be beyond the middle.
-        furthest = np.linalg.norm(middle - vertex)
-        inward *= min(1.0, furthest / max(np.linalg.norm(inward), 1e-12))
+        # At the tip of a needle this could lead beyond the middle.
+        furthest = float(np.linalg.norm(middle - vertex))
+        inward *= min(1.0, furthest / max(float(np.linalg.norm(inward)), 1e-12))
         x, y, z = (vertex + inward).tolist()
         centers.append((x, y, z))
     return centers
 
 
-def _spread(points: np.ndarray, count: int) -> list[int]:
-    """At most `count` of `points` (N, 3): the first, and then always the one farthest from all that were taken."""
+def _spread(points: Floats, count: int) -> list[int]:
+    """Indices of up to `count` of `points` (N, 3): the first, then always the one farthest from all chosen ones."""
     taken = [0]
     distances = np.linalg.norm(points - points[0], axis=1)
     while len(taken) < min(count, len(points)):

@@ -1,1 +1,1 @@
-"""Models that can move: which are simulated, held, or played back."""
+"""Models that can move: which ones are simulated, held still, or played back."""

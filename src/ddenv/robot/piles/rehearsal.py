@@ -1,8 +1,8 @@
-"""How models move while nobody comes near them: worked out once for each pile, and played back in every run.
+"""How piles move while nobody comes near them: simulated once for each pile, and played back in every run.
 
-A pile that is simulated together with the robot would change the last bits of the robot's motion, also from far away: the
+A pile that is simulated together with the robot would change the last bits of the robot's motion, even from far away: the
 solver ends its iterations for all contacts of the world at once. So each pile that starts away from the robot is simulated
-alone, and is played back until the robot, or something that it set in motion, comes near.
+alone, and played back until the robot, or something that the robot set in motion, comes near.
 """
 
 from __future__ import annotations
@@ -13,36 +13,42 @@ from itertools import pairwise
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
 
-from ddenv.robot.clock import Clock
+from ddenv.arrays import Floats, Integers
 from ddenv.robot.drake.articulation import anchored
-from ddenv.robot.drake.plant import Body, Built
-from ddenv.robot.drake.presence import Presence
-from ddenv.robot.piles.moving_models import Hold, Links, Motion, gaps, spread
+from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
+from ddenv.robot.piles.moving_links import Links, Motion, gaps, spread
 from ddenv.world.extent import model_bounds
 from ddenv.world.model import Model, World
+
+NEAR = 0.1  # m; models this near to something that moves are simulated with it
+SLOW = 0.03  # m/s
+CALM = 0.3  # s; a model that was slow for this long is at rest
+# The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
+BUDGET = 200.0
+LEAST = 1.0
 
 
 @dataclass(frozen=True)
 class Script:
-    """How a pile moves alone: its models by `names` in the file's order, and a row for each instant at which something is due.
+    """How a pile moves alone, with a row for each tick of the clock.
 
-    `states` are the pile's positions and velocities in the order of `Hold.entries`, `motions` and `paces` (`Links.pace`, m/s)
-    those of its links. With `rests` all of it is at rest after the last row, or has fallen out of the world; otherwise it still
-    moves.
+    `names` are its models in the order of the world file. `states` (T, E) are the pile's positions and velocities in the order of
+    `Hold.entries`; `motions` and `paces` (T of each; `Links.pace`, m/s) are those of its links. `rests` is True if everything is
+    at rest after the last row, or has fallen out of the world, and False if something still moves.
     """
 
     names: tuple[str, ...]
-    states: np.ndarray
+    states: Floats
     motions: tuple[Motion, ...]
-    paces: tuple[np.ndarray, ...]
+    paces: tuple[Floats, ...]
     rests: bool
 
 
 @dataclass(frozen=True)
 class Known:
-    """`script` holds where of the static models `near` just `present` are kept. None: the simulation broke."""
+    """`script` is valid while exactly `present` of the static models `near` are kept. None: the simulation broke."""
 
     near: frozenset[str]
     present: frozenset[str]
@@ -50,7 +56,7 @@ class Known:
 
 
 class Repertoire:
-    """What is known of the piles of one world. `moving` is the number of its models that move."""
+    """The scripts of one world's piles. `moving` is the number of its models that can move."""
 
     def __init__(self, world: World) -> None:
         self.moving = sum(1 for model in world.models if not model.static and model.links)
@@ -58,92 +64,68 @@ class Repertoire:
         self._static = {model.name: model_bounds(model) for model in world.models if _has_static(model)}
 
     def find(self, names: tuple[str, ...], present: frozenset[str]) -> Known | None:
-        """What is known of the pile of the models `names` where the models `present` are kept; None if it is unknown."""
+        """The script of the pile `names` in a world that keeps the models `present`; None if it was not rehearsed yet."""
         candidates = self._known.get(names, ())
         return next((known for known in candidates if known.near & present == known.present), None)
 
     def add(self, names: tuple[str, ...], present: frozenset[str], script: Script | None, margin: float) -> None:
-        """Keeps the script of a pile, which can meet what is `margin` (m) away from it."""
+        """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
         near = frozenset(self._static) if script is None else frozenset(self._near(script.motions, margin))
         self._known.setdefault(names, []).append(Known(near, near & present, script))
 
     def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:
-        """The static models that a pile could have met on its way."""
+        """The static models that a pile could have touched while it moved."""
         low = np.min([motion.low.min(axis=0) for motion in motions], axis=0) - margin
         high = np.max([motion.high.max(axis=0) for motion in motions], axis=0) + margin
         return (name for name, box in self._static.items() if box and (box[0] < high).all() and (low < box[1]).all())
 
 
 def _has_static(model: Model) -> bool:
-    """Whether something of `model` never moves and can be touched."""
+    """Whether `model` has a collision shape that never moves."""
     held = anchored(model)
     links = (link for link in model.links if model.static or link.name in held)
     return any(link.collisions for link in links)
 
 
-NEAR = 0.1  # m; models this near to something that moves are simulated with it
-SLOW = 0.03  # m/s
-CALM = 0.3  # s; what was slow for so long is at rest
-# Simulated time for the rehearsals of all models of a world that never come to rest, and the least for each of them, s.
-BUDGET = 200.0
-LEAST = 1.0
-
-
 class Rehearsals:
-    """Works out the scripts of piles in one plant, each that is not in the `repertoire` of its world."""
+    """Simulates the piles of one plant whose scripts are not in the world's `repertoire` yet."""
 
-    def __init__(
-        self,
-        repertoire: Repertoire,
-        built: Built,
-        context: Context,
-        presence: Presence,
-        hold: Hold,
-        clock: Clock,
-        floor: float,
-    ) -> None:
-        """`floor` (m) is the height below which a model has fallen out of the world."""
+    def __init__(self, repertoire: Repertoire, context: RunContext) -> None:
         self._repertoire = repertoire
-        self._built = built
         self._context = context
-        self._plant_context = built.plant.GetMyMutableContextFromRoot(context)
-        self._presence = presence
-        self._hold = hold
-        self._clock = clock
-        self._floor = floor
-        self._bodies = tuple(built.moving.values())
+        self._plant = context.built.plant
+        self._bodies = tuple(context.built.moving.values())
         # The same for every run in this world, whatever is kept: removing a model must not end the script of another.
         self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
-        hold.begin()
+        context.hold.begin()
         self._apart, self._to_robot = self._start_gaps()
 
     def scripts(self, kept: Sequence[Body], present: frozenset[str]) -> list[Script]:
-        """The scripts of all piles of `kept` that start away from the robot, where the models `present` are kept.
+        """The scripts of all piles of `kept` that start away from the robot, in a world that keeps the models `present`.
 
-        To be called after `Presence.remove` of those which are not.
+        Call it after `Presence.remove` of all other models.
         """
         piles = self._piles({body.name for body in kept})
         found = [self._find(pile, present) for pile in piles]
         missing = [pile for pile, known in zip(piles, found, strict=True) if known is None]
         if missing:
-            with self._presence.without_robot():
+            with self._context.presence.without_robot():
                 for pile in missing:
                     self._rehearse(pile, present)
             found = [self._find(pile, present) for pile in piles]
         return [known.script for known in found if known is not None and known.script is not None]
 
-    def _start_gaps(self) -> tuple[np.ndarray, np.ndarray]:
-        """Between all moving models, and from each to the robot, as they start."""
+    def _start_gaps(self) -> tuple[Floats, Floats]:
+        """The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m."""
         if not self._bodies:
             return np.empty((0, 0)), np.empty(0)
-        links, robot = Links.of(self._bodies), Links.of([self._built.robot])
-        plant = self._built.plant
-        there = links.observe(plant, self._plant_context, range(len(links.bodies)))
-        here = robot.observe(plant, self._plant_context, range(len(robot.bodies)))
+        links, robot = Links.of(self._bodies), Links.of([self._context.built.robot])
+        there = links.observe(self._plant, self._context.plant_context, range(len(links.bodies)))
+        here = robot.observe(self._plant, self._context.plant_context, range(len(robot.bodies)))
         return gaps(links, there, links, there), gaps(robot, here, links, there)[0]
 
     def _piles(self, names: set[str]) -> list[tuple[Body, ...]]:
-        """The models `names` in groups that start near each other, but for groups near the robot."""
+        """The models `names` in groups that start near each other, without the groups that start near the robot."""
         numbers = [number for number, body in enumerate(self._bodies) if body.name in names]
         joined = self._apart[np.ix_(numbers, numbers)] < NEAR
         left = ~spread(self._to_robot[numbers] < NEAR, joined)
@@ -162,45 +144,48 @@ class Rehearsals:
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> None:
         script = self._simulate(pile)
         fastest = max(motion.speed.max() for motion in script.motions) if script else 0.0
-        self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._clock.period)
+        self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._context.clock.period)
 
     def _simulate(self, pile: tuple[Body, ...]) -> Script | None:
-        """The pile alone in the world, until all of it rests or it has had its time; None if the simulation breaks."""
-        entries = self._hold.entries(pile)
-        self._context.SetTime(0.0)
-        self._hold.begin(others=(self._built.robot,))
-        self._hold.release(entries, self._hold.start[entries])
-        self._hold.apply()
-        self._presence.join(pile, (), robot=False)
+        """Simulates the pile alone until all of it rests or its time is up; None if the simulation breaks."""
+        hold, presence = self._context.hold, self._context.presence
+        entries = hold.entries(pile)
+        self._context.diagram_context.SetTime(0.0)
+        hold.begin(others=(self._context.built.robot,))
+        hold.release(entries, hold.start[entries])
+        hold.apply()
+        presence.join(pile, (), robot=False)
         try:
             return self._rows(pile, entries)
-        # Drake raises SystemExit where a condition of its own failed.
+        # Drake raises SystemExit when one of its own checks fails.
         except (RuntimeError, ValueError, SystemExit):
             return None
         finally:
-            self._presence.part(pile, ())
+            presence.part(pile, ())
 
-    def _rows(self, pile: tuple[Body, ...], entries: np.ndarray) -> Script:
-        """Simulates what is released, and writes down the pile each time that something is due."""
-        plant, links = self._built.plant, Links.of(pile)
-        motors = plant.get_desired_state_input_port(self._built.robot.instance)
-        motors.FixValue(self._plant_context, np.zeros(motors.size()))
-        simulator = Simulator(self._built.diagram, self._context)
+    def _rows(self, pile: tuple[Body, ...], entries: Integers) -> Script:
+        """Simulates what was released, and records the pile at each tick."""
+        built, plant_context, hold = self._context.built, self._context.plant_context, self._context.hold
+        links = Links.of(pile)
+        motors = self._plant.get_desired_state_input_port(built.robot.instance)
+        motors.FixValue(plant_context, np.zeros(motors.size()))
+        simulator = Simulator(built.diagram, self._context.diagram_context)
         everything = range(len(links.bodies))
-        states = [self._hold.state()[entries]]
-        motions, paces = [links.observe(plant, self._plant_context, everything)], [np.zeros(len(everything))]
+        states = [hold.state()[entries]]
+        motions = [links.observe(self._plant, plant_context, everything)]
+        paces: list[Floats] = [np.zeros(len(everything))]
         calm = 0.0
-        for before, tick in pairwise(self._clock.ticks):
+        for before, tick in pairwise(self._context.clock.ticks):
             simulator.AdvanceTo(tick.time)
-            states.append(self._hold.state()[entries])
+            states.append(hold.state()[entries])
             if not np.isfinite(states[-1]).all():
                 raise ValueError("not finite")
-            seconds = (tick.step - before.step) * self._clock.step
-            motions.append(links.observe(plant, self._plant_context, everything))
+            seconds = (tick.step - before.step) * self._context.clock.step
+            motions.append(links.observe(self._plant, plant_context, everything))
             paces.append(links.pace(everything, motions[-2], motions[-1], seconds))
-            rests = ((paces[-1] < SLOW) | motions[-1].below(self._floor)).all()
+            rests = ((paces[-1] < SLOW) | motions[-1].below(self._context.floor)).all()
             calm = calm + seconds if rests else 0.0
-            self._hold.apply()
+            hold.apply()
             if calm >= CALM or tick.time >= self._longest:
                 break
         return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), rests=calm >= CALM)

@@ -1,0 +1,132 @@
+"""The links of models that can move: the boxes around them, their speeds, and the gaps between models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import Context
+
+from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.drake.plant import Body
+
+# Half the size of a box around nothing: no other box is ever near it, m.
+NOTHING = -1e6
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where N links are and how fast they move.
+
+    `low` and `high` (N, 3) are the corners of the boxes around the links along the world's axes, m. No point of a link is
+    faster than its `speed` (N,), m/s. `places` (N, 3) m and `turns` (N, 3, 3) are the links' poses in the world frame.
+    """
+
+    low: Floats
+    high: Floats
+    speed: Floats
+    places: Floats
+    turns: Floats
+
+    @classmethod
+    def still(cls, count: int) -> Motion:
+        """`count` links at rest at the world's origin."""
+        zeros = np.zeros((count, 3))
+        return cls(zeros, zeros.copy(), np.zeros(count), zeros.copy(), np.zeros((count, 3, 3)))
+
+    def of(self, numbers: Sequence[int]) -> Motion:
+        """The motion of the links `numbers` alone."""
+        return Motion(*(part[numbers] for part in self._parts()))
+
+    def put(self, numbers: Sequence[int], other: Motion) -> None:
+        """Overwrites the motion of the links `numbers` with `other`."""
+        for mine, others in zip(self._parts(), other._parts(), strict=True):
+            mine[numbers] = others
+
+    def below(self, height: float) -> Booleans:
+        """Which links (N,) lie completely below `height` (m)."""
+        # A box around nothing has its highest corner below its lowest.
+        empty = self.high[:, 2] < self.low[:, 2]
+        below: Booleans = np.where(empty, self.places[:, 2], self.high[:, 2]) < height
+        return below
+
+    def _parts(self) -> tuple[Floats, ...]:
+        return self.low, self.high, self.speed, self.places, self.turns
+
+
+@dataclass(frozen=True)
+class Links:
+    """All N links of M models, one model after the other; model m begins at link `first[m]`.
+
+    `centers` and `halves` (N, 3) m are the boxes around the links along their own axes, `reach` (N,) m the distance of their
+    farthest corners from the links' origins.
+    """
+
+    bodies: tuple[RigidBody, ...]
+    first: Integers
+    centers: Floats
+    halves: Floats
+    reach: Floats
+
+    @classmethod
+    def of(cls, models: Sequence[Body]) -> Links:
+        bounds = [bounds for model in models for bounds in model.bounds]
+        centers = np.array([(one[0] + one[1]) / 2 if one else np.zeros(3) for one in bounds]).reshape(-1, 3)
+        halves = np.array([(one[1] - one[0]) / 2 if one else np.full(3, NOTHING) for one in bounds]).reshape(-1, 3)
+        return cls(
+            bodies=tuple(link for model in models for link in model.links),
+            first=np.cumsum([0, *(len(model.links) for model in models)], dtype=int)[:-1],
+            centers=centers,
+            halves=halves,
+            reach=np.linalg.norm(np.abs(centers) + np.maximum(halves, 0.0), axis=1),
+        )
+
+    def observe(self, plant: MultibodyPlant, context: Context, numbers: Sequence[int]) -> Motion:
+        """The motion of the links `numbers` in `context`, a context of `plant`."""
+        poses = [plant.EvalBodyPoseInWorld(context, self.bodies[number]) for number in numbers]
+        turns = np.array([pose.rotation().matrix() for pose in poses]).reshape(-1, 3, 3)
+        places = np.array([pose.translation() for pose in poses]).reshape(-1, 3)
+        rates = [plant.EvalBodySpatialVelocityInWorld(context, self.bodies[number]) for number in numbers]
+        turning = np.linalg.norm(np.array([rate.rotational() for rate in rates]).reshape(-1, 3), axis=1)
+        moving = np.linalg.norm(np.array([rate.translational() for rate in rates]).reshape(-1, 3), axis=1)
+        centers = np.einsum("nij,nj->ni", turns, self.centers[numbers]) + places
+        halves = np.einsum("nij,nj->ni", np.abs(turns), self.halves[numbers])
+        return Motion(centers - halves, centers + halves, moving + turning * self.reach[numbers], places, turns)
+
+    def pace(self, numbers: Sequence[int], before: Motion, after: Motion, seconds: float) -> Floats:
+        """The mean speed (K,) of each link's fastest point between two motions that lie `seconds` apart, m/s.
+
+        Unlike `Motion.speed` it is small for links that only tremble, as boards do that lie across each other.
+        """
+        way = np.linalg.norm(after.places - before.places, axis=1)
+        turn = np.linalg.norm(after.turns - before.turns, axis=(1, 2)) / np.sqrt(2.0)
+        return cast(Floats, (way + turn * self.reach[numbers]) / seconds)
+
+    def of_models(self, numbers: Sequence[int] | Integers) -> list[int]:
+        """The numbers of all links of the models `numbers`."""
+        ends = [*self.first[1:], len(self.bodies)]
+        return [link for number in numbers for link in range(self.first[number], ends[number])]
+
+
+def gaps(a: Links, of_a: Motion, b: Links, of_b: Motion) -> Floats:
+    """The gaps (A, B) between the models of `a` and those of `b`, m: along the axis where the gap is widest.
+
+    Below 0 where boxes overlap.
+    """
+    apart = np.maximum(of_a.low[:, None] - of_b.high[None], of_b.low[None] - of_a.high[:, None]).max(axis=2)
+    rows: Floats = np.minimum.reduceat(apart, a.first, axis=0)
+    return np.minimum.reduceat(rows, b.first, axis=1)
+
+
+def spread(start: Booleans, joined: Booleans) -> Booleans:
+    """`start` (N,) and all that is connected with it, directly or through others, where `joined` (N, N) is True."""
+    reached = start
+    while True:
+        wider = reached | joined[:, reached].any(axis=1)
+        if (wider == reached).all():
+            return reached
+        reached = wider
