@@ -185,10 +185,10 @@ def test_entry_points_may_point_into_classes(plugin):
 @pytest.mark.parametrize(
     ("pair", "words"),
     [
-        ("half/sequential", "partitioning 'half': its parts are not disjoint, not empty and all of E"),
+        ("half/sequential", "partitioning 'half': its partitions must be disjoint, not empty, and cover E"),
         ("needy/sequential", "partitioning 'needy': cannot be made:"),
         ("half/rude", "prioritization 'rude': large_lab.rude:order cannot be loaded: no licence"),
-        ("model2model/too-few", "prioritization 'too-few': expected a score for each of 2 parts"),
+        ("model2model/too-few", "prioritization 'too-few': expected a score for each of 2 partitions"),
     ],
 )
 def test_a_schema_that_breaks_its_word_is_told_in_one_line(plugin, pair, words):

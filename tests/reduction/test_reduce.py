@@ -105,7 +105,7 @@ def test_what_the_test_raises_comes_through():
 WRONG = {
     "no positions": (
         {},
-        "partitioning 'model2model' needs positions, which is not given; or choose another of timeseg",
+        "partitioning 'model2model' needs positions, which is missing; or use one of timeseg",
     ),
     "no trajectory": (
         {"positions": POSITIONS, "partitioning": "timeseg", "failure_pose": (0, 0, 0)},
@@ -135,13 +135,16 @@ WRONG = {
     "no n_partitions": ({"n_partitions": None}, "n_partitions: expected 2 or more, found None"),
     "a seed below zero": ({"seed": -1}, "seed: expected 0 or more, found -1"),
     "no seed": ({"seed": None}, "seed: expected 0 or more, found None"),
-    "positions in a list": ({"positions": [(0, 0, 0)] * 8}, "positions: expected names with values, found list"),
+    "positions in a list": (
+        {"positions": [(0, 0, 0)] * 8},
+        "positions: expected a mapping from names to values, found list",
+    ),
     "a place in digits": ({"positions": POSITIONS | {"a": "123"}}, "positions['a']: expected x, y, z m, found '123'"),
     "a place beyond all bounds": (
         {"positions": POSITIONS | {"a": (1e200, 0, 0)}},
         "positions['a']: expected x, y, z m",
     ),
-    "times in a list": ({"first_sensed": ["a"]}, "first_sensed: expected names with values, found list"),
+    "times in a list": ({"first_sensed": ["a"]}, "first_sensed: expected a mapping from names to values, found list"),
     "a time before the beginning": ({"first_sensed": {"a": -1e6}}, "first_sensed['a']: expected a time in s"),
     "a complex trajectory": ({"trajectory": TRAJECTORY + 1j}, "trajectory: expected finite numbers"),
     "no algorithm": ({"algorithm": None, **ALL}, "algorithm: expected a name, found None; use one of ddenv"),
@@ -191,7 +194,7 @@ def test_what_a_model_is_like_reaches_the_schemas():
 
 
 def test_two_of_one_name_are_refused():
-    with pytest.raises(ddenv.UserError, match="elements: 'a' is there twice"):
+    with pytest.raises(ddenv.UserError, match="elements: 'a' occurs twice"):
         ddenv.reduce("abca", needs("a"), algorithm="ddmin")
 
 

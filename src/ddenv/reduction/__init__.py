@@ -1,1 +1,1 @@
-"""The reduction itself, pure: partitioning, prioritization, algorithms, verdicts and statistics. It runs nothing."""
+"""The reduction itself: partitionings, prioritizations, algorithms, verdicts and rates. It is pure: it runs nothing."""

@@ -1,4 +1,7 @@
-"""The algorithms: the paper's ddenv, and ddmin, probdd and binary splitting to compare it with. Each is a generator."""
+"""The algorithms: generators that yield rounds and return the minimal environment. One function for each.
+
+An algorithm yields a `Round` and is sent the first similar candidate, or None. It runs nothing itself.
+"""
 
 from __future__ import annotations
 
@@ -13,30 +16,15 @@ from ddenv.reduction.guide import Guide, Search
 from ddenv.reduction.round import Candidate, Round, left_out, make_round, one_model_partitions, round_of
 
 
-def sweep(environment: Partition) -> Search:
-    """Rounds in which each model is left out in turn, in the environment's order, until none can be: returns what is left.
-
-    After a success the next model is the first in line, since those before it were just needed; they are tried again at the end.
-    """
-    while environment:
-        ranked = [(part, float(place)) for place, part in enumerate(one_model_partitions(environment))]
-        round = round_of(len(environment), environment, ranked, [("complement", place) for place in range(len(ranked))])
-        winner = yield round
-        if winner is None:
-            break
-        place = winner.partition
-        environment = environment[place + 1 :] + environment[:place]
-    return frozenset(environment)
-
-
 def ddenv(elements: Partition, guide: Guide) -> Search:
-    """The paper's algorithm. The environment is split into n partitions, likeliest first; each partition and its complement are
-    tried, and the first in which the failure shows becomes the environment. n grows by one after every round, and when a round of
-    single models and their complements shows nothing, no single model can be removed.
+    """The paper's algorithm. Each round splits the environment into n partitions and tries them in the order of the prioritization,
+    each followed by its complement. The first candidate that shows the failure becomes the environment. n grows with the rounds.
+    The search ends when a round of single models and their complements shows nothing: no single model can be removed.
 
-    n is at most |E|. (Algorithm 1 as printed counts up before it checks, and would end one granularity early.) A last model is left
-    out, too: whether f needs it is not known before. With the guide's `growth` "steady" n grows only when nothing was similar, and
-    there are always n partitions; with `skip` "implied" nothing is tried that lacks all that was missed before.
+    Paper, Algorithm 1; n never exceeds |E|. (As printed, it increments n before it checks, and would end one granularity early.)
+    The last model is tested, too: f may need no model at all. With the guide's `growth` "steady", n grows only after rounds that
+    found nothing, and a round always has n partitions; with `skip` "implied", candidates that lack everything that was missed before are
+    skipped.
     """
     environment, n = elements, guide.n_partitions
     missed: list[frozenset[str]] = []
@@ -47,7 +35,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
         round = make_round(n, environment, ranked, guide.candidates, guide.complement_order)
         if guide.skip == "implied":
             round = _without_implied(round, missed)
-        # Everything may be implied.
+        # All candidates may be implied.
         winner = (yield round) if round.candidates else None
         missed = _missed(round, winner, missed)
         if winner is not None:
@@ -66,14 +54,14 @@ def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
     partitions = guide.split(environment, n)
     if guide.growth == "steady":
         return _halved(partitions, n, guide)
-    # A split that leaves all models together is no split (paper, section III-B).
+    # A split that leaves all models together does not count (paper, section III-B).
     return partitions if len(partitions) > 1 else one_model_partitions(environment)
 
 
 def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition]:
-    """As many as n partitions: the largest are halved, by what their models would rank alone.
+    """Exactly n partitions: halves the largest, in the order in which its models would rank alone.
 
-    Where a robot stands still, one instant may be nearest to thousands of models: no split by time tells them apart.
+    Where a robot stands still, one instant may be the nearest to thousands of models: no split by time separates them.
     """
     parts = list(partitions)
     while len(parts) < n:
@@ -86,10 +74,10 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
 
 
 def _missed(round: Round, winner: Candidate | None, missed: list[frozenset[str]]) -> list[frozenset[str]]:
-    """Groups of models of which at least one is needed, if f shows in every environment that holds all it needs.
+    """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
 
-    They are what candidates without f had left out, as far as it is still there. Where nothing of it is, f did not need it after
-    all: it showed by chance, or does not show in every such environment.
+    A candidate without f leaves out such a group, as far as its models are still in the environment. A group that is gone
+    altogether was not needed after all: f showed by chance, or does not show in every such environment.
     """
     failed = takewhile(lambda one: one is not winner, round.candidates)
     found = [*missed, *(one.lacks for one in failed)]
@@ -100,9 +88,9 @@ def _missed(round: Round, winner: Candidate | None, missed: list[frozenset[str]]
 
 
 def _without_implied(round: Round, missed: list[frozenset[str]]) -> Round:
-    """The round without candidates that lack a whole group of `missed`, or all that an earlier candidate of the round lacks.
+    """`round` without candidates that lack a whole group of `missed`, or everything that an earlier candidate of the round lacks.
 
-    That a single model cannot be left out is always tried: else nothing would show that the environment is minimal.
+    Leaving out a single model is always tried: else nothing would show that the environment is minimal.
     """
     lacked, worth = list(missed), []
     for one in round.candidates:
@@ -120,12 +108,12 @@ def _lacks_any(candidate: Candidate, groups: list[frozenset[str]]) -> bool:
 
 
 def ddmin(elements: Partition, guide: Guide) -> Search:
-    """Classic delta debugging. The environment is cut into n runs of models in the order of the world file; first each run is tried
-    alone, then each complement. A run that shows the failure is split in two next, a complement is kept in its n - 1 runs, and
-    when nothing shows, n doubles. It uses neither positions nor the failure's place: what space and time are worth is the
-    difference to it.
+    """Classic delta debugging. It cuts the environment into n chunks in the order of the world file, and tries first each chunk
+    alone, then each complement. A chunk that shows the failure is split in two; a complement keeps its n - 1 chunks; when nothing
+    shows the failure, n doubles. It uses neither positions nor the place of the failure, so it is the baseline that shows what
+    space and time are worth.
 
-    Tests that were made before are not made again, as the paper has it. A last model is left out, too.
+    Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too.
     """
     environment, partitions = elements, _cut(elements, 2)
     while environment:
@@ -140,19 +128,19 @@ def ddmin(elements: Partition, guide: Guide) -> Search:
         else:
             partitions = partitions[: winner.partition] + partitions[winner.partition + 1 :]
             environment = tuple(name for partition in partitions for name in partition)
-            # With one partition left it would be its own environment.
+            # A single partition would be the environment itself.
             partitions = partitions if len(partitions) > 1 else _cut(environment, 2)
     return frozenset(environment)
 
 
 def _cut(environment: Partition, n: int) -> list[Partition]:
-    """Up to n runs of neighbours, as equal in length as can be."""
+    """Up to n chunks of neighbours, as equal in length as possible."""
     size, n = len(environment), min(n, len(environment))
     return [environment[size * part // n : size * (part + 1) // n] for part in range(n)]
 
 
 def _round(environment: Partition, partitions: list[Partition]) -> Round:
-    """Subsets first, then complements."""
+    """All partitions first, then all complements."""
     n = len(partitions)
     ranked = [(partition, float(place)) for place, partition in enumerate(partitions)]
     wanted = [(kind, place) for kind in ("partition", "complement") for place in range(n)]
@@ -160,16 +148,18 @@ def _round(environment: Partition, partitions: list[Partition]) -> Round:
 
 
 def probdd(elements: Partition, guide: Guide) -> Search:
-    """Probabilistic delta debugging. Each model has a chance of being needed, at first by how near it is to the failure (or the
-    same for all, with the scenario's key `reduction.prior: uniform`). Each test leaves out the models whose loss would be the
-    greatest gain on average; if the failure does not show, the chances of those that were left out rise. When all that is left is
-    certain, each model is left out once more.
+    """Probabilistic delta debugging. Each model has a probability of being needed, at first from its distance to the failure (or
+    the same for all, with the scenario's key `reduction.prior: uniform`). Each test leaves out the group with the greatest expected
+    gain; if the failure does not show, the probabilities of the group rise. When no candidate is left, each remaining model is left
+    out once more.
+
+    Wang et al., "Probabilistic Delta Debugging", 2021.
     """
     chance = dict(zip(elements, guide.chances(elements).tolist(), strict=True))
     environment = elements
     while group := _best_group(environment, chance):
         round = left_out(group, environment)
-        # f is taken to need something: leaving out everything is not worth a test.
+        # f needs something, we assume: leaving out everything is not worth a test.
         winner = (yield round) if round.candidates else None
         if winner is None:
             _raise_chances(group, chance)
@@ -179,7 +169,7 @@ def probdd(elements: Partition, guide: Guide) -> Search:
 
 
 def _best_group(environment: Partition, chance: dict[str, float]) -> Partition:
-    """The least likely models, so many that their number times the chance that none is needed is greatest; certain ones never."""
+    """The least likely models: as many as maximize their number times the probability that none of them is needed."""
     order = [name for name in sorted(environment, key=chance.__getitem__) if chance[name] < 1.0]
     if not order:
         return ()
@@ -188,28 +178,29 @@ def _best_group(environment: Partition, chance: dict[str, float]) -> Partition:
 
 
 def _raise_chances(group: Partition, chance: dict[str, float]) -> None:
-    """Bayes' rule: one of the group is needed at least."""
+    """Bayes' rule: at least one of the group is needed."""
     some_needed = 1.0 - np.prod([1.0 - chance[name] for name in group])
     for name in group:
         chance[name] = 1.0 if len(group) == 1 else min(1.0, chance[name] / float(some_needed))
 
 
 def splitting(elements: Partition, guide: Guide) -> Search:
-    """Binary splitting. The models stand in a line, by the prioritization, the last one first: far to near. A group at the head of
-    the line is left out, so large that the failure shows with even chances; if it does not show, one of the group is needed, and
-    halves of it are left out until it is found. At the end each model is left out once more. It takes the failure for one that
-    needs all its models in every environment, and then needs about as few tests as can be.
+    """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves out a group from the far end, of
+    the size at which the failure shows with even odds. If it does not show, one of the group is needed, and halves of the group
+    are left out until that model is found. At the end each remaining model is left out once more. For failures that show whenever
+    all needed models are there, it takes close to the minimum number of tests.
     """
     line = _far_to_near(elements, guide)
     weight = dict(zip(line, -np.log1p(-guide.chances(line)), strict=True))
-    environment, suspects = line, ()
+    environment = line
+    suspects: Partition = ()
     passed = found = 0.0
     while line:
-        # How much likelier needed models are than was thought, from what was passed so far.
+        # The ratio of needed models found so far to those expected by now.
         likelier = (1.0 + found) / (1.0 + passed)
         group = _half(suspects, weight, likelier) if suspects else _head(line, weight, likelier)
         round = left_out(group, environment)
-        # f is taken to need something: leaving out everything is not worth a test.
+        # f needs something, we assume: leaving out everything is not worth a test.
         winner = (yield round) if round.candidates else None
         if winner is not None:
             environment = tuple(name for name in environment if name not in set(group))
@@ -218,10 +209,26 @@ def splitting(elements: Partition, guide: Guide) -> Search:
         else:
             suspects = group
         if len(suspects) == 1:
-            # All others that were suspected are gone.
+            # All other suspects are gone.
             passed, found = passed + weight[suspects[0]], found + 1
             line, suspects = line[1:], ()
     return (yield from sweep(environment))
+
+
+def sweep(environment: Partition) -> Search:
+    """Leaves out each model in turn, in the environment's order, until none can be left out; returns what remains.
+
+    After a success it goes on with the next model: those before were just found to be needed. They are tried again at the end.
+    """
+    while environment:
+        ranked = [(part, float(place)) for place, part in enumerate(one_model_partitions(environment))]
+        round = round_of(len(environment), environment, ranked, [("complement", place) for place in range(len(ranked))])
+        winner = yield round
+        if winner is None:
+            break
+        place = winner.partition
+        environment = environment[place + 1 :] + environment[:place]
+    return frozenset(environment)
 
 
 def _far_to_near(elements: Partition, guide: Guide) -> Partition:
@@ -230,15 +237,15 @@ def _far_to_near(elements: Partition, guide: Guide) -> Partition:
 
 
 def _head(line: Partition, weight: dict[str, float], likelier: float) -> Partition:
-    """So many models from the head of the line that none of them is needed with even chances; at least one."""
+    """The models at the head of the line of which none is needed with even odds; at least one model."""
     reach = np.cumsum([weight[name] for name in line]) * likelier
     return line[: max(1, int(np.searchsorted(reach, math.log(2.0))))]
 
 
 def _half(suspects: Partition, weight: dict[str, float], likelier: float) -> Partition:
-    """So many of the suspects, of which one is needed, that it is among them with even chances; not all of them."""
+    """The suspects, of which one is needed, that include it with even odds; never all of them."""
     reach = np.cumsum([weight[name] for name in suspects]) * likelier
-    # Solves (e^-x - e^-all) / (1 - e^-all) = 1/2: none in the first part, though some in all.
+    # Solves (e^-x - e^-all) / (1 - e^-all) = 1/2: none in the first part, but some in all.
     even = -math.log((1.0 + math.exp(-reach[-1])) / 2.0)
     nearest = int(np.argmin(np.abs(reach[:-1] - even)))
     return suspects[: nearest + 1]

@@ -1,14 +1,14 @@
-"""What an algorithm goes by: how to split and rank the environment, and where the needed models are likely to be."""
+"""The guide of an algorithm: how to split and rank the environment, and which models are likely to be needed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Any
 
 from ddenv import schemas
+from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.reduction.chance import spatial_prior, uniform_prior
 from ddenv.reduction.evidence import Evidence, Lacking, Partition
@@ -16,10 +16,10 @@ from ddenv.reduction.round import Candidate, Round
 
 Split = Callable[[Partition, int], list[Partition]]
 Rank = Callable[[Sequence[Partition]], list[float]]
-Chances = Callable[[Partition], np.ndarray]
+Chances = Callable[[Partition], Floats]
 Search = Generator[Round, Candidate | None, frozenset[str]]
 
-# What each field of the evidence is called in the words of `ddenv.reduce`.
+# The fields of the evidence in the words of `ddenv.reduce`.
 _ARGUMENTS = {
     "positions": "positions",
     "trajectory": "a trajectory",
@@ -32,11 +32,12 @@ _ARGUMENTS = {
 
 @dataclass(frozen=True)
 class Guide:
-    """`split(environment, n)` gives at most n partitions, `rank(partitions)` their scores, the lowest tried first.
+    """What an algorithm asks while it searches.
 
-    `chances(environment)` is how likely each model is needed, shape (len(environment),), before any test. `n_partitions` is where
-    ddenv begins; `candidates` and `complement_order` are those of `make_round`, `growth` ("paper" or "steady") and `skip` ("known"
-    or "implied") those of ddenv.
+    `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, of which the lowest is tried first.
+    `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test. `n_partitions`
+    is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`, `growth` ("paper" or
+    "steady") and `skip` ("known" or "implied") those of ddenv.
     """
 
     split: Split
@@ -61,10 +62,11 @@ def make_guide(
     growth: str = "paper",
     skip: str = "known",
 ) -> Guide:
-    """The schemas by name, looking at what `evidence()` gives at the moment. Raises UserError for unknown names.
+    """A guide for the schemas of these names, which look at what `evidence()` returns at that moment.
 
-    A schema that lacks what it needs raises UserError when it is used. One that is a class is made anew for each guide: it may
-    remember what it has seen. `prior` is "spatial", where positions and the failure's place are known, or "uniform".
+    Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is used. A schema that is a class is
+    instantiated for each guide: it may remember what it has seen. `prior` is "uniform", or "spatial" where positions and the place
+    of the failure are known.
     """
     split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
 
@@ -75,7 +77,7 @@ def make_guide(
             raise _complaint("partitioning", partitioning, lacking) from None
         models = [name for part in partitions for name in part]
         if not all(partitions) or len(models) != len(environment) or set(models) != set(environment):
-            raise UserError(f"partitioning '{partitioning}': its parts are not disjoint, not empty and all of E")
+            raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
         return partitions
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
@@ -84,10 +86,12 @@ def make_guide(
         except Lacking as lacking:
             raise _complaint("prioritization", prioritization, lacking) from None
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
-            raise UserError(f"prioritization '{prioritization}': expected a score for each of {len(partitions)} parts")
+            raise UserError(
+                f"prioritization '{prioritization}': expected a score for each of {len(partitions)} partitions"
+            )
         return scores
 
-    def chances_now(environment: Partition) -> np.ndarray:
+    def chances_now(environment: Partition) -> Floats:
         known = evidence()
         if prior == "uniform" or known.positions is None or known.failure_position is None:
             return uniform_prior(environment)
@@ -97,21 +101,22 @@ def make_guide(
 
 
 def search(algorithm: str, elements: Iterable[str], guide: Guide) -> Search:
-    """The algorithm by name, at its beginning. Raises UserError for an unknown name."""
-    return schemas.load("algorithm", algorithm)(tuple(elements), guide)
+    """The algorithm `algorithm`, before its first round. Raises UserError for an unknown name."""
+    found: Search = schemas.load("algorithm", algorithm)(tuple(elements), guide)
+    return found
 
 
-def _made(kind: schemas.Kind, name: str) -> Callable:
+def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:
     found = schemas.load(kind, name)
     try:
         return found() if isinstance(found, type) else found
     except TypeError as error:
-        raise UserError(f"{kind} '{name}': cannot be made: {error}") from error
+        raise UserError(f"{kind} '{name}': cannot be instantiated: {error}") from error
 
 
-def _complaint(kind: str, name: str, lacking: Lacking) -> UserError:
+def _complaint(kind: schemas.Kind, name: str, lacking: Lacking) -> UserError:
     what = str(lacking)
     others = [each for each in schemas.names(kind) if each != name]
     return UserError(
-        f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is not given; or choose another of {', '.join(others)}"
+        f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is missing; or use one of {', '.join(others)}"
     )

@@ -1,4 +1,4 @@
-"""Partitions by how likely models are needed, learnt from the tests of this run."""
+"""The partitioning `learner`: groups models by how likely they are needed, learnt from all tests of this reduction."""
 
 from __future__ import annotations
 
@@ -9,55 +9,56 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from sklearn.linear_model import SGDClassifier
 
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.reduction.chance import LEAST, MOST, beliefs, distances_to_failure, spatial_prior, undominated
 from ddenv.reduction.evidence import Evidence, Partition, Traits, Trial
 from ddenv.reduction.partitionings import grouped
 
-# Keeps weights small while there are few tests.
+# Keeps the weights small while there are few tests.
 REGULARIZATION = 0.01
 
 
 class OnlineClassifier:
-    """Logistic regression by stochastic gradient descent; the chance of a label 1."""
+    """Logistic regression by stochastic gradient descent: the probability of label 1."""
 
     def __init__(self) -> None:
         self._model: SGDClassifier | None = None
         self._mean = self._spread = np.zeros(0)
 
-    def see(self, samples: np.ndarray) -> None:
-        """All there will be, shape (N, F), before anything is learnt: what is usual of each feature."""
+    def see(self, samples: Floats) -> None:
+        """Sets the scale of each feature from `samples` (N, F). Call it before learning, with all samples there will ever be."""
         spread = samples.std(axis=0)
         self._mean, self._spread = samples.mean(axis=0), np.where(spread > 1e-9, spread, 1.0)
 
-    def learn(self, samples: np.ndarray, labels: np.ndarray, weights: np.ndarray, seed: int) -> None:
-        """One step: `samples` (N, F) with `labels` (N,) of 0 and 1 that count `weights` (N,)."""
+    def learn(self, samples: Floats, labels: Floats, weights: Floats, seed: int) -> None:
+        """Learns in one step from `samples` (N, F) with `labels` (N,), 0 or 1, and `weights` (N,)."""
         if self._model is None:
             self._model = SGDClassifier(loss="log_loss", alpha=REGULARIZATION, average=True, random_state=seed)
         with warnings.catch_warnings():
-            # Early on there may be one label only.
+            # Early on there may be one label only, about which scikit-learn warns.
             warnings.simplefilter("ignore")
             self._model.partial_fit(self._scaled(samples), labels, classes=[0, 1], sample_weight=weights)
 
-    def chances(self, samples: np.ndarray) -> np.ndarray:
-        """The chance of label 1 for each of `samples` (N, F), shape (N,); one half before anything is learnt."""
+    def chances(self, samples: Floats) -> Floats:
+        """The probability of label 1 for each of `samples` (N, F), shape (N,); one half before anything is learnt."""
         if self._model is None or not len(samples):
             return np.full(len(samples), 0.5)
-        return self._model.predict_proba(self._scaled(samples))[:, 1]
+        return np.asarray(self._model.predict_proba(self._scaled(samples))[:, 1])
 
-    def _scaled(self, samples: np.ndarray) -> np.ndarray:
+    def _scaled(self, samples: Floats) -> Floats:
         return (samples - self._mean) / self._spread
 
 
-# Distances are seen on a scale on which 1 cm more at the failure counts as much as a metre far away, m.
+# Added to distances before their logarithm is taken, so that they do not matter below this scale, m.
 NEAR = 0.1
-# The scale on which the time of sensing is seen, s.
+# The time scale on which early sensing matters, s.
 SOON = 10.0
 
 
-def features(models: Partition, evidence: Evidence) -> np.ndarray:
-    """One row for each model, shape (len(models), 9), all of the order of one; what is not known is 0.
+def features(models: Partition, evidence: Evidence) -> Floats:
+    """The features of `models`, shape (len(models), 9), all of order one; unknown ones are 0.
 
-    Distance to the end of f, mean and least distance to the path, how early it was sensed (1 at once, 0 never), whether it was
+    Distance to the end of f, mean and minimum distance to the path, how early it was sensed (1 at once, 0 never), whether it was
     sensed, whether it was touched, size, friction, whether it can move. Raises evidence.Lacking without positions or f's place.
     """
     rows = np.zeros((len(models), 9))
@@ -78,19 +79,19 @@ def features(models: Partition, evidence: Evidence) -> np.ndarray:
     return rows
 
 
-def _scaled(distances: np.ndarray) -> np.ndarray:
+def _scaled(distances: Floats) -> Floats:
     return np.log(distances + NEAR)
 
 
-Sample = tuple[np.ndarray, np.ndarray, np.ndarray]
+Sample = tuple[Floats, Floats, Floats]
 
 
 class Lessons:
-    """The tests of a reduction, as what they say of models. Each candidate is one lesson, however many models it left out.
+    """What the tests of a reduction say about models. Each candidate is one lesson, however many models it left out.
 
-    Models that were removed were not needed; of those that a candidate without f left out, one is needed. `count` is the number
-    of candidates that told something. `gone_rows` (G, F) and `gone_prior` (G,) are the features and the first chances of what
-    was removed.
+    Removed models were not needed. Of the models that a candidate without f left out, at least one is needed. `count` is the number
+    of candidates that taught something. `gone_rows` (G, F) and `gone_prior` (G,) are the features and the priors of the removed
+    models.
     """
 
     def __init__(self) -> None:
@@ -98,21 +99,21 @@ class Lessons:
         self.gone_rows = np.zeros((0, 0))
         self.gone_prior = np.zeros(0)
         self._taken = 0
-        self._rows: dict[str, np.ndarray] = {}
+        self._rows: dict[str, Floats] = {}
         self._prior: dict[str, float] = {}
         self._columns: dict[str, int] = {}
-        # Those that are left to say something: of each (T, N) whether a model of the first environment was left out.
+        # Tests that still say something: which models (T, N) of the first environment each of them left out.
         self._failed = np.zeros((0, 0), dtype=bool)
         self._new_gone = np.zeros((0, 0))
         self._new_groups: list[Partition] = []
 
     @property
     def begun(self) -> bool:
-        """Whether the first environment was seen."""
+        """Whether `take` was called yet."""
         return bool(self._columns)
 
-    def take(self, environment: Partition, rows: np.ndarray, prior: np.ndarray, trials: Sequence[Trial]) -> None:
-        """What was tested since the last time; `rows` (M, F) and `prior` (M,) are of the environment as it is now."""
+    def take(self, environment: Partition, rows: Floats, prior: Floats, trials: Sequence[Trial]) -> None:
+        """Takes in new tests; `rows` (M, F) and `prior` (M,) are the features and priors of the current environment."""
         if not self._columns:
             self._columns = {name: column for column, name in enumerate(environment)}
             self._failed = np.zeros((0, len(environment)), dtype=bool)
@@ -127,7 +128,7 @@ class Lessons:
         self.count += len(self._new_groups) + bool(gone)
 
     def _failures(self, environment: Partition, trials: Sequence[Trial]) -> list[Partition]:
-        """What new candidates without f had left out of the environment as it is now."""
+        """The groups that new candidates without f left out of the current environment."""
         fresh, self._taken = trials[self._taken :], len(trials)
         similar = {trial.models for trial in fresh if trial.similar}
         failed = dict.fromkeys(trial.models for trial in fresh if trial.models not in similar)
@@ -136,20 +137,20 @@ class Lessons:
         groups = (tuple(name for name in environment if name not in models) for models in failed)
         return [group for group in groups if group]
 
-    def groups(self, environment: Partition) -> np.ndarray:
-        """Of each row (T, M) at least one model is needed: those that a candidate without f had left out.
+    def groups(self, environment: Partition) -> Booleans:
+        """Groups (T, M) of which at least one model is needed: those that candidates without f left out.
 
-        A group that holds all of another says nothing more, and never will.
+        Supersets of another group are dropped for good: they never say anything new.
         """
         groups = self._failed[:, [self._columns[name] for name in environment]]
         telling = undominated(groups)
         self._failed = self._failed[telling]
         return groups[telling]
 
-    def fresh(self, chances: Callable[[np.ndarray], np.ndarray]) -> Iterator[Sample]:
-        """New lessons for a classifier as samples, labels and weights: removed models, then each candidate without f.
+    def fresh(self, chances: Callable[[Floats], Floats]) -> Iterator[Sample]:
+        """New samples, labels and weights for a classifier: the removed models, then each candidate without f.
 
-        Who of a group is to blame is shared out by what the classifier now thinks, `chances(samples)`.
+        The blame within a group is shared according to `chances(samples)`, the classifier's present estimate.
         """
         if len(self._new_gone):
             count = len(self._new_gone)
@@ -162,20 +163,20 @@ class Lessons:
             yield np.vstack([rows, rows]), labels, np.append(blame, (1.0 - blame) / max(1, len(group) - 1))
 
 
-# After so many candidates the classifier's word counts as much as the spatial prior's.
+# After this number of candidates the classifier counts as much as the spatial prior.
 TRUST = 10.0
-# The chance that none of a group is needed is one half where its models' weights, -ln(1 - chance), add up to this.
+# With this sum of weights, -ln(1 - probability), a group contains no needed model with probability one half.
 EVEN = float(np.log(2.0))
-# How far the chances may be moved as a whole, in log odds, and how far they may be drawn together (as in Platt's scaling).
+# The grid of Platt scaling: shifts of all log odds, and slopes.
 SHIFTS = np.linspace(-3.0, 3.0, 13)
 SLOPES = np.array([0.5, 0.75, 1.0, 1.25])
 
 
 class Learner:
-    """A classifier learns from every test of this run what needed models are like: near the failure or the path, early sensed,
-    touched, large, slippery, able to move. Its chances are set right by how often tests showed the failure, joined with what the
-    tests say of each model itself, and models of like chance make a partition: the likely ones few, the unlikely ones many. With
-    no test yet, nearness to the failure is all it goes by.
+    """A classifier learns from every test of this reduction what needed models look like: near the failure or the path, sensed
+    early, touched, large, slippery, able to move. Its probabilities are calibrated by how often tests showed the failure, and
+    combined with what the tests say about each model itself. Models of similar probability make a partition: few likely ones, or
+    many unlikely ones. Before the first test it uses only the distance to the failure.
 
     It remembers what it has learnt: one object serves one reduction.
     """
@@ -186,15 +187,15 @@ class Learner:
 
     def __call__(self, environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
         chances = self.chances(environment, evidence)
-        # Sorted by chance, the least likely first; the order of the file between equals.
+        # By probability, the least likely first; equals in the order of the file.
         order = np.argsort(chances, kind="stable")
         weights = -np.log1p(-chances[order])
         labels = np.empty(len(environment), dtype=int)
         labels[order] = -_shares(weights, n_partitions)
         return grouped(environment, labels)
 
-    def chances(self, environment: Partition, evidence: Evidence) -> np.ndarray:
-        """How likely each model is needed, shape (len(environment),). Learns from what was tested since the last time."""
+    def chances(self, environment: Partition, evidence: Evidence) -> Floats:
+        """The probability that each model is needed, shape (len(environment),). Learns from the tests since the last call."""
         rows = features(environment, evidence)
         if not self._lessons.begun:
             self._classifier.see(rows)
@@ -211,27 +212,27 @@ class Learner:
         chances = _sigmoid(slope * logits + shift)
         return beliefs(chances, groups, evidence.miss_chance)
 
-    def _learnt(self, rows: np.ndarray) -> np.ndarray:
-        """By how much the classifier moves the log odds of models with the features `rows` (M, F), shape (M,)."""
+    def _learnt(self, rows: Floats) -> Floats:
+        """How far the classifier moves the log odds of models with the features `rows` (M, F), shape (M,)."""
         return self._lessons.count / (self._lessons.count + TRUST) * _logit(self._classifier.chances(rows))
 
 
-def _shares(weights: np.ndarray, n: int) -> np.ndarray:
-    """The number of the group of each model, 0 to n - 1; `weights` are in rising order.
+def _shares(weights: Floats, n: int) -> Integers:
+    """The group of each model, 0 to n - 1; `weights` (M,) are in rising order.
 
-    All but the last group, which is left with the likeliest models, are as large as can be for even chances that none of them is
-    needed; with little weight in all, they share it.
+    Each group but the last contains no needed model with even odds; the last gets the likeliest models. If the total weight is
+    small, all groups get an equal share of it.
     """
     share = min(EVEN, float(weights.sum()) / n)
     before = np.cumsum(weights) - weights
-    # A model that would take its group over the share begins the next one.
+    # A model that would exceed the share begins the next group.
     return np.minimum(np.floor(before / share + 0.5), n - 1).astype(int)
 
 
-def _scaling(logits: np.ndarray, gone: np.ndarray, groups: np.ndarray) -> tuple[float, float]:
-    """Which slope and shift of all log odds make the tests' outcomes likeliest (with a weak wish for 1 and 0).
+def _scaling(logits: Floats, gone: Floats, groups: Booleans) -> tuple[float, float]:
+    """The slope and shift of all log odds that maximize the likelihood of the tests (Platt scaling, with a weak prior at 1 and 0).
 
-    `gone` (G,) are the log odds of models that turned out not to be needed, `groups` (T, M) those of which one is.
+    `gone` (G,) are the log odds of models that were not needed; of each row of `groups` (T, M) at least one model is needed.
     """
     slopes, shifts = (grid.ravel() for grid in np.meshgrid(SLOPES, SHIFTS, indexing="ij"))
     spared = -np.logaddexp(0.0, np.outer(logits, slopes) + shifts)
@@ -243,10 +244,10 @@ def _scaling(logits: np.ndarray, gone: np.ndarray, groups: np.ndarray) -> tuple[
     return float(slopes[best]), float(shifts[best])
 
 
-def _logit(chances: np.ndarray) -> np.ndarray:
+def _logit(chances: Floats) -> Floats:
     chances = np.clip(chances, LEAST, MOST)
     return np.log(chances) - np.log1p(-chances)
 
 
-def _sigmoid(logits: np.ndarray) -> np.ndarray:
+def _sigmoid(logits: Floats) -> Floats:
     return np.clip(1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), LEAST, MOST)

@@ -1,4 +1,4 @@
-"""Partitionings: how the environment is split by where models stand and when the robot met them."""
+"""The partitionings: how a round splits the environment. One function for each, except for `learner.py`."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
+from ddenv.arrays import Floats
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.round import one_model_partitions
 
 
 def grouped(environment: Partition, labels: Iterable[int]) -> list[Partition]:
-    """The models of each label that occurs, by label; within a partition they stay in the environment's order."""
+    """The models of each label, sorted by label; within a partition they keep the environment's order."""
     groups: dict[int, list[str]] = {}
     for name, label in zip(environment, labels, strict=True):
         groups.setdefault(int(label), []).append(name)
     return [tuple(groups[label]) for label in sorted(groups)]
 
 
-# Above so many clusters or models k-means begins once instead of four times, and above so many clusters at random models: it
-# would take a second instead of a tenth.
+# With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
+# models: it would take a second instead of a tenth.
 MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
 
 
 def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
-    """Models that are near each other make a partition: k-means on their positions finds n clusters in space. Where it leaves a
-    cluster empty, because models stand in the same place, each model becomes a partition of its own for this round. Good when what
-    causes a failure stands close together.
+    """Models that are near each other form a partition: k-means clusters their positions into n groups. If a cluster stays empty,
+    because models share a position, each model is its own partition in this round. Good if models that cause a failure stand close
+    together.
 
     Paper, Algorithm 2.
     """
@@ -41,7 +42,7 @@ def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -
         n_init=1 if many else 4,
         random_state=evidence.seed,
     )
-    # One thread, so that sums are added in one order and a resumed run sees the same clusters.
+    # One thread, so that sums are added in one order and a resumed run gets the same clusters.
     with warnings.catch_warnings(), threadpool_limits(1):
         warnings.simplefilter("ignore", ConvergenceWarning)
         labels = clusters.fit(evidence.places(environment)).labels_
@@ -50,30 +51,30 @@ def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -
 
 
 def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
-    """The trajectory of the last similar run is cut into n spans of equal duration; a model belongs to the span whose path is
-    nearest to it. A robot that is stuck for long has many spans at one place, so that the models there come apart from the rest
-    early. Good when it matters when the robot met a model.
+    """The trajectory of the last similar run is cut into n spans of equal duration. A model belongs to the span whose path is
+    nearest to it. If the robot is stuck for long, many spans lie at that place, so the models there are soon separated from the
+    rest. Good if it matters when the robot met a model.
     """
     times = evidence.need("trajectory")[:, 0]
     return by_span(environment, np.linspace(times[0], times[-1], n_partitions + 1)[1:-1], evidence)
 
 
-def by_span(environment: Partition, cuts: np.ndarray, evidence: Evidence) -> list[Partition]:
-    """The models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
+def by_span(environment: Partition, cuts: Floats, evidence: Evidence) -> list[Partition]:
+    """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
     return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
 
 
 def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
     """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
-    scenario's key `reduction.delta`); a model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
-    are kept, and where there are too few, the longest spans are halved. Good when the robot's turns tell where something happened.
+    scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
+    are kept; with too few, the longest spans are halved. Good if the robot's turns show where something happened.
     """
     trajectory = evidence.need("trajectory")
     return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)
 
 
-def cuts(trajectory: np.ndarray, delta: float, n_spans: int) -> np.ndarray:
-    """Where the trajectory (N, 5) is cut into `n_spans`: sorted times, shape (n_spans - 1,), s."""
+def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
+    """The times (s) at which the trajectory (N, 5) is cut into `n_spans`, sorted, shape (n_spans - 1,)."""
     times, sharpness = turns(trajectory)
     sharp = np.flatnonzero(sharpness > delta)
     sharpest = sharp[np.argsort(-sharpness[sharp], kind="stable")][: n_spans - 1]
@@ -85,7 +86,7 @@ def cuts(trajectory: np.ndarray, delta: float, n_spans: int) -> np.ndarray:
     return np.array(ends[1:-1])
 
 
-def turns(trajectory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def turns(trajectory: Floats) -> tuple[Floats, Floats]:
     """The inner times (s) of the trajectory (N, 5), and how much the angular velocity (rad/s) changes there: two (N - 2,)."""
     times, yaw = trajectory[:, 0], np.unwrap(trajectory[:, 4])
     lasted = np.diff(times)

@@ -1,4 +1,4 @@
-"""How sure a rate is, and how often to re-run a flaky failure."""
+"""Statistics of a flaky failure: the interval of its rate, and how many re-runs it needs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a rate seen `successes` times in `trials`. Raises ValueError for impossible counts."""
+    """The 95 % Wilson interval of a rate that was seen `successes` times in `trials`. Raises ValueError for impossible counts."""
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials}")
     rate, z2 = successes / trials, Z_95**2
@@ -19,12 +19,12 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
 
 
 def miss_chance(rate: float, iterations: int) -> float:
-    """The chance that `1 + iterations` runs all miss a failure that shows at `rate`."""
+    """The probability that `1 + iterations` runs all miss a failure that shows at `rate`."""
     return (1.0 - rate) ** (1 + iterations)
 
 
 def iterations_needed(rate: float, confidence: float = 0.95) -> int:
-    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with `confidence`."""
+    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with probability `confidence`."""
     if rate >= 1.0:
         return 0
     return max(0, math.ceil(math.log(1.0 - confidence) / math.log(1.0 - rate) - 1e-9) - 1)

@@ -1,4 +1,4 @@
-"""A round: the environment's partitions in the order they are tried, and the candidates that come of them."""
+"""A round: the environment's partitions in the order in which they are tried, and the candidates made from them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COMPLEMENT_ORDERS = ("paper", "far-first")
 class Candidate:
     """A sub-environment to try: `kind` is "partition" or "complement" of the round's partition number `partition`.
 
-    `part` is that partition. The models are not kept: of 5,000 complements they would take gigabytes.
+    `part` is that partition. `models` is computed each time: stored, the models of 5,000 complements would take gigabytes.
     """
 
     kind: str
@@ -25,25 +25,25 @@ class Candidate:
 
     @property
     def models(self) -> frozenset[str]:
-        """What is there."""
+        """The models that are there."""
         part = frozenset(self.part)
         return part if self.kind == "partition" else frozenset(self.environment) - part
 
     @property
     def lacks(self) -> frozenset[str]:
-        """What of the environment is not there."""
+        """The models of the environment that are not there."""
         part = frozenset(self.part)
         return part if self.kind == "complement" else frozenset(self.environment) - part
 
     @property
     def size(self) -> int:
-        """How many models are there."""
+        """The number of models that are there."""
         return len(self.part) if self.kind == "partition" else len(self.environment) - len(self.part)
 
 
 @dataclass(frozen=True)
 class Round:
-    """`partitions` are in the order they are tried, `scores` what they were ranked by; the first similar candidate wins."""
+    """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins."""
 
     n_partitions: int
     environment: Partition
@@ -58,7 +58,7 @@ class Round:
 
 
 def one_model_partitions(environment: Partition) -> list[Partition]:
-    """Each model on its own."""
+    """Each model as a partition of its own."""
     return [(name,) for name in environment]
 
 
@@ -69,9 +69,9 @@ def make_round(
     candidates: str = "both",
     complement_order: str = "paper",
 ) -> Round:
-    """The candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself and repetitions.
+    """A round with the candidates p0, c0, p1, c1, ... of the ranked partitions, without E itself and without repetitions.
 
-    With `complement_order` "far-first" the complements come in the opposite order: what is farthest is left out first.
+    With `complement_order` "far-first" the complements come in the opposite order: the farthest partition is left out first.
     """
     count = len(ranked)
     order = range(count) if complement_order == "paper" else range(count - 1, -1, -1)
@@ -86,9 +86,9 @@ def round_of(
     ranked: Sequence[tuple[Partition, float]],
     wanted: Iterable[tuple[str, int]],
 ) -> Round:
-    """The candidates `wanted`, as (kind, partition), without E itself and repetitions.
+    """A round with the candidates `wanted`, given as (kind, partition), without E itself and without repetitions.
 
-    Nothing at all is a candidate only where E is a single model.
+    The empty set is a candidate only if E is a single model.
     """
     partitions, scores = zip(*ranked, strict=True)
     whole = len(environment)
@@ -96,7 +96,7 @@ def round_of(
     seen: set[tuple[str, int]] = set()
     for kind, number in wanted:
         one = Candidate(kind, number, partitions[number], environment)
-        # Of two partitions each is the other's complement; otherwise no candidate is like another.
+        # Two partitions are each other's complements; otherwise all candidates differ.
         same = ("partition", 1 - number) if kind == "complement" else ("complement", 1 - number)
         repeated = (kind, number) in seen or (len(partitions) == 2 and same in seen)
         if repeated or one.size == whole or (one.size == 0 and whole > 1):
@@ -107,7 +107,7 @@ def round_of(
 
 
 def left_out(group: Partition, environment: Partition, score: float = 0.0) -> Round:
-    """A round with one candidate: E without `group`. The group is its first partition, all the rest its second."""
+    """A round with one candidate, E without `group`. The group is the first partition, the rest the second."""
     gone = frozenset(group)
     rest = tuple(name for name in environment if name not in gone)
     ranked = [(group, score), (rest, score)] if rest else [(group, score)]

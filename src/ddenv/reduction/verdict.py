@@ -1,4 +1,4 @@
-"""What a round's finished tests add up to, and which tests it needs next: the same in any order of finishing."""
+"""The verdicts of a round from its finished tests, and which tests it needs next: the same whichever tests finish first."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Similar = Callable[[Key, int], bool | None]
 
 @dataclass(frozen=True)
 class Standing:
-    """`verdicts` holds "similar", "dissimilar" or "" (open) for each candidate that was looked at; `evidence` the run that showed
-    the failure.
+    """Where a round stands.
 
-    `winner` is the first similar candidate with none open before it. `wanted` are the tests still needed, as (candidate,
-    run), in the order in which one worker would make them if none of them showed the failure: idle workers may take them
-    from the front and the verdicts stay the same.
+    `verdicts` has "similar", "dissimilar" or "" (open) for each candidate looked at; `evidence` the number of the run that showed
+    the failure. `winner` is the first similar candidate, if no candidate before it is open. `wanted` are the tests still needed, as
+    (candidate, run), in the order in which a single worker would run them if none showed the failure. Idle workers may take them
+    from the front: the verdicts stay the same.
     """
 
     verdicts: tuple[str, ...]
@@ -28,7 +28,7 @@ class Standing:
 
 def standing(
     candidates: Iterable[Key],
-    similar: Similar,
+    similar: Similar[Key],
     iterations: int,
     refused: Container[Key] = frozenset(),
     *,
@@ -37,12 +37,13 @@ def standing(
 ) -> Standing:
     """Where a round stands (paper, Algorithm 1 lines 4 to 13).
 
-    `similar(candidate, run)` says of a finished run whether it showed f, None of another. A candidate is similar at its first run
-    that did, in the order of runs, and dissimilar when `1 + iterations` runs did not. `refused` ones count as dissimilar.
-    `candidates` are those from number `first` on. They are looked at up to the first that is sure to be similar, since nothing
-    behind it is worth a test, and no further than `enough` wanted tests.
+    `similar(candidate, run)` returns whether a finished run showed f, and None for a run that is not finished. A candidate is
+    similar at its first run that showed f, in the order of runs, and dissimilar after `1 + iterations` runs that did not. `refused`
+    candidates count as dissimilar. `candidates` begin with number `first`. They are looked at up to the first one that is sure to
+    be similar, since no later one is worth a test, or until there are `enough` wanted tests.
     """
-    verdicts, evidence = [], []
+    verdicts: list[str] = []
+    evidence: list[int | None] = []
     wanted: list[tuple[int, int]] = []
     for index, key in enumerate(candidates, first):
         shown, missing = (None, []) if key in refused else _row(similar, key, iterations)
@@ -56,12 +57,12 @@ def standing(
     return Standing(tuple(verdicts), tuple(evidence), None, tuple(wanted))
 
 
-def _row(similar: Similar, candidate: Key, iterations: int) -> tuple[int | None, list[int]]:
-    """The first run that showed f, if any, and the runs before it that are not made yet.
+def _row(similar: Similar[Key], candidate: Key, iterations: int) -> tuple[int | None, list[int]]:
+    """The first run that showed f, if any, and the runs before it that are not finished.
 
-    A later run that showed it decides nothing while an earlier one is open: the evidence would depend on timing.
+    A later run that showed f decides nothing while an earlier one is open: else the evidence would depend on timing.
     """
-    missing = []
+    missing: list[int] = []
     for run in range(1 + iterations):
         known = similar(candidate, run)
         if known:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import Context
 
-from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.arrays import Booleans, Floats, Integers, Objects
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.surroundings import Surroundings
@@ -191,10 +191,10 @@ class Notice:
             return
         times, places, headings = zip(*self._views, strict=True)
         shown = self._present & self._around.visible
-        still = [
+        still: list[Floats] = [
             np.broadcast_to(side[shown], (len(times), shown.sum(), 3)) for side in (self._around.low, self._around.high)
         ]
-        groups = [(self._around.names[shown], *still)]
+        groups: list[tuple[Objects, Floats, Floats]] = [(self._around.names[shown], still[0], still[1])]
         if self._boxes:
             low, high = (np.array(sides)[:, self._solid] for sides in zip(*self._boxes, strict=True))
             groups.append((self._moving[self._solid], low, high))

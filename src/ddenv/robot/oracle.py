@@ -86,7 +86,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class Judgement:
-    """`outcome` is "similar", "other", "pass" or "error". `distance` (m) is between the ends, `trajectory_distance` (m) the mean."""
+    """`outcome` is "similar", "other", "pass" or "error"; `distance` (m) between the ends, `trajectory_distance` (m) on average."""
 
     outcome: str
     distance: float

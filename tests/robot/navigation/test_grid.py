@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot.navigation.route import STEPS, Grid, way_to
+from ddenv.robot.navigation.route import STEPS, Grid, path_to
 
 COUNT = 4
 GRID = Grid(COUNT)
@@ -39,7 +39,7 @@ def test_no_way_is_shorter(factors, start):
     lengths, sources = GRID.search(factors, start)
     assert lengths == pytest.approx(best_lengths(factors, start))
     for cell in np.flatnonzero(np.isfinite(lengths)):
-        way = way_to(int(cell), sources)
+        way = path_to(int(cell), sources)
         assert way[0] == start
         assert way[-1] == cell
         assert np.abs(np.diff(np.divmod(way, COUNT))).max(initial=0) <= 1

@@ -1,1 +1,1 @@
-"""The robot in another simulator: a user's own command runs it."""
+"""Another simulator in Drake's place: a command of the user's."""

@@ -1,28 +1,29 @@
-"""The pose log of another simulator: where its robot was, as CSV."""
+"""The pose log of another simulator: the poses of its robot, as CSV."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.errors import printable
-from ddenv.robot.result import RECORD_PERIOD
+from ddenv.robot.result import RECORD_PERIOD, Progress
 
 COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 EXPECTED = f"expected {','.join(COLUMNS)} (s, m, a quaternion)"
 MOST_BYTES = 64_000_000
 TOO_LARGE = f"the pose log is larger than {MOST_BYTES / 1e6:.0f} MB; a row every 0.1 s is enough"
-# No row of eight numbers is as long as this, and none of s or m as large.
+# Longer than any row of eight numbers, and larger than any number of seconds or metres.
 LONGEST_LINE = 1000
 GREATEST = 1e9
 SHORTEST_QUATERNION = 1e-6
 SHORTEST_GAP = 0.001  # s
-# How much of a wrong line is told, in characters.
+# How many characters of a wrong line are reported.
 SHOWN = 60
 
-Row = tuple[float, ...]
+# t (s), x, y, z (m), qw, qx, qy, qz.
+Row = tuple[float, float, float, float, float, float, float, float]
 
 
 class BadLog(Exception):
@@ -30,13 +31,13 @@ class BadLog(Exception):
 
 
 class PoseLog:
-    """Takes in a log piece by piece, and keeps a row every 0.1 s and the last one.
+    """Reads a log piece by piece. It keeps the first row, a row every 0.1 s, and the last one.
 
-    Blank lines and those that begin with # do not count; the first line may be a header. `progress(time, pose)` is told each row
-    that is kept: s, and x, y, z (m), qw, qx, qy, qz.
+    Blank lines and lines that begin with # are skipped; the first line may be a header. `progress` gets each row that is kept,
+    except for the last.
     """
 
-    def __init__(self, progress: Callable[[float, Row], None] | None = None) -> None:
+    def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
         self._rest = b""
         self._number = 0
@@ -48,11 +49,11 @@ class PoseLog:
 
     @property
     def size(self) -> int:
-        """How many bytes it has."""
+        """The number of bytes so far."""
         return self._size
 
     def add(self, piece: bytes) -> None:
-        """The next bytes. What is wrong with them is told by `finish`; after it nothing is looked at any more."""
+        """Reads the next bytes. After a mistake, which `finish` reports, nothing more is read."""
         self._size += len(piece)
         if self._problem:
             return
@@ -65,18 +66,18 @@ class PoseLog:
         except BadLog as error:
             self._problem, self._rest = str(error), b""
 
-    def rows(self) -> np.ndarray:
-        """What could be read so far: t (s), x, y, z (m), qw, qx, qy, qz, shape (N, 8)."""
+    def rows(self) -> Floats:
+        """The rows so far: t (s), x, y, z (m), qw, qx, qy, qz, shape (N, 8)."""
         rows = list(self._rows)
         if self._last is not None and self._last is not rows[-1]:
-            # Two rows at one time would be a robot of endless speed.
+            # Two rows at nearly the same time would be a robot of infinite speed.
             if self._last[0] - rows[-1][0] < SHORTEST_GAP:
                 rows.pop()
             rows.append(self._last)
         return np.array(rows, dtype=float).reshape(-1, 8)
 
-    def finish(self) -> np.ndarray:
-        """All rows, at least one, as in `rows`. Raises BadLog."""
+    def finish(self) -> Floats:
+        """All rows, shape (N, 8) with N > 0. Raises BadLog."""
         rest, self._rest = self._rest, b""
         if rest:
             self.add(rest + b"\n")
@@ -104,7 +105,7 @@ class PoseLog:
             self._row(text, fields)
 
     def _header(self, text: str, fields: list[str]) -> None:
-        """A header names eight columns as it likes, but those of the quaternion not in another order."""
+        """Checks a header: it may name eight columns as it likes, but must not name the quaternion's in another order."""
         turned = [field.lower() for field in fields[4:]]
         known = list(COLUMNS[4:])
         if len(fields) != len(COLUMNS) or (sorted(turned) == sorted(known) and turned != known):
@@ -133,7 +134,7 @@ class PoseLog:
 
     def _keep(self, row: Row) -> None:
         self._last = row
-        # Times that were added up are a little off.
+        # Times that are sums of steps deviate a little.
         if self._rows and row[0] < self._rows[-1][0] + 0.999 * RECORD_PERIOD:
             return
         self._rows.append(row)

@@ -1,4 +1,4 @@
-"""A command as a process, started through the supervisor, which ends it whatever happens to this process."""
+"""Runs a command through a supervisor, which ends it whatever happens to this process."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ from ddenv.errors import printable
 
 SUPERVISOR = Path(__file__).with_name("supervise.py")
 PIECE = 65536
-# How often a command is looked at that prints nothing, s.
+# How often a silent command is checked, s.
 TICK = 0.2
-# How long the supervisor may take to end a command that was asked to, s: longer than it gives the command.
+# How long the supervisor may take to end a command, s: longer than the grace that it gives the command.
 STOP_WAIT = 10.0
-# What may still lie in a pipe when the command has ended.
+# The maximum that can be left in a pipe when the command has ended, bytes.
 MOST_LEFT = 16 * PIECE
-# How much of the end of what a command complains is kept, in bytes, and how much of its last line told, in characters.
+# How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in characters.
 KEPT = 16384
 SHOWN = 200
+# Python exits with code 1 for an uncaught exception, and prints this line first.
 # Python exits with 1 for an exception that nobody catches, and says so with this line.
 TRACEBACK = b"Traceback (most recent call last):"
 STOPPED = b"KeyboardInterrupt"
@@ -35,9 +36,9 @@ STOPPED = b"KeyboardInterrupt"
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: with the exit code `code`, or without one for a `reason`; and the last line that it wrote to stderr.
+    """How a command ended: with the exit code `code`, or without one for a `reason`.
 
-    `raised` tells whether that is the last one of an exception's traceback.
+    `complaint` is the last line that it wrote to stderr; `raised` is True if that line ends an exception's traceback.
     """
 
     code: int | None
@@ -61,7 +62,7 @@ class Complaints:
         return printable(last if len(last) <= SHOWN else f"{last[: SHOWN - 3]}...")
 
     def is_exception(self) -> bool:
-        """Whether they end with an exception's traceback. That of one who was interrupted only says that all is over."""
+        """Whether it ends with a traceback. That of an interrupted program does not count: it only says that it was stopped."""
         _, found, after = self._end.rpartition(TRACEBACK)
         not_indented = [line for line in after.splitlines() if line.strip() and not line.startswith(b" ")]
         return bool(found) and len(not_indented) <= 1 and not any(line.startswith(STOPPED) for line in not_indented)
@@ -69,36 +70,47 @@ class Complaints:
 
 @dataclass(frozen=True)
 class Running:
-    """A command in the hands of its supervisor, which `line` leads to."""
+    """A command under its supervisor. `line` is the socket to the supervisor, `stdout` and `stderr` are the command's output."""
 
-    supervisor: subprocess.Popen
+    supervisor: subprocess.Popen[bytes]
     line: socket.socket
+    stdout: IO[bytes]
+    stderr: IO[bytes]
 
 
 @contextlib.contextmanager
 def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], temporary: Path) -> Iterator[Running]:
-    """The command, started in `folder`; at the end nothing that it started is left, and the folder `temporary` is gone.
+    """Starts the command `words` in `folder`.
 
-    So it is if this process is killed. Raises OSError where no program can be started.
+    At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed.
+    Raises OSError if no program can be started.
     """
     ours, theirs = socket.socketpair()
     start = [sys.executable, "-I", "-S", str(SUPERVISOR), str(temporary), *words]
-    streams = {"stdin": theirs, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with ours:
         with theirs:
             supervisor = subprocess.Popen(
-                start, **streams, cwd=folder, env=environment, start_new_session=True, bufsize=0
+                start,
+                stdin=theirs.fileno(),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                cwd=folder,
+                env=environment,
+                start_new_session=True,
+                bufsize=0,
             )
-        with supervisor.stdout, supervisor.stderr:
+        stdout, stderr = supervisor.stdout, supervisor.stderr
+        assert stdout is not None and stderr is not None
+        with stdout, stderr:
             try:
-                yield Running(supervisor, ours)
+                yield Running(supervisor, ours, stdout, stderr)
             finally:
                 ours.close()
                 _end(supervisor)
 
 
-def _end(supervisor: subprocess.Popen) -> None:
-    """The supervisor ends by itself once its line is closed."""
+def _end(supervisor: subprocess.Popen[bytes]) -> None:
+    """Waits for the supervisor, which ends by itself once its socket is closed."""
     try:
         supervisor.wait(STOP_WAIT)
     except subprocess.TimeoutExpired:
@@ -107,43 +119,42 @@ def _end(supervisor: subprocess.Popen) -> None:
 
 
 def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_much: Callable[[], str]) -> Ended:
-    """Waits for the command's end, at most `seconds` of wall clock. All that it prints is read.
+    """Waits for the command's end, for a maximum of `seconds` of wall clock, and reads all its output.
 
-    `take` is given what it writes to stdout; as soon as `too_much()` has a reason for it, the command is ended early.
+    `take` gets what the command writes to stdout. As soon as `too_much()` returns a reason, the command is ended early.
     """
     complaints = Complaints()
-    takers = {command.supervisor.stdout: take, command.supervisor.stderr: complaints.add}
+    takers = ((command.stdout, take), (command.stderr, complaints.add))
     deadline = time.monotonic() + seconds
     said, why = None, ""
     with selectors.DefaultSelector() as selector:
-        for source in (command.line, *takers):
-            selector.register(source, selectors.EVENT_READ)
+        selector.register(command.line, selectors.EVENT_READ)
+        for stream, taker in takers:
+            selector.register(stream, selectors.EVENT_READ, taker)
         while said is None:
-            said = _look(selector, command, takers)
+            said = _look(selector, command)
             late = f"took longer than {seconds:g} s of wall clock" if time.monotonic() > deadline else ""
             if said is None and not why and (why := late or too_much()):
                 _ask_to_end(command)
                 deadline = time.monotonic() + STOP_WAIT
             elif said is None and late:
-                # It was stopped itself, and will be killed.
+                # The supervisor itself was stopped, and will be killed.
                 said = ""
-    for stream, taker in takers.items():
+    for stream, taker in takers:
         _drain(stream, taker)
     code, reason = _read(said)
     return Ended(None if why else code, why or reason, complaints.last_line(), complaints.is_exception())
 
 
-def _look(
-    selector: selectors.BaseSelector, command: Running, takers: Mapping[IO[bytes], Callable[[bytes], None]]
-) -> str | None:
-    """Takes what there is; returns what the supervisor says in the end, and "" if it says nothing any more."""
+def _look(selector: selectors.BaseSelector, command: Running) -> str | None:
+    """Takes new output. Returns the supervisor's final message, "" if it ended without one, None while the command runs."""
     for key, _ in selector.select(TICK):
         if key.fileobj is command.line:
             with contextlib.suppress(OSError):
                 return command.line.recv(64).decode()
             return ""
         if piece := os.read(key.fd, PIECE):
-            takers[key.fileobj](piece)
+            key.data(piece)
         else:
             selector.unregister(key.fileobj)
     return None
@@ -155,7 +166,7 @@ def _ask_to_end(command: Running) -> None:
 
 
 def _drain(stream: IO[bytes], take: Callable[[bytes], None]) -> None:
-    """Takes what was written before the command ended, and does not wait for more."""
+    """Takes what was written before the command ended, without waiting for more."""
     os.set_blocking(stream.fileno(), False)
     with contextlib.suppress(BlockingIOError):
         for _ in range(MOST_LEFT // PIECE):
@@ -163,7 +174,7 @@ def _drain(stream: IO[bytes], take: Callable[[bytes], None]) -> None:
 
 
 def _read(said: str) -> tuple[int | None, str]:
-    """What the supervisor said, as an exit code or the reason for the lack of one."""
+    """The exit code in the supervisor's message, or None and the reason why there is none."""
     kind, _, number = said.partition(" ")
     match kind:
         case "exit":

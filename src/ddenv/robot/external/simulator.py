@@ -1,4 +1,4 @@
-"""A scenario's own simulator: every run writes the world that is left to a file and starts the user's command on it."""
+"""A simulator of your own: each run writes the reduced world to a file and starts the scenario's command on it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
 from ddenv.robot.external.process import Ended, running, watch
@@ -24,15 +25,15 @@ from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 from ddenv.world.write import without
 
-# What the command's exit codes mean; all others are errors.
+# The meaning of the command's exit codes; all others are errors.
 OUTCOMES = {0: "pass", 1: "failed"}
 
 
 class ExternalSimulator:
-    """Runs as `ddenv.robot.drake.template.Template` has them, by a command. What it should do is told in docs/any-simulator.md."""
+    """Runs a command as `Template` runs Drake. docs/any-simulator.md says what the command has to do."""
 
     def __init__(self, world: World, scenario: Scenario) -> None:
-        """Raises UserError for a command that cannot be started."""
+        """Raises UserError if the command cannot be started."""
         self._world = world
         self._scenario = scenario
         self._words = command_words(scenario)
@@ -46,11 +47,11 @@ class ExternalSimulator:
         progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult:
-        """Runs the robot in the world with the models `keep`; those that cannot be removed are always there.
+        """Runs the robot in the world with the models `keep`, and with those that cannot be removed.
 
-        `progress(time, pose)` is told the simulated time (s) and the robot's x, y, z (m), qw, qx, qy, qz of what the command
-        prints. `full` changes nothing: a command ends its runs itself. Whatever it does becomes a result. Raises ValueError for
-        names that the world does not have, and UserError where no temporary file can be written.
+        `progress(time, pose)` gets the simulated time (s) and the pose of the robot (x, y, z in m, qw, qx, qy, qz) of each row that
+        the command prints. `full` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises
+        ValueError for unknown names, and UserError if no temporary file can be written.
         """
         unknown = keep - self._names
         if unknown:
@@ -72,7 +73,7 @@ class ExternalSimulator:
         )
 
     def _execute(self, world: Path, seed: int, progress: Progress | None) -> tuple[Ended, PoseLog]:
-        """Runs the command on the file `world` to its end, and takes in its pose log."""
+        """Runs the command on the file `world` to its end, and reads its pose log."""
         file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
         log = PoseLog(progress if file is None else None)
         values = {"world": str(world), "seed": str(seed), "log": str(file or "/dev/stdout")}
@@ -89,7 +90,7 @@ class ExternalSimulator:
         try:
             with running(words, self._scenario.folder, environment, world.parent) as command:
                 ended = watch(command, self._scenario.simulation.wall_timeout, take, too_much)
-                # Reading what is too large would take longer than writing it did.
+                # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE:
                     _read(file, log)
         except OSError as error:
@@ -97,23 +98,23 @@ class ExternalSimulator:
         return ended, log
 
     def _environment(self, values: dict[str, str]) -> dict[str, str]:
-        """Our own environment, and what the command is told of the scenario."""
+        """Our own environment, and what the command needs to know about the scenario."""
         spawn, goal = self._scenario.robot.spawn, self._scenario.goal
-        told = {f"DDENV_{name.upper()}": value for name, value in values.items()}
-        told["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
-        told["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
-        told["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
-        # What the world names beside itself is not beside the file that the command is given.
+        known = {f"DDENV_{name.upper()}": value for name, value in values.items()}
+        known["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
+        known["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
+        known["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
+        # Files beside the original world are not beside the reduced one.
         folders = [self._scenario.world.parent, *self._scenario.reading.model_path]
         for name in ENVIRONMENT:
             before = os.environ.get(name)
-            told[name] = os.pathsep.join([*map(str, folders), *([before] if before else [])])
-        return {**os.environ, **told}
+            known[name] = os.pathsep.join([*map(str, folders), *([before] if before else [])])
+        return {**os.environ, **known}
 
-    def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, np.ndarray]:
-        """Outcome, failure and trajectory of a run that ended like this."""
+    def _judged(self, ended: Ended, log: PoseLog) -> tuple[str, str, Floats]:
+        """The outcome, the failure and the trajectory (N, 8) of a run that ended like this."""
         said = f": {ended.complaint}" if ended.complaint else ""
-        if ended.code not in OUTCOMES:
+        if ended.code is None or ended.code not in OUTCOMES:
             why = ended.reason or f"the command's exit code is {ended.code}, neither 0 nor 1"
             return "error", why + said, self._rows(log)
         if ended.code == 1 and ended.raised:
@@ -124,8 +125,8 @@ class ExternalSimulator:
         except BadLog as error:
             return "error", f"{error}{said}", self._rows(log)
 
-    def _rows(self, log: PoseLog) -> np.ndarray:
-        """The rows of a run that broke: at least where the robot starts."""
+    def _rows(self, log: PoseLog) -> Floats:
+        """The rows (N, 8) of a run that broke: at least the robot's start."""
         rows = log.rows()
         if len(rows):
             return rows
@@ -162,7 +163,7 @@ def _no_room(error: OSError) -> UserError:
 
 
 def _read(file: Path, log: PoseLog) -> None:
-    """Takes in the file that a command was to write; what is not there, or is no plain file, has no rows."""
+    """Reads the file that the command had to write; a missing file, or one that is no plain file, has no rows."""
     with contextlib.suppress(OSError):
         if not file.is_file():
             return

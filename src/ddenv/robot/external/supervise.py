@@ -1,8 +1,8 @@
-"""Runs a command and ends it with all that it started: `python -I -S supervise.py FOLDER PROGRAM [WORD...]`.
+"""Runs a command and ends it with everything that it started: `python -I -S supervise.py FOLDER PROGRAM [WORD...]`.
 
-Standard input is a socket to a worker. When the command has ended, one line goes there: `exit 3`, `signal 9`, or `error 13` where
-it could not be started. A byte from the worker, or its end in any way, ends the command at once. FOLDER is removed in the end.
-A program of its own, since a worker that is killed can clean up nothing.
+Standard input is a socket to a worker. When the command has ended, one line is sent there: `exit 3`, `signal 9`, or `error 13` if
+it could not be started. A byte from the worker, or the worker's end, ends the command at once. At the end FOLDER is removed.
+This is a program of its own because a worker that is killed cannot clean up.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import sys
 import time
 from pathlib import Path
 
-# How long a command that is asked to end has before it is killed, and how long what it leaves behind is hunted, s.
+# How long a command may take to end before it is killed, and how long its remaining processes are killed, s.
 GRACE = 2.0
 PATIENCE = 5.0
 # From Linux' <sys/prctl.h>.
@@ -28,7 +28,7 @@ PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 def main() -> None:
     folder, *words = sys.argv[1:]
     worker = socket.socket(fileno=0)
-    # A worker ignores Ctrl-C, and what is ignored stays so in the programs that are started.
+    # A worker ignores Ctrl-C, and programs inherit what is ignored.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     with contextlib.suppress(OSError):
         worker.sendall(run(words, worker).encode())
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def run(words: list[str], worker: socket.socket) -> str:
-    """Runs the command to its end, or until the worker wants it ended; returns how it ended."""
+    """Runs the command to its end, or until the worker wants it ended. Returns how it ended."""
     woken, wake = os.pipe()
     os.set_blocking(wake, False)
     signal.set_wakeup_fd(wake)
@@ -48,8 +48,9 @@ def run(words: list[str], worker: socket.socket) -> str:
         process = subprocess.Popen(words, stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=die_with_us)
     except OSError as error:
         return f"error {error.errno}"
+    sources: list[socket.socket | int] = [worker, woken]
     while process.poll() is None:
-        ready, _, _ = select.select([worker, woken], [], [])
+        ready, _, _ = select.select(sources, [], [])
         if worker in ready:
             end(process)
         else:
@@ -60,8 +61,8 @@ def run(words: list[str], worker: socket.socket) -> str:
     return f"exit {code}" if code >= 0 else f"signal {-code}"
 
 
-def end(process: subprocess.Popen) -> None:
-    """Asks before it kills: some have something to put away, such as a container."""
+def end(process: subprocess.Popen[bytes]) -> None:
+    """Asks the command to end before it kills it: some have something to clean up, such as a container."""
     signal_group(process.pid, signal.SIGTERM)
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(GRACE)
@@ -70,7 +71,7 @@ def end(process: subprocess.Popen) -> None:
 
 
 def kill_children() -> None:
-    """Kills what has left the command's process group: what lost its parent is our own child by now."""
+    """Kills processes that have left the command's group. Those that lost their parent are our own children by now."""
     until = time.monotonic() + PATIENCE
     while (pids := children()) and time.monotonic() < until:
         for pid in pids:
@@ -86,11 +87,11 @@ def signal_group(group: int, number: int) -> None:
 
 
 def children() -> list[int]:
-    """Our child processes, also those that have ended; none where there is no /proc."""
+    """Our child processes, including ended ones; none where there is no /proc."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError, ValueError, IndexError):
-            # The second field is a name in parentheses, which may hold anything.
+            # The second field is a name in parentheses, which may contain anything.
             fields = (entry / "stat").read_text(errors="replace").rpartition(")")[2].split()
             if int(fields[1]) == os.getpid():
                 found.append(int(entry.name))
@@ -103,7 +104,7 @@ def die_with_us() -> None:
 
 
 def prctl(option: int, value: int) -> None:
-    """Linux' prctl, where there is one."""
+    """Calls Linux' prctl, where there is one."""
     with contextlib.suppress(ImportError, OSError, AttributeError):
         import ctypes
 

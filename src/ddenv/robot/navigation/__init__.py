@@ -1,1 +1,1 @@
-"""How the robot finds its way: from what it measures to how it wants to move."""
+"""The controllers that come with ddenv: from what the robot measures to how it drives."""

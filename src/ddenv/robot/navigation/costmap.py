@@ -1,111 +1,30 @@
-"""What the lidar has seen around the robot: a square map that rolls along with it."""
+"""The costmap: what the lidar has seen around the robot, on a square grid that moves along with it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.protocol import Setup
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
 
-# Points nearer to the robot than this part of its padding count as touched.
-TOUCHED = 0.6
-# Turns a direction, with its parts the other way round, to the left.
-LEFT = np.array([-1.0, 1.0])
-
-
-@dataclass(frozen=True, slots=True)
-class Footprint:
-    """How far the robot reaches from its origin, m: `ahead`, `behind`, and to each `side`, which are taken as equal.
-
-    What is nearer than `margin` (m) counts as touched.
-    """
-
-    ahead: float
-    behind: float
-    side: float
-    margin: float = 0.0
-
-    @classmethod
-    def of(cls, setup: Setup) -> Footprint:
-        """That of the robot of `setup`."""
-        ahead, behind, left, right = setup.footprint
-        return cls(ahead, behind, max(left, right), TOUCHED * setup.settings.planner.padding)
-
-    @property
-    def inscribed(self) -> float:
-        """Radius (m) about the origin that the robot covers however it is turned."""
-        return min(self.ahead, self.behind, self.side)
-
-    @property
-    def circumscribed(self) -> float:
-        """Radius (m) about the origin beyond which the robot never reaches."""
-        return float(np.hypot(max(self.ahead, self.behind), self.side))
-
-    def apart(self, points: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """How far (K, N) m `points` (3, N), the third row 1, are from the footprint with its margin at least; inside below 0.
-
-        `places` (2, K, 3) turn such a point into how far ahead and how far aside of the robot it is, for each of K places.
-        """
-        beyond = places.reshape(-1, 3) @ points
-        count = places.shape[1]
-        beyond[:count] -= (self.ahead - self.behind) / 2
-        np.abs(beyond, out=beyond)
-        beyond[:count] -= (self.ahead + self.behind) / 2 + self.margin
-        beyond[count:] -= self.side + self.margin
-        return np.maximum(beyond[:count], beyond[count:])
-
-
-def legs_beside(
-    points: np.ndarray,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    back: np.ndarray | float,
-    on: np.ndarray | float,
-    side: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which straight legs are free of `points` (N, 2), N > 0, and how near (m) the nearest point is to each; both (K,).
-
-    A leg from `starts` (K, 2) to `ends` (K, 2) is free if no point is within `side` of it, from `back` (K,) before its start to
-    `on` (K,) after its end. All in m.
-    """
-    ways = ends - starts
-    lengths = np.sqrt((ways * ways).sum(axis=1, keepdims=True))
-    np.maximum(lengths, 1e-9, out=lengths)
-    ways = ways / lengths
-    across_them = ways[:, ::-1] * LEFT
-    along = ways @ points.T
-    along -= (ways * starts).sum(axis=1, keepdims=True)
-    across = across_them @ points.T
-    across -= (across_them * starts).sum(axis=1, keepdims=True)
-    np.abs(across, out=across)
-    after = along - lengths
-    hit = along > -np.asarray(back)[..., None]
-    hit &= across < side
-    hit &= after < np.asarray(on)[..., None]
-    beyond = np.maximum(np.negative(along, out=along), after, out=along)
-    np.maximum(beyond, 0.0, out=beyond)
-    beyond *= beyond
-    across *= across
-    across += beyond
-    return ~hit.any(axis=1), np.sqrt(across.min(axis=1))
-
-
-# A beam that goes this much farther than a cell, in cells, has shown that nothing is there any more.
+# A beam clears a cell if it goes farther than the cell by this many cells.
 PASSED = 1.5
-# Tilted more than this (rad), beams pass over or under what they would clear.
+# When the robot tilts more than this (rad), its beams pass above or below what they would clear.
 LEVEL = 0.12
 
 
 class Costmap:
-    """Cells in which a beam has ended, aligned with the frame of the estimates. Each cell keeps the last place that was hit in it.
+    """The occupied cells around the robot, aligned with the frame of the pose estimates. Cells that no beam has seen are free.
 
-    A cell's slot is its number modulo the map's width: as the map rolls, what drops out at one side makes place for what comes
-    in at the other. What was not seen counts as free. `spots` (3, N) are all places that were hit, x and y in m and 1,
-    `version` counts how often something appeared that is not beside what was there, or went away altogether.
+    Each occupied cell keeps the last point at which a beam ended in it. The cells are stored in slots, numbered modulo the map's
+    width: as the map moves, cells that enter on one side take the slots of those that leave on the other. `spots` (3, N) are all
+    those points: x and y in m, and 1. `version` counts the changes: something appeared away from everything known, or something
+    vanished altogether.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -115,43 +34,43 @@ class Costmap:
         self.spots = np.empty((3, 0))
         self.version = 0
         body = Footprint.of(setup)
-        # One cell of the rim stays: a robot that turns may still hit what is there.
+        # One cell of the rim is kept: a robot that turns may still hit what is there.
         self._middle = (body.ahead - body.behind) / 2
         self._half = (body.ahead + body.behind) / 2 - self.resolution
         self._side = body.side - self.resolution
-        # The wheels stand this far below the frame that the points are in.
+        # The wheels stand this far below the frame of the points.
         self._lowest = planner.lowest - setup.radius
-        self._slots = np.empty(0, dtype=int)
-        # The slots that were hit when the version last changed, and those that are among or beside them, (count^2,).
+        self._slots: Integers = np.empty(0, dtype=int)
+        # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
         self._known = self._slots
-        self._around = np.zeros(self.count**2, dtype=bool)
+        self._around: Booleans = np.zeros(self.count**2, dtype=bool)
         beside = (-1, 0, 1)
         self._beside = np.array([[dx * self.count + dy] for dx in beside for dy in beside])
-        self._hit = np.zeros(self.count**2, dtype=bool)
+        self._hit: Booleans = np.zeros(self.count**2, dtype=bool)
         self._places = np.ones((3, self.count**2))
-        self._angles: np.ndarray | None = None
+        self._angles: Floats | None = None
         self._beams = np.empty((2, 0))
-        # The cell in the middle, and how far the nearest of three neighbouring beams went.
+        # The robot's cell, and the least range of each three neighbouring beams, m.
         self._cell: tuple[int, int] | None = None
         self._far = np.empty(0)
 
     @property
-    def points(self) -> np.ndarray:
-        """The places that were hit, (N, 2) m."""
+    def points(self) -> Floats:
+        """The points at which beams ended, (N, 2) m."""
         return self.spots[:2].T
 
     def see(self, scan: Scan, estimate: Estimate, imu: Imu | None = None) -> None:
-        """Take in what `scan` shows to a robot at `estimate`, tilted as `imu` says."""
+        """Adds what `scan` shows, and clears what its beams pass through; `estimate` and `imu` are the robot's pose and tilt."""
         if scan.angles is not self._angles:
             self._angles, self._beams = scan.angles, np.stack([np.cos(scan.angles), np.sin(scan.angles)])
-            # The outermost beams clear nothing, nor is there anything beyond them.
+            # The outermost beams, which have one neighbour only, clear nothing.
             self._far = np.zeros(len(scan.angles))
         roll, pitch = (imu.roll, imu.pitch) if imu else (0.0, 0.0)
         self._mark(scan, estimate, roll, pitch)
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)
 
     def forget(self, estimate: Estimate, beyond: float, beyond_unseen: float) -> None:
-        """Clear the map where it is farther than `beyond` (m) from the robot, `beyond_unseen` (m) where no beam goes now."""
+        """Clears the map beyond `beyond` (m) from the robot, or beyond `beyond_unseen` (m) outside the lidar's field of view."""
         dx, dy = (self.points - (estimate.x, estimate.y)).T
         bearings = np.arctan2(dy, dx) - estimate.heading
         bearings -= math.tau * np.round(bearings / math.tau)
@@ -181,7 +100,7 @@ class Costmap:
         self._places[:2, slots] = places
 
     def _clear(self, scan: Scan, estimate: Estimate, level: bool) -> None:
-        """Drop what is out of the map, under the robot or, if the beams are level, where they have passed through."""
+        """Clears what is off the map, under the robot or, if the beams are `level`, where they have passed through."""
         (slots,) = self._hit.nonzero()
         spots = self._places.take(slots, axis=1)
         cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
@@ -199,11 +118,12 @@ class Costmap:
             gone |= self._seen_through(scan, seen[0] + (self._middle - scan.origin[0]), seen[1] - scan.origin[1])
         if gone.any():
             self._hit[slots[gone]] = False
-            slots, spots = slots[~gone], spots[:, ~gone]
+            kept: Booleans = ~gone
+            slots, spots = slots[kept], spots[:, kept]
         self._keep(slots, spots)
 
-    def _seen_through(self, scan: Scan, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Past which places (N,), seen from the lidar, the nearest beam and those beside it went on."""
+    def _seen_through(self, scan: Scan, x: Floats, y: Floats) -> Booleans:
+        """Which places (N,), given in the lidar's frame, the nearest beam and both its neighbours have passed."""
         ranges, first, far = scan.ranges, scan.angles[0], self._far
         np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
         np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
@@ -212,14 +132,15 @@ class Costmap:
         beams -= first
         beams /= step
         nearest = np.rint(beams, out=beams).astype(int)
-        return np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
+        passed: Booleans = np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
+        return passed
 
-    def _keep(self, slots: np.ndarray, spots: np.ndarray) -> None:
+    def _keep(self, slots: Integers, spots: Floats) -> None:
         same = len(slots) == len(self._slots) and bool((slots == self._slots).all())
         self._slots, self.spots = slots, spots
         if same:
             return
-        around = np.zeros(self.count**2, dtype=bool)
+        around: Booleans = np.zeros(self.count**2, dtype=bool)
         around[(slots + self._beside) % len(around)] = True
         if self._around[slots].all() and around[self._known].all():
             return
@@ -227,8 +148,8 @@ class Costmap:
         self.version += 1
 
 
-def _rotation(roll: float, pitch: float, heading: float) -> np.ndarray:
-    """From the robot's frame to one that is level and along the world's axes, (3, 3)."""
+def _rotation(roll: float, pitch: float, heading: float) -> Floats:
+    """The rotation (3, 3) from the robot's frame to the world frame."""
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)
     ch, sh = math.cos(heading), math.sin(heading)

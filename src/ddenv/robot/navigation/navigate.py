@@ -1,4 +1,4 @@
-"""Navigation around what the lidar sees: map, plan, follow, and recover when that leads nowhere."""
+"""The controllers `straight` and `costmap`: straight to the goal, or around obstacles with map, plan, pursuit and recovery."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ from ddenv.robot.protocol import STOP, Reading, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
 from ddenv.robot.sensing.sensors import Imu
 
-# The robot stops when it believes to be this far inside the goal's tolerance (a fraction of it).
+# A controller stops when the estimated distance to the goal is within this fraction of its tolerance.
 ARRIVED = 0.2
 
 
 class Straight:
-    """Drives to the goal in a straight line, turning on the spot when it lies behind. Once it believes to be there it stays."""
+    """Drives straight to the goal by proportional heading control, turning on the spot while the goal lies behind.
+
+    Once the pose estimate has reached the goal the robot stays there.
+    """
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -36,21 +39,21 @@ class Straight:
             return STOP
         error = wrap(math.atan2(dy, dx) - estimate.heading)
         wanted = setup.speed * max(0.0, math.cos(error))
-        # Faster starts lift the front wheels; slowing down is left to the goal's tolerance.
+        # Faster starts lift the front wheels. The robot need not brake gently: it stops well inside the tolerance.
         self._speed = min(wanted, self._speed + setup.acceleration * setup.period)
         turn = min(max(self._gain * error, -setup.turn_rate), setup.turn_rate)
         return Twist(self._speed, turn)
 
 
-# It moved if it is this far (m) from where it was, or turned by this (rad).
+# The robot made progress when it moved this far (m), or turned by this angle (rad).
 MOVED = 0.1
 TURNED = 0.3
-# Turning alone counts for no longer than this many times the patience.
+# Turning alone counts as progress for no longer than this many times the patience.
 ON_THE_SPOT = 4
 
 
 class Progress:
-    """Remembers where the robot last got further, and since when it does not."""
+    """Watches whether the robot still makes progress: since when it has neither moved nor turned."""
 
     def __init__(self, patience: float) -> None:
         self._patience = patience
@@ -59,11 +62,11 @@ class Progress:
         self._moved = self._turned = 0.0
 
     def begin(self) -> None:
-        """From now on it has to get further again."""
+        """Forgets the past: from now on the robot has to make progress again."""
         self._from = None
 
     def is_stalled(self, time: float, estimate: Estimate) -> bool:
-        """Whether the robot at `estimate` has not moved for too long."""
+        """Whether the robot at `estimate` has made no progress for too long at `time` (s)."""
         if self._from is None or math.hypot(estimate.x - self._from.x, estimate.y - self._from.y) >= MOVED:
             self._from, self._moved = estimate, time
             self._heading, self._turned = estimate.heading, time
@@ -72,30 +75,34 @@ class Progress:
         return time - self._turned >= self._patience or time - self._moved >= ON_THE_SPOT * self._patience
 
 
-# Scans that come faster than this (s) are left out, and of a robot that waits where it is, these.
+# The minimum time between two scans that the map takes in, s; and while the robot waits in place.
 LOOK_EVERY = 0.2
 LOOK_WAITING = 0.6
-# Between two plans, at least, s; and without a plan for so long, the robot tries to recover, s.
+# The minimum time between two plans, s; after this time without any plan the robot starts a recovery behaviour, s.
 THINK_EVERY = 0.5
 THINK = 1.0
-# Where it could not follow its plan, it makes no other one so soon until it is this far (m) away.
+# If the robot cannot follow its plan, it makes no new one within this distance (m) of where it made the last.
 ELSEWHERE = 0.1
-# A plan that ends at the map's border is made anew when less than this (m) is left of it.
+# A plan that ends at the map's border is renewed when less than this (m) is left of it.
 TOO_SHORT = 2.0
-# Farther beside its plan than this (m), the robot makes another.
+# A robot this far (m) off its plan makes a new one.
 BESIDE = 0.5
-# It stays with its plan if another is hardly shorter or roomier (m), unless it is so far (m) beside it.
+# The robot keeps its plan if a new one is less than this many times shorter and has no more than this additional room (m), unless
+# the robot is this far (m) off its plan.
 LONGER = 1.1
 CLOSER = 0.03
 SWAY = 0.2
-# So far (m) from where it last recovered, it begins to count its attempts anew.
+# This far (m) from its last recovery the robot starts to count its recovery attempts anew.
 BETTER = 0.5
-# Clocks that add up periods are off by less, s.
+# Clocks that add up periods deviate by less than this, s.
 TICK = 1e-6
 
 
 class Navigator:
-    """Drives to the goal around obstacles. `arrived` and `gave_up` are for good: the robot stays where it is."""
+    """Drives to the goal around obstacles, as move_base of ROS does: costmap, global plan, pure pursuit, recovery behaviours.
+
+    `arrived` and `gave_up` are final: the robot then stays where it is.
+    """
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
@@ -130,7 +137,7 @@ class Navigator:
         if self.arrived:
             return STOP
         twist = self._recover(reading) if self._attempt else self._follow(reading)
-        # Faster starts lift the front wheels; it may always brake.
+        # Faster starts lift the front wheels; braking is not limited.
         most = self._speed + self._setup.acceleration * self._setup.period
         if twist.speed > most:
             twist = Twist(most, twist.turn_rate * most / twist.speed)
@@ -148,7 +155,7 @@ class Navigator:
         self._see(reading.estimate)
 
     def _see(self, estimate: Estimate) -> None:
-        """Note what the map has to say about the path."""
+        """Collects the points near the robot, and checks whether the path is blocked."""
         spots, reach = self._map.spots, self._follower.reach
         near = (np.abs(spots[0] - estimate.x) < reach) & (np.abs(spots[1] - estimate.y) < reach)
         self._near = spots[:, near]
@@ -159,7 +166,7 @@ class Navigator:
         left = math.hypot(goal[0] - estimate.x, goal[1] - estimate.y)
         if left <= ARRIVED * tolerance:
             return True
-        # Where the goal itself is not free, the end of the plan must do.
+        # Where the goal itself is not free, the end of the plan has to do.
         path = self._path
         return path is not None and path.final and path.left <= ARRIVED * tolerance and left <= tolerance
 
@@ -175,7 +182,7 @@ class Navigator:
         return twist
 
     def _think(self, time: float, estimate: Estimate) -> None:
-        """Plan if there is a reason to, and from time to time if the map has changed."""
+        """Plans if there is a reason to, and from time to time if the map has changed."""
         since = time - self._planned + TICK
         is_due = since >= self._replan and self._map.version != self._planned_on
         if self._path is None or self._is_spoilt(self._path):
@@ -189,13 +196,13 @@ class Navigator:
             self._plan(time, estimate)
 
     def _is_no_use(self, estimate: Estimate) -> bool:
-        """Whether another plan would leave the robot where it is, too: this one was made from here, and it cannot follow it."""
+        """Whether a new plan would not help: the last one was made here, and the robot cannot follow it."""
         if not self._follower.stuck or self._blocked:
             return False
         return math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
 
     def _is_spoilt(self, path: Path) -> bool:
-        """Whether something is in the way, the robot has left it, or it ends soon at the map's border."""
+        """Whether the path is blocked, the robot cannot follow it or has left it, or it soon ends at the map's border."""
         if self._blocked or self._follower.stuck or path.off > BESIDE:
             return True
         return not path.final and path.left < TOO_SHORT
@@ -211,7 +218,7 @@ class Navigator:
             self._path, self._blocked = path, False
 
     def _is_as_good(self, other: Path) -> bool:
-        """Whether the path is hardly worse than `other`: a robot that changes its mind all the time sways."""
+        """Whether the present path is hardly worse than `other`: a robot that keeps changing its plan swerves."""
         path, points = self._path, self._map.points
         if path is None or self._is_spoilt(path) or path.off > SWAY or path.final < other.final:
             return False
@@ -230,7 +237,7 @@ class Navigator:
         return STOP if self.gave_up else self._recover(reading)
 
     def _recover(self, reading: Reading) -> Twist:
-        twist = self._attempt.step(reading.time, reading.estimate, self._map)
+        twist = self._attempt.step(reading.time, reading.estimate, self._map) if self._attempt else None
         if twist is not None:
             return twist
         self._attempt = self._path = None

@@ -1,4 +1,4 @@
-"""How the robot follows a path: it aims at a place ahead on it, and only goes where its footprint hits nothing."""
+"""Pure pursuit of a path: the robot aims at a point ahead on the path, and drives only where its footprint stays free."""
 
 from __future__ import annotations
 
@@ -6,66 +6,67 @@ import math
 
 import numpy as np
 
-from ddenv.robot.navigation.costmap import Footprint
+from ddenv.arrays import Floats
+from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.navigation.route import Path
 from ddenv.robot.protocol import STOP, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
 
-# Parts of the look-ahead at which the robot aims, the first whose arc is free.
+# Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
-# It can stop like this, m/s^2.
+# The deceleration that the robot can rely on, m/s^2.
 BRAKE = 1.0
-# Standing, it aims at this part of the look-ahead: the slower, the closer it keeps to its path.
+# At a standstill it aims at this part of the lookahead distance: the slower it is, the closer it keeps to its path.
 NEAREST = 0.4
-# It turns on the spot when the path leads farther aside than this, until it is within the second, rad.
+# It turns on the spot when the path leads farther aside than the first angle, until it is within the second, rad.
 ASIDE = 0.9
 ALONG = 0.25
-# Turned along its path to this (rad) and still not free, it stays.
+# When it is aligned with its path within this angle (rad) and still not free, it stops.
 ALIGNED = 0.04
 # Slower turns than this (rad/s) are lost between the wheels and the ground.
 LEAST_TURN = 0.2
 BACK_SPEED = 0.25  # m/s
-# How much nearer (m) something within its margin may come in a step.
+# A point within the margin may come nearer by this in a step, m.
 GIVE = 0.001
-# With this much room (m) at its sides it goes at full speed, with none at this part of it.
+# With this much room (m) around it the robot drives at full speed, with no room at this part of it.
 ROOM = 0.35
 SLOWEST = 0.25
-# With this much (m) it need not look again for this time, s.
+# With this much room (m) it need not test its arc again for this time, s.
 CALM = 0.1
 CALM_FOR = 0.1
-# Parts of an arc at which it is tested.
+# The parts of an arc at which the footprint is tested.
 PLACES = np.linspace(0.0, 1.0, 7)
-# An arc is bent at least so much, rad: too little to matter.
+# The minimum curvature of an arc, rad: too little to matter.
 BENT = 1e-6
 
 
 class Follower:
-    """Pure pursuit of `path` within the limits of `setup`. `stuck` tells that the last step found nowhere to go."""
+    """Follows paths within the limits of `setup`. `stuck` is True if the last step found no free way to move."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self._gain = setup.settings.heading_gain
         self._look_ahead = setup.settings.planner.look_ahead
         self._body = Footprint.of(setup)
-        # Faster, it could not stop within what it knows to be free.
+        # Faster, the robot could not stop within the space that it knows to be free.
         self._fastest = min(setup.speed, math.sqrt(2 * BRAKE * self._look_ahead))
         self._turning = False
         self._path: Path | None = None
-        self._points: np.ndarray | None = None
-        # What was free, with room, is not tested again for so many steps.
+        self._points: Floats | None = None
+        # An arc that was free, with room, is not tested again for this many steps.
         self._calm = round(CALM_FOR / setup.period)
         self._left = 0
         self._room = 0.0
         self.reach = self._body.circumscribed + self._look_ahead + ROOM + self._body.margin
         self.stuck = False
 
-    def step(self, path: Path, estimate: Estimate, points: np.ndarray) -> Twist:
-        """Where to go next on `path`, with `points` (3, N) near the robot: x and y (m) in the frame of the estimates, and 1."""
+    def step(self, path: Path, estimate: Estimate, points: Floats) -> Twist:
+        """The command to follow `path`. `points` (3, N) near the robot are x, y (m) and 1, in the frame of the estimates."""
         path.locate(estimate.x, estimate.y)
         distance, bearing = self._aim(path, estimate, PARTS[0])
         turning = abs(bearing) > (ALONG if self._turning else ASIDE)
         same = path is self._path and turning == self._turning
-        # Standing, it waits for what it sees next.
+        # A stopped robot waits for the next scan.
         if same and self.stuck and points is self._points:
             return STOP
         self._path, self._points, self._turning = path, points, turning
@@ -86,14 +87,14 @@ class Follower:
         return self._turn(bearing, estimate, points)
 
     def _aim(self, path: Path, estimate: Estimate, part: float) -> tuple[float, float]:
-        """How far away (m) and in which direction (rad, from straight ahead) the place is that the robot aims at."""
+        """The distance (m) and the bearing (rad, from straight ahead) of the point that the robot aims at."""
         share = NEAREST + (1 - NEAREST) * min(max(estimate.speed / self._fastest, 0.0), 1.0)
         x, y = path.ahead(part * share * self._look_ahead)
         dx, dy = x - estimate.x, y - estimate.y
         return math.hypot(dx, dy), wrap(math.atan2(dy, dx) - estimate.heading)
 
-    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: np.ndarray) -> float | None:
-        """How far (m) from all `points` the robot stays on its arc to the place that it aims at; None if it touches one."""
+    def _room_on_arc(self, distance: float, bearing: float, estimate: Estimate, points: Floats) -> float | None:
+        """The distance (m) that the robot keeps from all `points` on its arc to the aim; None if it touches one."""
         if abs(bearing) > ASIDE:
             return None
         if not points.shape[1]:
@@ -106,21 +107,21 @@ class Follower:
         fastest = self._fastest * (SLOWEST + (1 - SLOWEST) * min(room / ROOM, 1.0))
         if abs(bend) > 1e-6:
             fastest = min(fastest, self._setup.turn_rate / abs(bend))
-        # Nothing is known of what is beyond the arc; before the goal it brakes half as hard.
+        # Nothing is known beyond the arc. Before the goal the robot brakes half as hard.
         fastest = min(fastest, math.sqrt(2 * BRAKE * arc))
         if path.final:
             fastest = min(fastest, math.sqrt(BRAKE * path.left))
         fastest *= max(math.cos(bearing), 0.0)
         return Twist(fastest, fastest * bend)
 
-    def _turn(self, bearing: float, estimate: Estimate, points: np.ndarray) -> Twist:
-        """On the spot towards `bearing` (rad), by the other side if only that is free, or back to where there is room to turn."""
+    def _turn(self, bearing: float, estimate: Estimate, points: Floats) -> Twist:
+        """Turns on the spot towards `bearing` (rad), the other way round if only that is free, or backs up to make room."""
         if abs(bearing) < ALIGNED:
             self.stuck = True
             return STOP
         rate = min(max(self._gain * abs(bearing), LEAST_TURN), self._setup.turn_rate)
         sides = (1.0, -1.0) if bearing > 0 else (-1.0, 1.0)
-        # What is nearly ahead is not looked for all the way round.
+        # For a small bearing the robot does not turn the long way round.
         for side in sides if abs(bearing) > math.pi / 2 else sides[:1]:
             if may_turn(self._body, points, estimate, side):
                 return Twist(0.0, side * rate)
@@ -130,11 +131,11 @@ class Follower:
         return STOP
 
 
-def room(body: Footprint, points: np.ndarray, estimate: Estimate, places: np.ndarray) -> float | None:
-    """How far (m) `body` stays from `points` (3, N) at `places` (2, K, 3) as seen by the robot at `estimate`, the first its own.
+def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) -> float | None:
+    """The distance (m) that `body` keeps from `points` (3, N) at `places` (2, K, 3), see `Footprint.apart`; None if it touches one.
 
-    None if it touches one: what is within the margin already may come a little nearer, so that it can turn away, but not be
-    touched, or touched harder.
+    `places` are relative to the robot at `estimate`; the first one is where it is now. A point within the margin may come a little
+    nearer, so that the robot can turn away from it, but must not be touched, or touched harder.
     """
     apart = body.apart(points, places @ _seen_from(estimate))
     least = float(apart.min())
@@ -145,29 +146,29 @@ def room(body: Footprint, points: np.ndarray, estimate: Estimate, places: np.nda
     return None if (nearest < may).any() else 0.0
 
 
-def may_turn(body: Footprint, points: np.ndarray, estimate: Estimate, side: float) -> bool:
-    """Whether the robot may turn on the spot a little, to its left if `side` is 1, else -1, past `points` (3, N)."""
+def may_turn(body: Footprint, points: Floats, estimate: Estimate, side: float) -> bool:
+    """Whether the robot can turn on the spot a little without touching `points` (3, N); `side` is 1 for left, -1 for right."""
     return not points.shape[1] or room(body, points, estimate, LEFT if side > 0 else RIGHT) is not None
 
 
-def may_back_up(body: Footprint, points: np.ndarray, estimate: Estimate) -> bool:
-    """Whether the robot may go straight back a little past `points` (3, N)."""
+def may_back_up(body: Footprint, points: Floats, estimate: Estimate) -> bool:
+    """Whether the robot can back up a little without touching `points` (3, N)."""
     return not points.shape[1] or room(body, points, estimate, BACK) is not None
 
 
-def _seen_from(estimate: Estimate) -> np.ndarray:
-    """What turns places (3,), the third number 1, in the frame of the estimates into those that the robot sees, (3, 3)."""
+def _seen_from(estimate: Estimate) -> Floats:
+    """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and 1."""
     x, y = estimate.x, estimate.y
     cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
     return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
 
 
-def _turned(angle: float) -> np.ndarray:
+def _turned(angle: float) -> Floats:
     return _seen_from(Estimate(0.0, 0.0, angle))[:2]
 
 
-def _arc(distance: float, bearing: float) -> np.ndarray:
-    """Places on the arc from the robot to where it aims, for `Footprint.apart`."""
+def _arc(distance: float, bearing: float) -> Floats:
+    """Poses on the arc from the robot to its aim, (2, K, 3), as for `Footprint.apart`."""
     bearing = math.copysign(max(abs(bearing), BENT), bearing)
     radius = distance / (2 * math.sin(bearing))
     headings = PLACES * (2 * bearing)
@@ -181,7 +182,7 @@ def _arc(distance: float, bearing: float) -> np.ndarray:
     return places
 
 
-# Turned on the spot, and a little back.
+# Small turns on the spot, and a little way back.
 LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
 RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
 BACK = np.stack([_seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

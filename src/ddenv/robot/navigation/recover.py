@@ -1,4 +1,4 @@
-"""What the robot tries when it gets no further, one after another, as move_base does."""
+"""Recovery behaviours: what the robot tries, one after another, when it makes no progress, as move_base of ROS does."""
 
 from __future__ import annotations
 
@@ -6,29 +6,30 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ddenv.robot.navigation.costmap import Costmap, Footprint
+from ddenv.robot.navigation.costmap import Costmap
+from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.navigation.pursuit import BACK_SPEED, may_back_up, may_turn
 from ddenv.robot.protocol import STOP, Setup, Twist
 from ddenv.robot.sensing.estimate import Estimate, wrap
 
-# What stays on the map, m around the robot, when the rest is forgotten.
+# Clearing the costmap keeps what is within this distance of the robot, m.
 NEAR = 1.5
-# After forgetting, the lidar has to see again what is there, s.
+# After clearing, the lidar gets this time to see obstacles again, s.
 LOOK = 0.5
 BACK = 0.4  # m
-# An attempt that does not get there ends after this time, s.
+# The maximum duration of a behaviour, s.
 LONGEST_BACK = 4.0
 LONGEST_TURN = 15.0
 
 
 class Attempt(Protocol):
-    """Something the robot tries: commands until it is over, then None."""
+    """A recovery behaviour: commands until it is over, then None."""
 
     def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None: ...
 
 
 class Forget:
-    """Forgets what is farther away than `beyond` (m), and looks again. What is near and out of sight it had better not forget."""
+    """Clears the costmap beyond `beyond` (m) and looks again. It keeps what is near and outside the lidar's field of view."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate, beyond: float) -> None:
         self._until = time + LOOK
@@ -42,7 +43,7 @@ class Forget:
 
 
 class BackUp:
-    """Goes back a little, as long as nothing is there."""
+    """Backs up a little, as long as nothing is there."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
         self._body = Footprint.of(setup)
@@ -58,7 +59,7 @@ class BackUp:
 
 
 class LookAround:
-    """Turns once around on the spot, as long as nothing is in the way."""
+    """Turns around once on the spot, as long as nothing is in the way."""
 
     def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
         self._body = Footprint.of(setup)
@@ -77,13 +78,13 @@ class LookAround:
 
 @dataclass(slots=True)
 class Recovery:
-    """Attempts in turn. `made` counts those since the robot last made progress."""
+    """Chooses recovery behaviours in turn. `made` counts those since the robot last made progress."""
 
     setup: Setup
     made: int = 0
 
     def next(self, time: float, estimate: Estimate) -> Attempt | None:
-        """What to try now; None when the robot has tried as often as it may."""
+        """The next behaviour; None once the scenario's maximum number of recoveries is reached."""
         if self.made >= self.setup.settings.planner.recoveries:
             return None
         self.made += 1

@@ -1,4 +1,4 @@
-"""The way to the goal around what is on the map."""
+"""The global planner: a path to the goal around the points on the map, by Dijkstra's search on a grid."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ddenv.robot.navigation.costmap import Footprint, legs_beside
+from ddenv.arrays import Floats, Integers
+from ddenv.robot.navigation.footprint import Footprint, legs_beside
 from ddenv.robot.protocol import Setup
 
 Place = tuple[float, float]
@@ -18,7 +19,7 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """From (x, y) along (cosine, sine) for `length` (m)."""
+    """A straight leg from (x, y) in the direction (cosine, sine), `length` m long."""
 
     x: float
     y: float
@@ -28,10 +29,10 @@ class Leg:
 
 
 class Path:
-    """Straight legs between `corners` (x, y; m), at least two.
+    """Straight legs between at least two `corners` (x, y in m).
 
-    `final` tells whether it ends where the robot wants to be in the end. `back` and `on` (m) are how much free ground each leg
-    was given before its start and after its end. `off` (m) is how far beside it the robot is.
+    `final` is True if the path ends at the goal, not at the map's border. `back` and `on` (m) are how much free ground each leg
+    has before its start and after its end. `off` (m) is the robot's distance from the path.
     """
 
     def __init__(self, corners: list[Place], final: bool = True, back: float = 0.0, on: float = 0.0) -> None:
@@ -40,7 +41,7 @@ class Path:
         self.back, self.on = back, on
         self.off = 0.0
         self._legs = [_leg(*pair) for pair in pairwise(corners)]
-        # How long the rest is from the start of each leg.
+        # The length of the path from the start of each leg.
         self._rests = list(accumulate(leg.length for leg in self._legs[::-1]))[::-1]
         self._number = 0
         self._along = 0.0
@@ -51,11 +52,11 @@ class Path:
 
     @property
     def left(self) -> float:
-        """How long (m) the rest of it is."""
+        """The length (m) of what is left of the path."""
         return self._rests[self._number] - self._along
 
     def locate(self, x: float, y: float) -> None:
-        """Note that the robot is at (x, y): it never goes back, and reaches the legs in turn."""
+        """Projects the robot at (x, y) onto the path: it never moves back along it, and reaches the legs in turn."""
         self.off = math.inf
         for number in range(self._number, min(self._number + 2, len(self._legs))):
             leg = self._legs[number]
@@ -75,8 +76,8 @@ class Path:
         along = min(along, leg.length)
         return leg.x + along * leg.cosine, leg.y + along * leg.sine
 
-    def rest(self) -> np.ndarray:
-        """The corners (K, 2) m that are left, beginning where the robot is along it."""
+    def rest(self) -> Floats:
+        """The corners (K, 2) m of what is left of the path, beginning with the robot's projection onto it."""
         return np.array([self.ahead(0.0), *self.corners[self._number + 1 :]])
 
 
@@ -88,74 +89,76 @@ def _leg(start: Place, end: Place) -> Leg:
     return Leg(*start, dx / length, dy / length, length)
 
 
-# Steps from a cell in the order of their direction, counterclockwise from x; the axis of number k is k % 4.
+# Steps from a cell, counterclockwise from the x axis; step k runs along axis k % 4.
 STEPS = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 AXES = np.arange(8) % 4
-# Longer than any way: what cannot be passed is infinitely long.
+# Longer than any path: only what cannot be passed is longer.
 LONGEST = 1e9
 
 
 class Grid:
-    """`count` x `count` cells, numbered row by row: the cell at column x and row y of x first has the number x * count + y."""
+    """`count` x `count` cells for Dijkstra's search. The cell at column x and row y has the number x * count + y."""
 
     def __init__(self, count: int) -> None:
         self.count = count
         cells = np.arange(count * count)
         x, y = np.divmod(cells, count)
         inside = [(x + dx >= 0) & (x + dx < count) & (y + dy >= 0) & (y + dy < count) for dx, dy in STEPS]
-        # A step out of the grid leads nowhere.
-        to = [np.where(there, cells + dx * count + dy, cells) for there, (dx, dy) in zip(inside, STEPS, strict=True)]
-        to = np.stack(to, axis=1).astype(np.int32)
-        # Where the factors (4, cells) of a step's two ends are, flat.
+        # A step out of the grid leads back to its own cell.
+        ends = [np.where(there, cells + dx * count + dy, cells) for there, (dx, dy) in zip(inside, STEPS, strict=True)]
+        to = np.stack(ends, axis=1).astype(np.int32)
+        # The indices of the factors (4, cells), flattened, at a step's two ends.
         self._here = (AXES * len(cells) + cells[:, None]).ravel()
         self._there = (AXES * len(cells) + to).ravel()
         self._lengths = np.tile([np.hypot(dx, dy) / 2 for dx, dy in STEPS], len(cells))
         starts = np.arange(0, to.size + 1, len(STEPS), dtype=np.int32)
         self._graph = csr_matrix((np.ones(to.size), to.ravel(), starts), shape=(len(cells), len(cells)))
 
-    def search(self, factors: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
-        """How long, in cells, the cheapest way from `start` to each cell is, infinite if there is none, and from which it comes.
+    def search(self, factors: Floats, start: int) -> tuple[Floats, Integers]:
+        """Searches the cheapest paths from `start` to all cells.
 
-        `factors` (4, cells) is how much longer than it is a step along x, along the first diagonal, along y and along the
-        second diagonal counts in each cell, at least 1, infinite where it cannot be; a step counts with the mean of its ends'.
+        Returns their lengths (cells,), in cells and infinite where there is none, and the last cell before each cell (cells,).
+        `factors` (4, cells) multiply the length of a step along x, the first diagonal, y and the second diagonal in each cell: at
+        least 1, infinite where the cell cannot be passed. A step counts with the mean of the factors at its two ends.
         """
         flat = factors.ravel()
         self._graph.data = (flat[self._here] + flat[self._there]) * self._lengths
-        return dijkstra(self._graph, indices=start, return_predecessors=True, limit=LONGEST)
+        lengths, sources = dijkstra(self._graph, indices=start, return_predecessors=True, limit=LONGEST)
+        return lengths, sources
 
 
-def way_to(cell: int, sources: np.ndarray) -> list[int]:
-    """The cells from the search's start to `cell`, both included."""
-    way = [cell]
-    while sources[way[-1]] >= 0:
-        way.append(int(sources[way[-1]]))
-    return way[::-1]
+def path_to(cell: int, sources: Integers) -> list[int]:
+    """The cells from the start of a search to `cell`, both included; `sources` are from `Grid.search`."""
+    path = [cell]
+    while sources[path[-1]] >= 0:
+        path.append(int(sources[path[-1]]))
+    return path[::-1]
 
 
-# Ways are searched on a grid this much coarser than the map: places are kept to the centimetre, so that no gap is lost by it.
+# The search's grid is coarser than the map by this factor. Points keep their exact places, so that no gap is lost.
 COARSER = 2
-# How much longer than it is a way right beside an obstacle counts, less 1, and how fast that falls with the distance, 1/m.
+# The additional cost of a path right beside an obstacle, and how fast it decays with the distance, 1/m.
 WEIGHT = 4.0
 FALL = 5.0
-# How many times longer a way counts along which only a shorter robot would fit: straightened, it may fit this one.
+# The factor for a direction in which only a shorter robot would fit: the straightened path may fit this one.
 TIGHT = 1.5
-# How much longer a blocked way counts where the robot already is: it has to get out of there.
+# The factor for blocked cells where the robot already is: it has to get out of there.
 HEAVY = 50.0
-# Corners at which a way may be cut short are at most this many cells apart.
+# A path can be cut short at corners that are at most this many cells apart.
 APART = 3
-# A way cut short may come nearer to an obstacle by this, m.
+# A shortcut may come nearer to an obstacle by this, m.
 NEARER = 0.015
-# A way so little longer than the straight line is not searched again.
+# A path at most this many times longer than the straight line is not searched again.
 STRAIGHT = 1.03
-# Before and after a narrow place the robot goes straight on for the first of these (m) for which there is room.
+# Before and after a narrow place the path goes straight on for the first of these distances (m) that is free.
 STRAIGHT_ON = np.array([0.8, 0.5, 0.25])
-# A turn there is no sharper than this, as the cosine of its angle.
+# The sharpest turn there, as the cosine of its angle.
 SHARPEST = -0.3
 DIRECTIONS = tuple((math.cos(axis * math.pi / 4), math.sin(axis * math.pi / 4)) for axis in AXES[:4])
 
 
 class Planner:
-    """Finds ways on which the robot, turned along each leg, touches nothing and keeps `padding` to its sides."""
+    """Finds paths on which the robot, aligned with each leg, touches nothing and keeps its `padding` on both sides."""
 
     def __init__(self, setup: Setup) -> None:
         planner = setup.settings.planner
@@ -174,10 +177,10 @@ class Planner:
         self._start = middle * (self._grid.count + 1)
         self._close = np.flatnonzero(np.hypot(x - middle, y - middle) * self._step <= self._body.inscribed * 1.5)
 
-    def plan(self, points: np.ndarray, x: float, y: float) -> Path | None:
-        """From (x, y) to the goal, or to the best place at the map's border if it is outside, around `points` (N, 2); all in m.
+    def plan(self, points: Floats, x: float, y: float) -> Path | None:
+        """A path from (x, y) to the goal, or to the best place at the map's border if the goal lies beyond; None if there is none.
 
-        None if there is none.
+        It avoids `points` (N, 2). All in m.
         """
         straight = Path([(x, y), self._goal], back=self._body.inscribed, on=self._body.inscribed)
         if not len(points):
@@ -188,25 +191,26 @@ class Planner:
             return straight
         return self._search(points, (x, y))
 
-    def room(self, path: Path, points: np.ndarray) -> float | None:
-        """How near (m) the nearest of `points` (N, 2) m is to what is left of `path`; None if one stands in it."""
+    def room(self, path: Path, points: Floats) -> float | None:
+        """The distance (m) of the nearest of `points` (N, 2) m from what is left of `path`; None if one blocks it."""
         rest = path.rest()
+        inflation: float = self._inflation
         if not len(points) or len(rest) < 2:
-            return self._inflation
+            return inflation
         back = np.full(len(rest) - 1, path.back)
-        # What is beside the robot now is no matter of its way.
+        # What is beside the robot now does not block its path.
         back[0] = -min(self._body.ahead, path.left)
         free, near = legs_beside(points, rest[:-1], rest[1:], back, path.on, self._body.side)
-        return min(float(near.min()), self._inflation) if free.all() else None
+        return min(float(near.min()), inflation) if free.all() else None
 
-    def is_best(self, path: Path, points: np.ndarray) -> bool:
-        """Whether no way can be much better than what is left of `path`: it is free, with room, and nearly straight."""
+    def is_best(self, path: Path, points: Floats) -> bool:
+        """Whether no path can be much better than what is left of `path`: it is free, with room, and nearly straight."""
         room = self.room(path, points)
         if room is None or room < self._inflation:
             return False
         return path.left + math.dist(path.end, self._goal) <= STRAIGHT * math.dist(path.ahead(0.0), self._goal)
 
-    def _search(self, points: np.ndarray, start: Place) -> Path | None:
+    def _search(self, points: Floats, start: Place) -> Path | None:
         corner = (np.rint(np.array(start) / self._step) - self._grid.count // 2) * self._step
         factors, near = self._costs(points - corner)
         factors[:, self._close] = np.minimum(factors[:, self._close], HEAVY)
@@ -215,29 +219,29 @@ class Planner:
         to = self._target(lengths, corner, goal_is_free)
         if to is None:
             return None
-        # Also where the robot is in the goal's cell already, a way has two ends.
-        way = way_to(to, sources) if to != self._start else [to, to]
-        places = self._cells[way] + corner
+        # A path has two ends, even if the robot is in the goal's cell already.
+        route = path_to(to, sources) if to != self._start else [to, to]
+        places = self._cells[route] + corner
         left = math.dist(places[-1], self._goal)
         if goal_is_free and left <= self._step:
             places[-1] = self._goal
         elif to == self._start:
             places[-1] = start
         places[0] = start
-        corners = self._cut_short(places, near[way], points)
-        # A place at the map's border is on the way to a goal beyond it, however near to that it is.
+        corners = self._cut_short(places, near[route], points)
+        # A place at the map's border only leads to a goal beyond it, however near it is to the goal.
         final = left <= self._tolerance and self._is_on_map(corner)
         return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
 
-    def _is_on_map(self, corner: np.ndarray) -> bool:
+    def _is_on_map(self, corner: Floats) -> bool:
         ahead = np.array(self._goal) - corner
         return bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
 
-    def _target(self, lengths: np.ndarray, corner: np.ndarray, goal_is_free: bool) -> int | None:
+    def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""
         left = np.hypot(*(self._cells + corner - self._goal).T)
         if left.min() < self._step:
-            # The goal is on the map: there, or as near to it as it counts as reached.
+            # The goal is on the map: go there, or as near to it as still counts as reached.
             enough = max(self._tolerance, self._step) if goal_is_free else self._tolerance
             left[~((lengths < np.inf) & (left <= enough))] = np.inf
             best = int(left.argmin())
@@ -246,8 +250,8 @@ class Planner:
         best = int(whole.argmin())
         return int(self._border[best]) if whole[best] < np.inf else None
 
-    def _costs(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How much longer than it is a way counts along each axis (4, cells), and how near the nearest point is (cells,), m."""
+    def _costs(self, points: Floats) -> tuple[Floats, Floats]:
+        """The factors (4, cells) for `Grid.search`, and the distance of the nearest point to each cell (cells,), m."""
         count, step = self._grid.count, self._step
         widest = max(self._inflation, math.hypot(self._reach, self._side))
         around = np.arange(-math.ceil(widest / step), math.ceil(widest / step) + 1)
@@ -271,10 +275,10 @@ class Planner:
         factors[:, nearest < self._side] = np.inf
         return factors, nearest
 
-    def _cut_short(self, places: np.ndarray, near: np.ndarray, points: np.ndarray) -> list[Place]:
-        """The corners of a way over `places` (K, 2) m that is as free, but goes straight wherever it can.
+    def _cut_short(self, places: Floats, near: Floats, points: Floats) -> list[Place]:
+        """The corners of a path along `places` (K, 2) m that is as free, but straight wherever it can be.
 
-        `near` (K,) m is how near the nearest point is to each place: no leg comes nearer than the way it replaces.
+        `near` (K,) m is the distance of the nearest point to each place: no leg comes nearer than what it replaces.
         """
         turns = np.any(np.diff(places, 2, axis=0).round(6), axis=1)
         kept = np.ones(len(places), dtype=bool)
@@ -292,8 +296,8 @@ class Planner:
             corners.append(int(chosen[at]))
         return [(float(x), float(y)) for x, y in self._ease(places[corners], points)]
 
-    def _ease(self, corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """`corners` (K, 2) m moved away from narrow places: the robot comes there already turned, and leaves them straight."""
+    def _ease(self, corners: Floats, points: Floats) -> Floats:
+        """Moves `corners` (K, 2) m away from narrow places, so that the robot gets there aligned and leaves straight."""
         for number in range(1, len(corners) - 1):
             sides, here = corners[[number - 1, number + 1]], corners[number]
             _, near = legs_beside(points, sides, np.stack([here, here]), 0.0, 0.0, self._side)
@@ -302,7 +306,7 @@ class Planner:
             if near[narrow] >= self._body.circumscribed or not way.any():
                 continue
             tries = here + np.outer(STRAIGHT_ON, way / np.hypot(*way))
-            # Beside the robot as it stands there need not be room for it to be turned.
+            # Beside the robot as it stands now there may be no room for it to be turned.
             on = [0.0 if number + 2 * side - 1 == 0 else self._reach for side in (narrow, 1 - narrow)]
             ends = np.repeat([sides[narrow], sides[1 - narrow]], len(tries), axis=0)
             free, _ = legs_beside(
@@ -314,8 +318,9 @@ class Planner:
         return corners
 
 
-def _cosines(start: np.ndarray, corners: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Of the angles by which ways from `start` to `end` (2,) turn at `corners` (K, 2)."""
+def _cosines(start: Floats, corners: Floats, end: Floats) -> Floats:
+    """The cosines (K,) of the angles by which paths from `start` to `end` (2,) turn at `corners` (K, 2)."""
     come, go = corners - start, end - corners
     lengths = np.hypot(*come.T) * np.hypot(*go.T)
-    return (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)
+    cosines: Floats = (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)
+    return cosines

@@ -172,7 +172,8 @@ class Sleep:
         touching: Booleans = apart < TOUCH
         stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
         meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
-        return Situation(near, meeting.any(axis=1), stirring.any(axis=1), touching, together)
+        stirred = np.asarray(stirring.any(axis=1))
+        return Situation(near, meeting.any(axis=1), stirred, touching, together)
 
     def _wake(self, models: Booleans) -> None:
         """Lets the simulator move `models` (M,), starting from where they are now."""

@@ -1,1 +1,1 @@
-"""What the robot measures, and where it believes it is."""
+"""What the robot measures, and its pose estimate."""

@@ -1,6 +1,6 @@
-"""Casting beams: how far each of the beams of a lidar goes until it meets a shape.
+"""Casts the beams of a lidar: how far each one goes until it hits a shape.
 
-All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is met only with the beams
+All beams of a scan start in one point and lie in one plane, the x-y plane of the lidar. Each shape is tested only with the beams
 that point towards the box around it.
 """
 
@@ -13,26 +13,28 @@ from functools import cached_property
 
 import numpy as np
 
+from ddenv.arrays import Floats, Integers
 from ddenv.robot.sensing.crossing import Facets, Interval, ball, cube, pill, tube
 from ddenv.robot.sensing.obstacles import HULL, KINDS, PILL, Obstacles
 from ddenv.world.scenario import Lidar
 
-# What is left out is at least this much out of the way (m, rad, and as a part of the range): far more than rounding does.
+# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
+# larger than rounding errors.
 SPARE = 1e-6
 CROSSINGS = (cube, ball, tube)
-# Where each kind begins among sorted ones, and where the last one ends.
+# Where each kind begins in a sorted array of kinds, and where the last one ends.
 BOUNDS = np.arange(len(KINDS) + 1)
-# A full turn more or less is the same direction.
+# Directions that differ by a full turn are the same.
 TURNS = np.array([[-math.tau], [0.0], [math.tau]])
 
 
 @dataclass(frozen=True)
 class Fan:
-    """The beams of a lidar: `angles` (B,) rad with their `cosines` and `sines` (B,), `step` rad between two, `range` m long."""
+    """The B beams of a lidar: `angles` (B,) rad, their `cosines` and `sines` (B,), `step` rad between two, `range` m long."""
 
-    angles: np.ndarray
-    cosines: np.ndarray
-    sines: np.ndarray
+    angles: Floats
+    cosines: Floats
+    sines: Floats
     step: float
     range: float
 
@@ -45,8 +47,8 @@ class Fan:
         shared.setflags(write=False)
         return cls(shared, cosines, sines, step, settings.range)
 
-    def between(self, middle: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which beams are within `half` of the angles `middle`, (K,) rad: how many (K,) of each, and the numbers (P,) of all."""
+    def between(self, middle: Floats, half: Floats) -> tuple[Integers, Integers]:
+        """The beams within `half` (K,) rad of the angles `middle` (K,) rad: how many for each (K,), and the numbers of all (P,)."""
         number, width = (middle - self.angles[0] + TURNS) / self.step, half / self.step
         first = np.maximum(np.ceil(number - width), 0.0).astype(int).T.ravel()
         last = np.minimum(np.floor(number + width), len(self.angles) - 1.0).astype(int).T.ravel()
@@ -58,30 +60,31 @@ class Fan:
 
 @dataclass(frozen=True)
 class Shapes:
-    """N shapes, sorted by kind, as they are at some instant; see `ddenv.robot.sensing.obstacles`.
+    """N shapes, sorted by kind, at some instant; see `obstacles.py`.
 
-    `centers` (3, N) m are in the world, `frames` (3, 3, N) 1/m turn what is along the world's axes (first) into what is along
-    the shapes' own (second). `squares` (3, N) m^2 are those of half the sizes, `reaches` (N,) m is how far the shapes
-    go from their centers, or more. `lengths` (N,) are half those of capsules of radius 1, `facets` those of meshes by
-    their numbers.
+    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
+    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
+    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
+    in units of their radius, `facets` the faces of meshes by the number of the shape.
     """
 
-    kinds: np.ndarray
-    centers: np.ndarray
-    frames: np.ndarray
-    squares: np.ndarray
-    reaches: np.ndarray
-    lengths: np.ndarray
+    kinds: Integers
+    centers: Floats
+    frames: Floats
+    squares: Floats
+    reaches: Floats
+    lengths: Floats
     facets: Mapping[int, Facets]
 
     @cached_property
     def firsts(self) -> list[int]:
         """Where each kind begins, and where the last one ends."""
-        return self.kinds.searchsorted(BOUNDS).tolist()
+        firsts: list[int] = self.kinds.searchsorted(BOUNDS).tolist()
+        return firsts
 
     @classmethod
-    def of(cls, obstacles: Obstacles, rows: np.ndarray) -> Shapes:
-        """The shapes `rows` (N,) of `obstacles`; those on links that move are where they are in their link's frame."""
+    def of(cls, obstacles: Obstacles, rows: Integers) -> Shapes:
+        """The shapes `rows` (N,) of `obstacles`; shapes on moving links still in their link's frame."""
         halves = obstacles.halves[:, rows]
         squares = halves * halves
         return cls(
@@ -94,7 +97,7 @@ class Shapes:
             facets={new: obstacles.facets[old] for new, old in enumerate(rows.tolist()) if old in obstacles.facets},
         )
 
-    def take(self, rows: np.ndarray) -> Shapes:
+    def take(self, rows: Integers) -> Shapes:
         """The shapes `rows` (K,) alone, in this order."""
         return Shapes(
             kinds=self.kinds[rows],
@@ -109,27 +112,27 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Ends:
-    """Where the beams of S scans end: `distances` (S, B) m, infinite for those that meet nothing.
+    """Where the beams of S scans end: `distances` (S, B) m, infinite for beams that hit nothing.
 
-    Of each meeting (M,) `beams` is the beam, counted from the first of the first scan, `ways` how far away it is (m), and
-    `shapes` the number of the shape.
+    For each of M hits, of whatever shape along a beam, `beams` (M,) is the number of the beam, counted from the first beam of the
+    first scan, `ways` (M,) the distance (m), and `shapes` (M,) the number of the shape.
     """
 
-    distances: np.ndarray
-    beams: np.ndarray
-    ways: np.ndarray
-    shapes: np.ndarray
+    distances: Floats
+    beams: Integers
+    ways: Floats
+    shapes: Integers
 
-    def first(self) -> tuple[np.ndarray, np.ndarray]:
-        """The beams (N,) that end on something, and the shapes (N,) on which they end."""
+    def first(self) -> tuple[Integers, Integers]:
+        """The beams (N,) that end on a shape, and these shapes (N,)."""
         first = self.ways == self.distances.ravel()[self.beams]
         return self.beams[first], self.shapes[first]
 
 
-def cast(fan: Fan, shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> Ends:
-    """The beams of S scans from `origins` (S, 3) m, in the world as `axes` (S, 3, 3) are.
+def cast(fan: Fan, shapes: Shapes, origins: Floats, axes: Floats) -> Ends:
+    """Casts the beams of S scans from `origins` (S, 3) m, in the world frame; `axes` (S, 3, 3) are the lidar's axes, as rows.
 
-    Their angles count from the first of the axes towards the second. A shape around an origin is not met.
+    Angles count from the first axis towards the second. A beam does not hit a shape that it starts in.
     """
     scans, count = len(origins), len(fan.angles)
     distances = np.full((scans, count), np.inf)
@@ -151,8 +154,8 @@ def cast(fan: Fan, shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> End
     return Ends(distances, beams, enter, numbers // scans)
 
 
-def _seen(shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """The lidar's place and its three axes as each shape sees them in each scan, (4, 3, K, S)."""
+def _seen(shapes: Shapes, origins: Floats, axes: Floats) -> Floats:
+    """The lidar's position and its three axes in the frame of each shape, for each scan, (4, 3, K, S)."""
     view = np.empty((4, 3, len(shapes.kinds), len(origins)))
     np.subtract(origins.T[:, None], shapes.centers[:, :, None], out=view[0])
     view[1:] = axes.transpose(1, 2, 0)[:, :, None]
@@ -160,13 +163,15 @@ def _seen(shapes: Shapes, origins: np.ndarray, axes: np.ndarray) -> np.ndarray:
     local = view[:, :1] * frames[0]
     local += view[:, 1:2] * frames[1]
     local += view[:, 2:] * frames[2]
-    return local
+    seen: Floats = local
+    return seen
 
 
-def _span(centers: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At which angles boxes are seen from the origin: the middle and half the width, (K,) rad each.
+def _span(centers: Floats, edges: Floats) -> tuple[Floats, Floats]:
+    """The angles at which boxes are seen from the origin: the middle and half the width, (K,) rad each.
 
-    `centers` (3, K) m, and `edges` (3, 3, K) m with the box's axes second, are along the lidar's axes.
+    Along the lidar's axes, `centers` (3, K) m are the boxes' centers, and `edges` (3, 3, K) m half their edges, one for each of the
+    box's axes (second index).
     """
     distance = np.sqrt(centers[0] * centers[0] + centers[1] * centers[1])
     x, y = centers[:2] / np.maximum(distance, SPARE)
@@ -176,8 +181,11 @@ def _span(centers: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.arctan2(y, x), np.where(gap > 0, np.arctan2(wide, gap), math.pi) + SPARE
 
 
-def _cross(fan: Fan, shapes: Shapes, local: np.ndarray, counts: np.ndarray, beams: np.ndarray) -> Interval:
-    """Where `beams` (P,) enter and leave the shapes, of which each has `counts` (K * S,) of them, those of each scan in turn."""
+def _cross(fan: Fan, shapes: Shapes, local: Floats, counts: Integers, beams: Integers) -> Interval:
+    """Where `beams` (P,) enter and leave the shapes.
+
+    `counts` (K * S,) says how many of the beams belong to each shape in each scan, in this order.
+    """
     start, ahead, left = local[:3].repeat(counts, axis=2)
     ahead *= fan.cosines.take(beams)
     left *= fan.sines.take(beams)

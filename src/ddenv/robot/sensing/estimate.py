@@ -1,4 +1,4 @@
-"""Where the robot believes it is: an extended Kalman filter on odometry, IMU and compass."""
+"""The robot's pose estimate: an extended Kalman filter on wheel odometry, IMU and compass."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 from ddenv.world.scenario import Sensors
 
-# How uncertain a turn rate is that is worked out from the wheels of a robot that skids, rad/s.
+# The standard deviation of a turn rate that is computed from the wheels of a skidding robot, rad/s.
 SKIDDING = 0.3
-# How uncertain a speed is that is worked out from them, as a part of it: they slip.
+# The standard deviation of a speed that is computed from the wheels, as a part of it: they slip.
 SLIPPING = 0.1
-# What turns the robot unseen by its gyro, rad in a second; and keeps the filter's gain defined where sensors have no noise.
+# Process noise of the heading, rad per square root of a second; it also keeps the gain defined where sensors have no noise.
 UNSEEN = 0.005
 SMALLEST = 1e-6  # rad
 
 
 class Estimate(NamedTuple):
-    """Position (m), heading (rad in [-pi, pi]) in the world frame, forward speed (m/s) and turn rate (rad/s).
+    """A pose estimate: position (m) and heading (rad in [-pi, pi]) in the world frame, speed forward (m/s), turn rate (rad/s).
 
-    `spread` is the standard deviation of x, y (m) and of the heading (rad), as the filter has them.
+    `spread` are the standard deviations of x, y (m) and of the heading (rad), as the filter estimates them.
     """
 
     x: float
@@ -31,11 +31,11 @@ class Estimate(NamedTuple):
 
 
 class Filter:
-    """The filter of one run. Its state is x, y (m), heading (rad) and the gyro's bias (rad/s); it knows where it starts.
+    """The filter of one run. Its state is x, y (m), heading (rad) and the gyro's bias (rad/s); the start is known exactly.
 
-    Speeds of the wheels and the gyro's turn rate move it, the compass corrects it: the heading, and through what it knows
-    of their common errors also the bias and the position. Nothing else corrects the position, which drifts where wheels slip.
-    Written out in scalars: arrays as small as these would cost ten times as much.
+    The prediction uses the wheels' speeds and the gyro's turn rate. The compass corrects the heading and, through the covariance,
+    also the bias and the position. Nothing else corrects the position, which drifts where wheels slip.
+    It is written in scalars: arrays as small as these would take ten times as long.
     """
 
     def __init__(self, x: float, y: float, heading: float, sensors: Sensors) -> None:
@@ -57,9 +57,9 @@ class Filter:
         return Estimate(self._x, self._y, self._heading, self._speed, self._rate, spread)
 
     def advance(self, speed: float, wheel_rate: float, gyro_rate: float, pitch: float, seconds: float) -> None:
-        """So many seconds pass at the wheels' `speed` (m/s); `wheel_rate` and `gyro_rate` (rad/s) tell how the robot turns.
+        """The prediction: `seconds` pass at the wheels' `speed` (m/s).
 
-        `pitch` (rad) is how steep its way is.
+        `wheel_rate` and `gyro_rate` (rad/s) are the turn rates from wheels and gyro, `pitch` (rad) is the robot's pitch.
         """
         trust = self._trust
         rate = trust * (gyro_rate - self._bias) + (1.0 - trust) * wheel_rate
@@ -71,7 +71,7 @@ class Filter:
         self._y += way * sine
         self._heading = wrap(self._heading + rate * seconds)
         self._speed, self._rate = level, rate
-        # How an error of the heading and of the bias grows into the others: the filter's Jacobian.
+        # The Jacobian: how an error of the heading and of the bias grows into the other errors.
         xh, yh, hb = -way * sine, way * cosine, -trust * seconds
         xb, yb = xh * hb / 2, yh * hb / 2
         self._spread_errors(xh, yh, hb, xb, yb)
@@ -83,7 +83,7 @@ class Filter:
         self._hh += turned
 
     def _spread_errors(self, xh: float, yh: float, hb: float, xb: float, yb: float) -> None:
-        """The covariance P becomes F P F^T, where F is the identity but for these five entries."""
+        """The covariance P becomes F P F^T, where F is the identity except for these five entries."""
         hh, h_b, bb = self._hh, self._hb, self._bb
         # The rows of F P for x, y and h, in the columns that are needed.
         x_h = self._xh + xh * hh + xb * h_b
@@ -99,7 +99,7 @@ class Filter:
         self._hb = h_b + hb * bb
 
     def correct(self, compass: float) -> None:
-        """The compass says `compass` (rad)."""
+        """The correction by the heading that the compass measures, `compass` (rad)."""
         surprise = wrap(compass - self._heading)
         total = self._hh + self._compass_variance
         kx, ky, kh, kb = self._xh / total, self._yh / total, self._hh / total, self._hb / total
@@ -121,5 +121,5 @@ class Filter:
 
 
 def wrap(angle: float) -> float:
-    """`angle` (rad) in [-pi, pi]."""
+    """`angle` (rad), wrapped into [-pi, pi]."""
     return math.remainder(angle, math.tau)

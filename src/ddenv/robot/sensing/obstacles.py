@@ -1,7 +1,7 @@
-"""What a lidar can meet in a world, as arrays.
+"""The collision shapes that a lidar can hit, as arrays.
 
-Each shape has a frame of its own in which it is between -1 and 1 along each axis: there all boxes are the same cube, and all
-spheres and ellipsoids the same ball.
+Each shape has its own frame, in which it lies between -1 and 1 along each axis: there all boxes are the same cube, and all spheres
+and ellipsoids the same ball.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.arrays import Floats, Integers
 from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.sensing.crossing import Facets
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World
@@ -17,30 +18,31 @@ from ddenv.world.pose import Pose, Vector
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
-# A plane is the top of a cube of this size, m: what is below it is inside.
+# A plane is the top of a cube of this size, m: what lies below it is inside.
 PLANE = 2e4
-# Half the thickness of what has none, m.
+# The minimum half thickness of a shape, m.
 THINNEST = 1e-9
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """All collision shapes of a world, N of them, sorted by kind.
+    """All N collision shapes of a world, sorted by kind.
 
-    `names` are the world's models, `owners` (N,) the number of each shape's model there. `links` (N,) is the number of the
-    shape's link in its model, -1 where that never moves. `centers` (3, N) m and `turns` (3, 3, N) are the places of the shapes'
-    frames, in the frame of the link or, of what never moves, in the world, and `halves` (3, N) m are half their
-    sizes. `lengths` (N,) is half that of a capsule, for a radius of 1. `facets` has the faces of meshes by their numbers.
+    `names` are the world's models, `owners` (N,) the index of each shape's model in `names`. `links` (N,) is the index of the
+    shape's link in its model, -1 for a shape that never moves. `centers` (3, N) m and `turns` (3, 3, N) are the poses of the
+    shapes' frames: in the link's frame, or in the world frame for a shape that never moves. `halves` (3, N) m are half the
+    sizes. `lengths` (N,) are half lengths in units of the radius, for capsules. `facets` are the faces of meshes by
+    the number of the shape.
     """
 
     names: tuple[str, ...]
-    owners: np.ndarray
-    links: np.ndarray
-    kinds: np.ndarray
-    centers: np.ndarray
-    turns: np.ndarray
-    halves: np.ndarray
-    lengths: np.ndarray
+    owners: Integers
+    links: Integers
+    kinds: Integers
+    centers: Floats
+    turns: Floats
+    halves: Floats
+    lengths: Floats
     facets: dict[int, Facets]
 
     @classmethod
@@ -67,7 +69,7 @@ class Obstacles:
 
 
 def _shapes(model: Model) -> list[tuple[int, Shape, Pose]]:
-    """A model's shapes, each with the number of its link, or -1 if that never moves, and where it is in that link or the world."""
+    """A model's shapes: the index of the link (-1 if it never moves), the shape, and its pose in the link or in the world."""
     held = {link.name for link in model.links} if model.static else anchored(model)
     found = []
     for number, link in enumerate(model.links):

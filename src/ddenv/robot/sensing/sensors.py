@@ -1,4 +1,4 @@
-"""What the robot measures of itself: a compass, an IMU and the speeds of its wheels, each with noise of its own."""
+"""The robot's own sensors: compass, IMU and wheel odometry, each with its own noise; and what a lidar scan is."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ddenv.arrays import Floats
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
 
 class Imu(NamedTuple):
-    """Turn rate about the robot's own vertical (rad/s), roll and pitch (rad)."""
+    """The turn rate about the robot's own vertical axis (rad/s), roll and pitch (rad)."""
 
     yaw_rate: float
     roll: float
@@ -22,33 +23,34 @@ class Imu(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """One turn of the lidar, taken at one instant.
+    """One scan of the lidar, taken at one instant (`time`, s).
 
-    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x axis, `ranges` (N,) m how far
-    they went, infinite where they met nothing. `origin` (m) is the lidar's place in the frame of the robot's first link.
+    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x axis. `ranges` (N,) m are the
+    measured distances, infinite where a beam hit nothing. `origin` (m) is the lidar's position in the frame of the robot's first
+    link.
     """
 
     time: float
-    angles: np.ndarray
-    ranges: np.ndarray
+    angles: Floats
+    ranges: Floats
     origin: Vector
 
-    def points(self) -> np.ndarray:
-        """Where the beams ended that met something, shape (M, 3) m, in the frame of the robot's first link."""
+    def points(self) -> Floats:
+        """Where beams hit something, shape (M, 3) m, in the frame of the robot's first link."""
         met = np.isfinite(self.ranges)
         ranges, angles = self.ranges[met], self.angles[met]
         x, y, z = self.origin
         return np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)])
 
 
-# Numbers drawn at once: one at a time would cost more than all that is done with them.
+# Random numbers drawn at once: drawing them one at a time would cost more than all that is done with them.
 DRAWN = 256
 
 
 class Truth(NamedTuple):
-    """The robot as it is: heading, roll and pitch (rad, world frame), turn rate about its own vertical (rad/s).
+    """The robot's true heading, roll and pitch (rad, world frame), and turn rate about its own vertical axis (rad/s).
 
-    `wheels` (rad/s) are the speeds of its wheels, positive forward.
+    `wheels` (rad/s) are the wheels' speeds, positive forward.
     """
 
     heading: float
@@ -59,7 +61,7 @@ class Truth(NamedTuple):
 
 
 class Noise:
-    """Standard normal numbers, one after the other."""
+    """A stream of standard normal numbers."""
 
     def __init__(self, random: np.random.Generator) -> None:
         self._random = random
@@ -72,25 +74,26 @@ class Noise:
 
 
 class SensorSuite:
-    """The sensors of one run. Same seed, same noise; each sensor has its own, whatever the others measure.
+    """The noisy sensors of one run. The same seed gives the same noise; each sensor has its own stream, whatever others measure.
 
-    `lidar` is the source of the lidar's noise.
+    `lidar` is the random generator for the lidar's noise.
     """
 
     def __init__(self, settings: Sensors, seed: int) -> None:
         self._settings = settings
         *own, self.lidar = (np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(4))
         self._compass, self._imu, self._odometry = (Noise(random) for random in own)
-        # Drawn first and once: a compass that points wrong, a gyro that drifts, worn tyres.
+        # Drawn first, once a run: the compass's misalignment, the gyro's drift, the wear of the tyres.
         self._heading_bias = settings.compass_bias * self._compass.next()
         self._rate_bias = settings.gyro_bias * self._imu.next()
         self._scale = 1.0 + settings.odometry_bias * self._odometry.next()
 
     def compass(self, truth: Truth) -> float:
-        """The heading, rad."""
+        """The measured heading, rad."""
         return truth.heading + self._heading_bias + self._settings.compass * self._compass.next()
 
     def imu(self, truth: Truth) -> Imu:
+        """The measured turn rate, roll and pitch."""
         settings, noise = self._settings, self._imu
         return Imu(
             yaw_rate=truth.yaw_rate + self._rate_bias + settings.gyro * noise.next(),
@@ -99,6 +102,6 @@ class SensorSuite:
         )
 
     def odometry(self, wheels: Sequence[float]) -> tuple[float, ...]:
-        """What the wheels say (rad/s): they turn as fast where they slip."""
+        """The measured speeds of the wheels, rad/s; a wheel that slips is not distinguished from one that grips."""
         scale, spread, noise = self._scale, self._settings.odometry, self._odometry
         return tuple([speed * (scale + spread * noise.next()) for speed in wheels])
