@@ -186,7 +186,7 @@ def test_entry_points_may_point_into_classes(plugin):
     ("pair", "words"),
     [
         ("half/sequential", "partitioning 'half': its partitions must be disjoint, not empty, and cover E"),
-        ("needy/sequential", "partitioning 'needy': cannot be made:"),
+        ("needy/sequential", "partitioning 'needy': cannot be instantiated:"),
         ("half/rude", "prioritization 'rude': large_lab.rude:order cannot be loaded: no licence"),
         ("model2model/too-few", "prioritization 'too-few': expected a score for each of 2 partitions"),
     ],

@@ -60,8 +60,8 @@ class Setup:
     in rad, world frame). `joints` are the wheel joints, `left` is True for those on the left side; `radius` (m) is the wheels'
     radius, `track` (m) the distance between left and right ones. `footprint` (m) is how far the robot extends from its origin:
     ahead, behind, to its left, to its right. `period` (s) is the time between two commands; `speed` (m/s), `acceleration` (m/s^2)
-    and `turn_rate` (rad/s) are limits. `settings` is the scenario's section `controller`, `options` are the scenario's options for a
-    controller of your own. `seed` is the seed of the run.
+    and `turn_rate` (rad/s) are limits. `settings` is the scenario's section `controller`, `options` are the scenario's options for
+    a controller of your own. `seed` is the seed of the run.
     """
 
     goal: tuple[float, float]
