@@ -6,13 +6,17 @@ import re
 import socket
 import subprocess
 import sys
+from typing import ClassVar
 
 import fake_run
 import pytest
+from textual.binding import Binding
 from textual.command import CommandPalette
+from textual.screen import Screen
 from textual.widgets import OptionList, Static
 
 from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help, commands, groups
 from ddenv.workbench.runs.runs_screen import RunsScreen
 from tests.waiting import PATIENCE, eventually
@@ -69,6 +73,34 @@ async def offers(pilot, query, words):
     # What matches is found by and by.
     await eventually(offered, lambda: f"'{words}' is not offered")
     await pilot.press("escape")
+
+
+class Choosy(Screen):
+    """Some of its actions cannot be done now."""
+
+    BINDINGS: ClassVar = [
+        Binding("a", "now", "now", id="choosy.now", tooltip="can be done"),
+        Binding("b", "later", "later", id="choosy.later", tooltip="cannot be done yet"),
+        Binding("c", "never", "never", id="choosy.never", tooltip="makes no sense here"),
+    ]
+
+    def check_action(self, action, parameters):
+        return {"later": None, "never": False}.get(action, True)
+
+    def compose(self):
+        ids = [binding.id for binding in self.BINDINGS]
+        yield KeyFooter(ids, ids)
+
+
+async def test_footer_help_and_commands_offer_only_what_can_be_done_now(run):
+    async with Workbench(run.path).run_test(size=(80, 24)) as pilot:
+        await pilot.app.push_screen(screen := Choosy())
+        await pilot.pause()
+        footer = screen.query_one(KeyFooter)
+        assert [(entry.words, entry.enabled) for entry in footer.entries] == [("now", True), ("later", False)]
+        own = next(group for group in groups(screen) if group.title == "This screen")
+        assert [(each.id, each.enabled) for each in own.shortcuts] == [("choosy.now", True), ("choosy.later", False)]
+        assert [each.id for each in commands(screen) if each.id.startswith("choosy")] == ["choosy.now"]
 
 
 @pytest.mark.parametrize("theme", ["ddenv-light", "ansi-dark"])

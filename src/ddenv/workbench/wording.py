@@ -13,7 +13,7 @@ from ddenv.words import count as count
 from ddenv.words import duration as duration
 from ddenv.words import percent as percent
 
-# Every status and verdict has a sign of its own, so that nothing is told by colour alone.
+# Every status and verdict has a sign of its own, so that nothing depends on colour alone.
 STATUS = {
     "created": ("○", "not started"),
     "starting": ("◌", "engine starts"),
@@ -56,12 +56,12 @@ def plain(text: Any) -> str:
 
 
 def shorten(text: str, width: int) -> str:
-    """At most `width` characters, with an ellipsis where something was left out."""
+    """A maximum of `width` characters, with an ellipsis at the end if `text` is longer."""
     return text if len(text) <= width else f"{text[: max(0, width - 1)]}…"
 
 
 def brief(seconds: float) -> str:
-    """`seconds` in at most seven characters: 0.4 s, 312 s, 25 min, 3 h."""
+    """`seconds` in a maximum of seven characters: 0.4 s, 312 s, 25 min, 3 h."""
     if seconds < 9.95:
         return f"{seconds:.1f} s"
     if seconds < 599.5:
@@ -70,7 +70,7 @@ def brief(seconds: float) -> str:
 
 
 def about(low: float, middle: float, high: float) -> str:
-    """A time of so many seconds with its interval, no finer than it is known: 2 min (1 to 5)."""
+    """A time in s with its interval, rounded as far as it is uncertain: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
     low, middle, high = (_rounded(each / unit) for each in (low, middle, high))
     interval = f" ({low} to {high})" if low < high else ""
@@ -91,7 +91,7 @@ def metres(value: Any, digits: int = 1) -> str:
 
 
 def attach_name(run: Path) -> str:
-    """A run's name if it lies in the runs folder, else its path, quoted for a shell."""
+    """A run's name if it is in the runs folder, else its path, quoted for a shell."""
     from ddenv.runs.folder import find_run
 
     name = run.stem if find_run(run.stem) == run else str(run)

@@ -1,4 +1,4 @@
-"""The dialog that writes what a run has left: its world, a scenario for it, and a report."""
+"""The dialog that exports the result of a run: its reduced world, a scenario for it, and a report."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from ddenv.errors import UserError
 from ddenv.workbench.background import is_open, tell
 from ddenv.workbench.wording import count, plain
 
-# What can be written: its id, what it is called, and which endings its name may have.
+# What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
     ("world", "world (SDF)", (".sdf", ".world")),
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
 )
-# So many files are named before they are replaced; so many that a world needs, each with so many letters.
+# The maximum number of existing files to name, of files that a world needs, and of letters of each of these.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The files to write, None for what is not wanted. A scenario goes with a world."""
+    """The files to write, None for what is not wanted. A scenario needs a world."""
 
     world: Path | None
     scenario: Path | None
@@ -39,7 +39,7 @@ class Wanted:
 
 
 class Tick(Checkbox):
-    """A checkbox that is empty when it is off: nothing is told by colour alone."""
+    """A checkbox that is empty when it is off, so that nothing depends on colour alone."""
 
     def render(self) -> Content:
         self.BUTTON_INNER = "X" if self.value else " "
@@ -60,14 +60,14 @@ class ExportScreen(ModalScreen[None]):
 
     def __init__(self, run: Path) -> None:
         super().__init__()
-        # `run` is taken: a screen runs things itself.
+        # Not `run`, which is a method of every screen.
         self._file = run
         self._agreed: frozenset[Path] = frozenset()
         self._busy = False
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file)
-        with Vertical(id="export") as dialog:
+        with Vertical(id="export", classes="dialog") as dialog:
             dialog.border_title = "Export"
             dialog.border_subtitle = "enter or ctrl+s writes   escape closes"
             yield Static("", id="export-left", markup=False)
@@ -80,7 +80,7 @@ class ExportScreen(ModalScreen[None]):
                     yield Input(name, id=f"export-{id}-name", compact=True)
             with VerticalScroll(id="export-told", can_focus=False):
                 yield Static("", id="export-words", markup=False)
-                yield Static("", id="export-wrong", markup=False)
+                yield Static("", id="export-wrong", classes="wrong", markup=False)
             with Horizontal(id="export-buttons"):
                 yield Button("Write", id="export-write", variant="primary", compact=True)
                 yield Button("Close", id="export-close", compact=True)
@@ -110,7 +110,7 @@ class ExportScreen(ModalScreen[None]):
         self._forget()
 
     def _forget(self) -> None:
-        """Other files are asked about anew."""
+        """Asks again before other files are replaced."""
         self._agreed = frozenset()
         self.query_one("#export-write", Button).label = "Write"
 
@@ -202,7 +202,7 @@ def suggested(run: Path) -> tuple[str, str, str]:
 
 
 def _home(path: Path) -> Path:
-    """`path` with what `~` stands for. Raises UserError for a user that nobody knows."""
+    """`path` with what `~` stands for. Raises UserError for an unknown user."""
     try:
         return path.expanduser()
     except RuntimeError:
@@ -217,7 +217,7 @@ def _here() -> Path:
 
 
 def what_is_left(run: Path) -> str:
-    """How much of the world would be written; why nothing can be, where that is so."""
+    """How much of the world would be written, or why nothing can be."""
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
 
@@ -252,7 +252,7 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
 
 
 def write(run: Path, wanted: Wanted) -> Iterator[str]:
-    """Writes the files, and says so in a line each. Raises UserError for the first that cannot be written."""
+    """Writes the files; yields a line for each. Raises UserError for the first that cannot be written."""
     from ddenv.map.names import shortened
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world

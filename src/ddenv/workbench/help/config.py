@@ -16,7 +16,7 @@ KNOWN = ("theme", "keys")
 
 
 def config_path() -> Path:
-    """Where the file is looked for: `$DDENV_CONFIG`, or `config.yaml` in the user's folder for settings."""
+    """The path of the file: `$DDENV_CONFIG`, or `config.yaml` in the user's folder for settings."""
     named = os.environ.get("DDENV_CONFIG")
     if named:
         return Path(named)
@@ -26,7 +26,7 @@ def config_path() -> Path:
 
 
 def read_config() -> Config:
-    """What the file says; without a file all is as it comes. Raises UserError: what is wrong, and where."""
+    """Reads the file, if there is one. Raises UserError, which says what is wrong, and where."""
     path = config_path()
     data = _load(path) if path.exists() else {}
     if not data:
@@ -51,7 +51,7 @@ def _load(path: Path) -> dict[Any, Any]:
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', '') or 'is no UTF-8 text'}") from None
+        raise UserError(f"{path}: cannot be read: {getattr(error, 'strerror', '') or 'is not UTF-8 text'}") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f"line {mark.line + 1}: " if mark else ""
@@ -70,7 +70,7 @@ def _load(path: Path) -> dict[Any, Any]:
 
 
 def _wanted(keys: Any, path: Path) -> dict[str, str]:
-    """What the section `keys` says, as text."""
+    """The section `keys`, as text."""
     if keys is None:
         return {}
     if not isinstance(keys, dict):
@@ -84,7 +84,7 @@ def _wanted(keys: Any, path: Path) -> dict[str, str]:
 
 # Before the sections of an example.
 INTRODUCTION = """# Settings of the ddenv workbench: {path}
-# Take away the '# ' in front of a line to change it. '?' and other signs go in quotes.
+# Remove the '# ' in front of a line to change it. '?' and other signs go in quotes.
 
 # {themes}
 # theme: {theme}
@@ -97,8 +97,8 @@ def lines() -> list[str]:
     """The file, the theme, and every action with its keys. Raises UserError for a file that is wrong."""
     config, path = read_config(), config_path()
     chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
-    told = [
-        f"file    {path}{'' if path.exists() else ' (there is none; ddenv config --example prints one)'}",
+    found = [
+        f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
         f"theme   {chosen}",
         f"themes  {', '.join(theme_names())}",
     ]
@@ -109,23 +109,23 @@ def lines() -> list[str]:
     for id, action in sorted(actions().items(), key=_place):
         if section != _section(action):
             section = _section(action)
-            told.append("")
+            found.append("")
         changed = "*" if id in config.keys else " "
-        told.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
-    return [*told, "", "* is yours"] if config.keys else told
+        found.append(f"{changed} {id:<{width}}  {keys[id]:<{room}}  {action.words}")
+    return [*found, "", "* is your own key"] if config.keys else found
 
 
 def example_lines() -> list[str]:
     """A file that changes nothing, with every action as a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
-    told = begin.splitlines()
+    found = begin.splitlines()
     section = ""
     for id, action in sorted(actions().items(), key=_place):
         if section != _section(action):
             section = _section(action)
-            told.append(f"  # {section}")
-        told.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
-    return told
+            found.append(f"  # {section}")
+        found.append(f"  # {id}: {_quoted(_written(','.join(action.keys)))}  # {action.words}")
+    return found
 
 
 def _written(keys: str) -> str:
@@ -133,7 +133,7 @@ def _written(keys: str) -> str:
 
 
 def _quoted(keys: str) -> str:
-    """As YAML takes it for text."""
+    """As YAML reads it as text."""
     return keys if all(char.isalnum() or char in "+, " for char in keys) and keys[0].isalpha() else f'"{keys}"'
 
 
@@ -142,7 +142,7 @@ def _section(action: Action) -> str:
 
 
 def _place(entry: tuple[str, Action]) -> tuple[int, str]:
-    """The app first, then what one sees most."""
+    """The app first, then the screens that are used most."""
     order = ("app", "setup", "run", "map", "runs")
     section = _section(entry[1])
     return (order.index(section) if section in order else len(order), section)

@@ -1,4 +1,4 @@
-"""The footer: the keys that are needed most, as many as there is room for."""
+"""The footer: the most important keys, as many as there is room for."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class KeyFooter(Widget):
         self._due = False
 
     def say(self, id: str, words: str) -> None:
-        """Other words for a key; without any it is not shown."""
+        """Other words for a key; with "" it is not shown."""
         if self._words.get(id) != words:
             self._words[id] = words
             self._renew()
@@ -68,7 +68,7 @@ class KeyFooter(Widget):
         self.screen.bindings_updated_signal.subscribe(self, self._bindings_changed)
 
     def _bindings_changed(self, screen: Screen[Any]) -> None:
-        # One move of the focus tells of it several times.
+        # One move of the focus sends several of these signals.
         if screen.app.app_focus and screen is self.screen and not self._due:
             self._due = True
             self.call_after_refresh(self._renew)

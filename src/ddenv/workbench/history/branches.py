@@ -1,4 +1,4 @@
-"""The tree of a run's reductions as lines: the way to where the run is goes straight down, other branches leave it to the right."""
+"""The tree of a run's reductions as lines: the path to the current node goes straight down, other branches go to the right."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
     for node in nodes:
         if node.parent is not None:
             children[node.parent].append(node.number)
-    way = set(path(nodes, here))
+    straight_path = set(path(nodes, here))
     found: list[Row] = []
-    # What is still to be drawn: a branch's first node, and what stands before its lines.
+    # What is still to be drawn: a branch's first node, what stands before its lines, and its fork.
     todo = [(0, "", "")] if nodes else []
     while todo:
         number, before, fork = todo.pop()
         found.append(Row(f"{before}{fork}", nodes[number]))
         after = before + ("│ " if fork else "")
-        straight = _straight(children[number], way)
+        straight = _straight(children[number], straight_path)
         if straight is not None:
             todo.append((straight, after, ""))
         sides = [child for child in children[number] if child != straight]
@@ -63,14 +63,14 @@ def sign(node: Node, here: int) -> str:
 
 def words(node: Node, here: int) -> str:
     """What a node is, in words."""
-    told = ["here"] if node.number == here else []
+    found = ["here"] if node.number == here else []
     if node.minimal:
-        told.append("minimal")
+        found.append("minimal")
     if node.rejected:
-        told.append("taken back")
-    return ", ".join(told)
+        found.append("taken back")
+    return ", ".join(found)
 
 
-def _straight(children: Sequence[int], way: set[int]) -> int | None:
-    """The child that goes on straight down: the one on the way to where the run is, or else the latest."""
-    return next((child for child in children if child in way), children[-1] if children else None)
+def _straight(children: Sequence[int], straight_path: set[int]) -> int | None:
+    """The child that goes straight down: the one on the path to the current node, or else the latest."""
+    return next((child for child in children if child in straight_path), children[-1] if children else None)

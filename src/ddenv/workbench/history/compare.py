@@ -1,4 +1,4 @@
-"""Two environments of a run side by side: what they share, and in what they differ."""
+"""Two environments of a run side by side: what they share, and how they differ."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ class Compare(ModalScreen[None]):
         self.query_one("#common", Lines).show(found.common)
 
     def _facts(self, name: str, node: Node) -> Text:
-        told = branches.words(node, self._state.node)
+        words = branches.words(node, self._state.node)
         text = Text(f"{name}  {guiding.place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
         after = f"\nafter {count(node.tests, 'test')}"
-        return text.append(after + (f"; {told}" if told else ""), "not bold dim")
+        return text.append(after + (f"; {words}" if words else ""), "not bold dim")
 
 
 def _heading(what: str, names: Sequence[str]) -> Text:

@@ -28,12 +28,12 @@ from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
 
-# How often the run is looked at, s.
+# The time between two looks at the run, s.
 PERIOD = 0.5
 # Name and width of the tree's columns behind the tree itself; the last is for wide terminals.
 COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("", 22), ("method", 36))
 ROOM = 90
-# Of the tree so many columns, besides the lines of its branches.
+# The width of the tree in columns, without the lines of its branches.
 TREE = 15
 MARK = "marked"
 # Where the words of a decision begin, behind its time.
@@ -51,7 +51,7 @@ class Tree(DataTable[Text]):
 
 
 class History(Screen[int | None]):
-    """The node to go on from, or None. It follows the run while it is open."""
+    """Returns the node to go on from, or None. It follows the run while it is open."""
 
     CSS_PATH: ClassVar = ["history.tcss"]
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide"), (170, "-huge")]
@@ -73,7 +73,7 @@ class History(Screen[int | None]):
     ]
 
     def __init__(self, look: Callable[[], Snapshot], place: Place, *, may_go: bool = True) -> None:
-        """`look` gives the run as it is now. Without `may_go` it is only looked at."""
+        """`look` returns the run as it is now. Without `may_go` it is only shown."""
         super().__init__()
         self._look_at, self._place, self._may_go = look, place, may_go
         self._tree: tuple[Node, ...] = ()
@@ -89,7 +89,7 @@ class History(Screen[int | None]):
                 yield Tree(id="tree", cursor_type="row", cell_padding=1)
             with Vertical(id="past-decisions", classes="panel") as panel:
                 panel.border_title = "What you decided"
-                yield Lines(_as_it_is, nothing="nothing was decided by hand yet", tail=True, id="decisions")
+                yield Lines(_as_it_is, nothing="you decided nothing yet", tail=True, id="decisions")
         yield Static("", id="about", markup=False)
         shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
         yield KeyFooter(shown, shown)
@@ -111,7 +111,7 @@ class History(Screen[int | None]):
             self._fill(self._here if stays is None else stays)
 
     def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
-        """Whole: this is where they are read."""
+        """All of their words: this is where they are read."""
         lines = self.query_one(Lines)
         made_of = decisions, lines.scrollable_content_region.width
         if made_of != self._decided and made_of[1] > 0:
@@ -141,8 +141,8 @@ class History(Screen[int | None]):
         sign = branches.sign(node, self._here)
         size = len(node.environment)
         marked = MARK if node.number == self._marked else ""
-        told = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
-        texts = (str(node.number), plain(node.what), str(node.tests), told, plain(node.method))
+        words = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
+        texts = (str(node.number), plain(node.what), str(node.tests), words, plain(node.method))
         cells = (
             Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
         )
@@ -157,7 +157,7 @@ class History(Screen[int | None]):
         self.call_after_refresh(self._arrange)
 
     def _arrange(self) -> None:
-        """Makes table and lines for the room that there is."""
+        """Fits table and lines to the size of the screen."""
         self._show_decisions(self._look_at().state.decisions)
         at = self.under_cursor
         if at is None:

@@ -22,7 +22,7 @@ PATTERNS = "█╱─╲│╳"
 # The strength of a part's hue on the background.
 STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.62, REMOVED: 0.0}
 LIGHT_STRENGTH = STRENGTH | {KEPT: 0.88, LEFT_OUT: 0.30, PINNED: 0.80}
-# Bright blue, yellow, green, magenta, red and cyan of the sixteen: as numbers, and as what a terminal takes them for.
+# Bright blue, yellow, green, magenta, red and cyan of the sixteen: as numbers, and as the colours that terminals show.
 NUMBERS = (12, 3, 2, 5, 1, 6)
 STANDARD: tuple[int, ...] = (0x5555FF, 0xAA5500, 0x00AA00, 0xAA00AA, 0xAA0000, 0x00AAAA)
 NEUTRAL: RGB = (128, 140, 160)
@@ -44,7 +44,7 @@ class Tone:
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Packed colours. `back` and `fore` are background and text, `native` says that the sixteen are told by number."""
+    """Packed colours. `back` and `fore` are background and text, `native` says that the sixteen colours are numbers."""
 
     colors: int
     back: int
@@ -173,7 +173,7 @@ def sixteen(back: int = PLAIN, fore: int = PLAIN) -> Palette:
 
 
 def plain(back: int = PLAIN, fore: int = PLAIN) -> Palette:
-    """For a terminal without colours: all is told by letters and fillings."""
+    """For a terminal without colours: letters and fillings say everything."""
     native = back == PLAIN
     faint = fore if native else packed(blend(unpacked(back), unpacked(fore), 0.4))
     names = ("path", "original", "live", "dull", "selected", "start", "goal", "failure")

@@ -36,14 +36,14 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
     With `same_paths`, the last similar run went as f did.
     """
     state, layers = shown.snapshot.state, shown.layers
-    told = {
+    meanings = {
         ("A B", "parts"): bool(state.elements),
         ("*", "selected"): bool(shown.selection),
         ("+", "pinned"): bool(state.pinned) and "pinned" in layers,
         ("1 2", "order sensed"): "sensed" in layers and state.evidence_test is not None,
         ("⠒ ⠒", "path of f"): "original" in layers and not same_paths,
     }
-    signs = [sign for sign, there in told.items() if there]
+    signs = [sign for sign, there in meanings.items() if there]
     text = Text(no_wrap=True, overflow="ellipsis")
     for sign, meaning in (*signs, *(LEGEND if state.elements else LEGEND[:2])):
         if text.cell_len + len(sign) + len(meaning) + 3 > width:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
 GONE = ord("·")
-# A model so many times larger than the median is a floor that others stand on.
+# A model this many times larger than the median is a floor that others stand on.
 FLOOR_FACTOR = 8.0
 
 
@@ -120,7 +120,7 @@ def _label(kind: int, part: int) -> str:
 
 
 def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
-    """What each model is; of several the last one in this order counts."""
+    """What each model is; the last rule that applies counts."""
     kinds = np.where(floor, FLOOR, KEPT)
     if who.shown is not None:
         out = ~_among(names, who.shown)

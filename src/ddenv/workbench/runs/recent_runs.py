@@ -1,4 +1,4 @@
-"""The runs in the runs folder, last changed first, each with how it stands. Nothing is written to look at them."""
+"""The runs in the runs folder and their states, last changed first. Reading them writes nothing."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ddenv.runfile.state import RunState
 from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.wording import STATUS
 
-# So many are listed on the setup screen.
+# The maximum number of runs in the list of the setup screen.
 SHOWN = 40
-# What SQLite says of a file that another program keeps for itself.
+# What SQLite says about a file that another program has locked.
 LOCKED = "database is locked"
-# So many events are read at a time, so that no thread has the machine for itself.
+# The number of events that are read at a time: other threads have their turn after that.
 BATCH = 500
-# What lies beside a run file, and goes when it does.
+# The endings of files beside a run file that are deleted with it.
 BESIDE = ("-wal", "-shm", ".lock", ".log", ".scene.log")
 
 
 @dataclass(frozen=True, slots=True)
 class Recent:
-    """One run. `status` is the state's, or "lost" without an engine that should be there, or "" while it is not read yet.
+    """One run. `status` is the state's, "lost" if its engine has died, or "" if it is not read yet.
 
     `started` and `changed` are Unix times, s; `size` in bytes. `trouble` says why it cannot be opened.
     """
@@ -54,7 +54,7 @@ class Recent:
 
     @property
     def state_words(self) -> str:
-        """How it stands, in a word or two."""
+        """Its state, in a word or two."""
         if self.trouble:
             return "cannot be read"
         if self.status == "finished":
@@ -63,7 +63,7 @@ class Recent:
 
     @property
     def words(self) -> str:
-        """How it stands, for a narrow list."""
+        """Its state, for a narrow list."""
         word = "cannot be read" if self.trouble else STATUS.get(self.status, ("", self.status))[1]
         return f"{len(self.kept)}/{self.total} {word}" if self.total else word
 
@@ -74,7 +74,7 @@ class Recent:
 
 @dataclass(slots=True)
 class _Read:
-    """What is known of a file that looked like `stamp`; the state of one that an engine works on, to go on from."""
+    """A file's run when the file had this `stamp`; with its `state` to go on from while an engine works on it."""
 
     stamp: tuple[int, ...]
     recent: Recent
@@ -82,14 +82,14 @@ class _Read:
 
 
 class RunsFolder:
-    """A folder of runs that is looked at again and again: only files that changed are read, and only what is new in them."""
+    """A folder of runs that is read again and again: only files that changed, and only what is new in them."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._read: dict[Path, _Read] = {}
 
     def look(self, patience: float = float("inf"), most: int | None = None) -> list[Recent]:
-        """The runs that were changed last, at `most` so many. After `patience` s the rest is left for the next look: `status` "".
+        """The runs that were changed last, at most `most`. After `patience` s the rest waits for the next look: `status` "".
 
         Not for the screen's thread.
         """
@@ -113,7 +113,7 @@ class RunsFolder:
         if not recent.trouble and recent.status not in ("created", "finished", "stopped", "failed"):
             alive = engine_is_alive(path)
             if not alive:
-                # Of runs that nobody works on only what is shown is kept.
+                # A run that no engine works on needs no state to go on from.
                 read.state = None
             return recent if alive else replace(recent, status="lost")
         return recent
@@ -135,7 +135,7 @@ def delete_run(path: Path) -> None:
 
 
 def _stamps(folder: Path) -> dict[Path, tuple[int, ...]]:
-    """When each run file and its log were changed, in ns, and how large they are: all that tells whether to read it again."""
+    """When each run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
     try:
         paths = [path for path in folder.glob("*.ddenv") if not path.name.startswith(".")]
     except OSError:

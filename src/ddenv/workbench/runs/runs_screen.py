@@ -1,4 +1,4 @@
-"""The runs screen: every run of the runs folder, how it stands, and what can be done with it."""
+"""The runs screen: every run of the runs folder, its state, and what can be done with it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ddenv.workbench.runs.runs_table import RunTable, about
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain
 
-# How often the folder is looked at, and how long a look may read before it shows what it has, s.
+# The time between two looks at the folder, and the maximum time of one before it shows what it has, s.
 PERIOD, PATIENCE = 1.0, 0.3
 
 
 class RunsScreen(Screen[None]):
-    """Looked at beside the screen, again and again; nothing is written but what is asked for."""
+    """The folder is read in a thread, again and again; only what the user asks for is written."""
 
     CSS_PATH = "runs.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
@@ -83,7 +83,7 @@ class RunsScreen(Screen[None]):
         self._reading = False
         self._runs = runs
         self._list()
-        # What is not read yet is read at once, as long as there is something left.
+        # The rest is read at once.
         if any(not run.status and not run.trouble for run in runs):
             self.set_timer(0.05, self._look)
 
@@ -205,7 +205,7 @@ class RunsScreen(Screen[None]):
 
 
 def _about(run: Recent) -> str:
-    """How a run stands, in a line."""
+    """A run's state, in a line."""
     if not run.total:
         return f"{run.state_words}."
     left = f"{len(run.kept)} of {count(run.total, 'model')} left"

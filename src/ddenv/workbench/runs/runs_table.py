@@ -1,4 +1,4 @@
-"""The table of all runs: as many columns as there is room for."""
+"""The list of recent runs, and the table of all runs with as many columns as there is room for."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.wording import count, plain
 
-# Of the models that are left so many are named.
+# The maximum number of models to name.
 MOST_NAMES = 40
 
 
 class RunList(OptionList):
-    """The runs of the runs folder, read beside the screen."""
+    """The runs of the runs folder, read in a thread."""
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True, markup=False)
@@ -54,7 +54,7 @@ class RunList(OptionList):
 
 
 def about(run: Recent, width: int) -> Text:
-    """All that is known of a run, for a column so wide."""
+    """All that is known about a run, for a column of that `width`."""
     text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
     if run.trouble:
         return text.append(f"\n{plain(run.trouble)}", "not bold")
@@ -77,7 +77,7 @@ def about(run: Recent, width: int) -> Text:
     return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
 
 
-# Without the name, which takes what is left: title, columns, whether it is a number, and what it says.
+# All but the name, which takes the rest: title, columns, whether it is a number, and its text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
@@ -108,7 +108,7 @@ def moment(time: float) -> str:
     try:
         then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):
-        # A file system knows years that no calendar does.
+        # File systems allow years that no calendar has.
         return "?"
     return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
 

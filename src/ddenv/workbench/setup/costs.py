@@ -15,14 +15,14 @@ from ddenv.workbench.wording import count, duration
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-# So many of the newest runs are looked at, and so many of one scenario are enough.
+# The maximum number of runs to look at, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
 UNKNOWN_TIME = "the time is known after the baseline"
 
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """What earlier `runs` of a scenario tell: real `seconds` of a test (median), and how often the whole world showed f."""
+    """From earlier `runs` of a scenario: the median time of a test, real `seconds`, and the `rate` of f in the baseline."""
 
     runs: int = 0
     seconds: float | None = None
@@ -30,21 +30,21 @@ class Past:
 
 
 def past_of(scenario: Scenario, folder: Path) -> Past:
-    """What the newest runs in `folder` tell that have the same name, timeout and files, wherever these are."""
+    """What is known from the newest runs in `folder` with the same name, timeout and files, wherever these are."""
     try:
         paths = sorted(folder.glob("*.ddenv"), key=lambda path: -path.stat().st_mtime)
     except OSError:
         return Past()
     found: list[tuple[list[float], float | None]] = []
     for path in paths[:LOOKED_AT]:
-        if len(found) < ENOUGH and (told := _told(path, scenario)) is not None:
-            found.append(told)
+        if len(found) < ENOUGH and (figures := _figures(path, scenario)) is not None:
+            found.append(figures)
     seconds = [each for times, _ in found for each in times]
     rates = [rate for _, rate in found if rate is not None]
     return Past(len(found), median(seconds) if seconds else None, median(rates) if rates else None)
 
 
-def _told(path: Path, scenario: Scenario) -> tuple[list[float], float | None] | None:
+def _figures(path: Path, scenario: Scenario) -> tuple[list[float], float | None] | None:
     """The real times of a run's tests, s, and its failure rate; None for another scenario's run or a damaged one."""
     try:
         with RunFile(path) as run:

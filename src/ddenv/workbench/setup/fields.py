@@ -1,4 +1,4 @@
-"""The setup screen's form: every setting of a run, with its meaning, and what it comes to."""
+"""The setup screen's form: every setting of a run with its meaning, the cost, and the command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The workbench in a browser: textual-serve starts one for each page, on this machine's own address alone."""
+"""The workbench in a browser: textual-serve starts one for each page, only on this machine's own address."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HOST = "127.0.0.1"
 
 
 def serve(port: int, run: str | None = None) -> None:
-    """Serves until it is interrupted; each page has a workbench of its own, attached to `run` if there is one.
+    """Serves until it is interrupted; each page has its own workbench, attached to `run` if there is one.
 
     Raises UserError if textual-serve is not installed, the port is taken, or there is no such run.
     """
@@ -31,7 +31,7 @@ def serve(port: int, run: str | None = None) -> None:
     _check_free(port)
 
     class Guarded(Server):
-        """Answers pages of its own alone, and tells nothing but what we tell."""
+        """Answers only its own pages, and prints only our lines."""
 
         async def _make_app(self) -> Any:
             app = await super()._make_app()
@@ -39,16 +39,16 @@ def serve(port: int, run: str | None = None) -> None:
             return app
 
         async def on_startup(self, app: Any) -> None:
-            print("\n".join(told(port)), flush=True)
+            print("\n".join(address_lines(port)), flush=True)
 
         def initialize_logging(self) -> None:
-            """Requests are nobody's news."""
+            """Requests are not worth a line."""
 
     Guarded(shlex.join(words), host=HOST, port=port, title="ddenv").serve()
 
 
-def told(port: int) -> list[str]:
-    """Where it is, and who can reach it."""
+def address_lines(port: int) -> list[str]:
+    """The address, and who can reach it."""
     return [
         f"The workbench is at http://{HOST}:{port} (ctrl+c ends it).",
         f"Any user of this machine who opens that address acts as {getpass.getuser()}: the workbench can read, write and "
@@ -71,7 +71,7 @@ def guard(port: int) -> Any:
             raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself")
         response = await handler(request)
         if not response.prepared:
-            # Nor may they show it in a frame, and catch clicks there.
+            # Other pages must not show it in a frame, and catch clicks there.
             response.headers["X-Frame-Options"] = "DENY"
         return response
 

@@ -1,4 +1,4 @@
-"""The colours: two themes of ours beside Textual's, and the terminal's own colours where it has but sixteen."""
+"""The colours: two own themes beside Textual's, and the terminal's own colours where it has only sixteen."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DARK = Theme(
     dark=True,
     variables={"footer-key-foreground": "#6cb6ff", "primary-muted": "#24476b"},
 )
-# The same in daylight: colours are darker, so that they can be read on white.
+# For daylight: colours are darker, so that they can be read on white.
 LIGHT = Theme(
     name="ddenv-light",
     primary="#0a58b0",
@@ -47,7 +47,7 @@ LIGHT = Theme(
 # The terminal's own sixteen colours: for terminals that have no more, and for people who chose them well.
 ANSI = "ansi-dark"
 OURS = (DARK, LIGHT)
-# What people also call them.
+# Other names for themes.
 ALIASES = {"textual-ansi": ANSI, "ansi_dark": ANSI, "ansi": ANSI, "dark": DARK.name, "light": LIGHT.name}
 
 
@@ -73,7 +73,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
 
 
 def fitting(color_system: str | None) -> str:
-    """The theme for a terminal with so many colours, as Rich names them."""
+    """The theme for a terminal with that colour system, as Rich names it."""
     # Ours would become whichever of sixteen colours is nearest, some of them the same.
     return ANSI if color_system == "standard" else DARK.name
 

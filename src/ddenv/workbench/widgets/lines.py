@@ -1,4 +1,4 @@
-"""Many lines of text, of which only those in sight are made."""
+"""A long list of lines: only those in sight are made."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from textual.strip import Strip
 
 
 def changed_lines(before: Text, now: Text, width: int) -> list[Region]:
-    """The lines in which two texts differ, as regions of a widget of so many columns."""
+    """The lines in which two texts differ, as regions of a widget that is `width` columns wide."""
     pairs = zip_longest(before.split("\n"), now.split("\n"))
     return [Region(0, y, width, 1) for y, (old, new) in enumerate(pairs) if old != new]
 
 
 class Lines(ScrollView, can_focus=True):
-    """One line an item, made by `line(item, width)` when it comes in sight. With `tail` the last ones are shown."""
+    """One line for each item, made by `line(item, width)` when it comes in sight. With `tail` the last ones are shown."""
 
     class Clicked(Message):
         """A line was clicked; `item` is what it shows."""
@@ -66,7 +66,7 @@ class Lines(ScrollView, can_focus=True):
             self.scroll_end(animate=False, force=True)
 
     def watch_show_vertical_scrollbar(self) -> None:
-        # It is not told how far the list was scrolled before.
+        # A new scroll bar does not know how far the list is scrolled.
         self.vertical_scrollbar.position = self.scroll_y
 
     def on_click(self, event: events.Click) -> None:
