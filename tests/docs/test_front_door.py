@@ -28,6 +28,12 @@ def test_the_headline_figures_are_those_of_the_study():
 HOUSE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 
 
+def test_the_drawing_of_the_house_has_every_room():
+    rooms = {path.stem for path in (ROOT / "src/ddenv").iterdir() if not path.stem.startswith("_") and path.is_dir()}
+    drawing = HOUSE.split("```")[1]
+    assert rooms - set(re.findall(r"\w+", drawing)) == set()
+
+
 WALKS = dict(re.findall(r"^### (The life of .*?)$(.*?)(?=^###? |\Z)", HOUSE, re.MULTILINE | re.DOTALL))
 
 
