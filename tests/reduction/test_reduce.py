@@ -18,7 +18,13 @@ ELEMENTS = tuple("abcdefgh")
 POSITIONS = {name: (float(index), 0.5, 0.0) for index, name in enumerate(ELEMENTS)}
 TRAJECTORY = np.array([[0.1 * step, 8 - 0.1 * step, 0.0, 0.0, np.pi] for step in range(81)])
 SENSED = {"a": 3.0, "h": 0.1}
-ALL = {"positions": POSITIONS, "trajectory": TRAJECTORY, "first_sensed": SENSED}
+ALL = {
+    "positions": POSITIONS,
+    "trajectory": TRAJECTORY,
+    "first_sensed": SENSED,
+    "touched": ["a", "b"],
+    "traits": {name: ddenv.Traits(size) for size, name in enumerate(ELEMENTS, start=1)},
+}
 
 
 def needs(*needed):

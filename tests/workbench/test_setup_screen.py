@@ -6,7 +6,7 @@ import yaml
 from setup_session import Opened
 from textual.widgets import Button, Input, OptionList, Select, Static
 
-from ddenv.schemas import explanation
+from ddenv.schemas import explanation, names
 from ddenv.workbench.help.shortcuts import Help
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.methods import KINDS
@@ -212,7 +212,7 @@ async def test_an_open_list_shows_all_its_names(scenarios):
     async with Opened((64, 18)) as session:
         await session.press("enter", "tab", "tab", "enter")
         region = session.app.focused.region
-        assert region.height == 6
+        assert region.height == len(names("prioritization"))
         assert session.screen.region.contains_region(region)
 
 
