@@ -167,12 +167,12 @@ def ours(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
             program.send_signal(signal.SIGINT)
             program.wait(STOP)
             raise
-        told, said = _content(out), _content(log)
-    if not told:
+        printed, said = _content(out), _content(log)
+    if not printed:
         raise UserError(said.strip().rpartition("\n")[2] or "ddenv said nothing")
     with RunFile(path) as file:
         stopped = fold(file.events()).tally["lost"]
-    data = json.loads(told)
+    data = json.loads(printed)
     made = Counts(data["tests"], data["deflake_runs"], stopped)
     return Result(made, seconds, tuple(data["kept"]), data["minimal"])
 
@@ -210,11 +210,11 @@ def theirs(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
     try:
         while not here.poll(LOOK):
             tell(counts(record).tests)
-        told = here.recv()
+        message = here.recv()
         seconds = time.perf_counter() - started
-        if isinstance(told, str):
-            raise UserError(told)
-        kept, made = told
+        if isinstance(message, str):
+            raise UserError(message)
+        kept, made = message
         return Result(made, seconds, tuple(kept), here.recv())
     except EOFError:
         raise UserError("the reducer's process died: see above") from None

@@ -26,7 +26,7 @@ ENDS = ("confirm_started", "finished", "engine_stopped", "engine_failed")
 
 
 @dataclass(frozen=True)
-class Told:
+class Entry:
     """An event to write `at` this time of the run's clock, s; `test` is the number that its test has in the source."""
 
     at: float
@@ -36,7 +36,7 @@ class Told:
 
 
 @dataclass(frozen=True)
-class Way:
+class Course:
     """The path of a running test, with its start and end, s."""
 
     path: array
@@ -62,16 +62,16 @@ class Source:
         self._read = {test for test in named if test is not None}
         self._any = file.trajectory(min(self._read))
 
-    def way(self, told: Told) -> Way:
-        path = self._file.motion(told.test) or self._any
-        lasts = self._ends.get(told.test, self.events[-1].time) - self._starts[told.test]
-        return Way(path, told.at, told.at + lasts)
+    def course(self, entry: Entry) -> Course:
+        path = self._file.motion(entry.test) or self._any
+        lasts = self._ends.get(entry.test, self.events[-1].time) - self._starts[entry.test]
+        return Course(path, entry.at, entry.at + lasts)
 
-    def motions(self, told: Told) -> dict[str, bytes] | None:
+    def motions(self, entry: Entry) -> dict[str, bytes] | None:
         """What is written with a test's end: the path that shows f, if a view reads it."""
-        if told.kind != "test_finished" or told.test not in self._read:
+        if entry.kind != "test_finished" or entry.test not in self._read:
             return None
-        return {ROBOT: self._file.trajectory(told.test).tobytes()}
+        return {ROBOT: self._file.trajectory(entry.test).tobytes()}
 
 
 def main() -> None:
@@ -94,46 +94,46 @@ def main() -> None:
             target.set_live([])
 
 
-def at_once(source: Source, target: RunFile, script: Iterator[Told], tests: int) -> Told:
+def at_once(source: Source, target: RunFile, script: Iterator[Entry], tests: int) -> Entry:
     """Writes everything before test number `tests` + 1; returns that test's start."""
-    for told in script:
-        if told.kind == "test_started" and told.data["test"] > tests:
-            return told
-        target.append(told.kind, told.data, source.motions(told))
+    for entry in script:
+        if entry.kind == "test_started" and entry.data["test"] > tests:
+            return entry
+        target.append(entry.kind, entry.data, source.motions(entry))
     raise ValueError("no more tests")
 
 
-def play(source: Source, target: RunFile, script: Iterator[Told], speed: float, until: float) -> None:
+def play(source: Source, target: RunFile, script: Iterator[Entry], speed: float, until: float) -> None:
     """Writes the rest at its pace, up to this time of the run's clock, s."""
-    running: dict[int, Way] = {}
+    running: dict[int, Course] = {}
     first = next(script)
     started = looked = time.monotonic()
-    for told in itertools.chain([first], script):
+    for entry in itertools.chain([first], script):
         while True:
             now = time.monotonic()
             clock = first.at + speed * (now - started)
             if now - looked >= PERIOD:
                 looked = now
                 target.set_live([way.live(slot, test, clock) for slot, (test, way) in enumerate(running.items())])
-            if clock >= min(told.at, until):
+            if clock >= min(entry.at, until):
                 break
-            time.sleep(min(looked + PERIOD - now, (told.at - clock) / speed))
-        if told.at > until:
+            time.sleep(min(looked + PERIOD - now, (entry.at - clock) / speed))
+        if entry.at > until:
             return
-        if told.kind == "test_started":
-            running[told.data["test"]] = source.way(told)
-        elif told.kind in ("test_finished", "test_lost"):
-            running.pop(told.data["test"], None)
-        target.append(told.kind, told.data, source.motions(told))
+        if entry.kind == "test_started":
+            running[entry.data["test"]] = source.course(entry)
+        elif entry.kind in ("test_finished", "test_lost"):
+            running.pop(entry.data["test"], None)
+        target.append(entry.kind, entry.data, source.motions(entry))
 
 
-def endless(events: list[Event]) -> Iterator[Told]:
+def endless(events: list[Event]) -> Iterator[Entry]:
     """All events but the first, and then those of the rounds again and again, as later tests of later rounds."""
     begin = next(index for index, event in enumerate(events) if event.kind == "round_started")
     ends = [index + 1 for index, event in enumerate(events) if event.kind == "round_finished"]
     end = ends[-1] if ends else len(events)
     for event in events[1:begin]:
-        yield Told(event.time, event.kind, event.data, event.data.get("test", 0))
+        yield Entry(event.time, event.kind, event.data, event.data.get("test", 0))
     body = [event for event in events[begin:end] if event.kind not in ENDS]
     body += [Event(0, body[-1].time, "test_lost", {"test": test}) for test in unfinished(body)]
     tests = [event.data["test"] for event in body if event.kind == "test_started"]
@@ -142,7 +142,7 @@ def endless(events: list[Event]) -> Iterator[Told]:
     for lap in itertools.count():
         for event in body:
             data = later(event.data, tests[0], lap * len(tests), lap * rounds)
-            yield Told(event.time + lap * lasts, event.kind, data, event.data.get("test", 0))
+            yield Entry(event.time + lap * lasts, event.kind, data, event.data.get("test", 0))
 
 
 def unfinished(events: list[Event]) -> list[int]:

@@ -26,7 +26,7 @@ TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}
 
 
 @dataclass
-class Told:
+class Recorder:
     """A drive that remembers the speeds it commanded."""
 
     drive: Any
@@ -61,11 +61,11 @@ def row(template: Template, name: str, keep: frozenset[str], seeds: int) -> str:
     simulated = spent = bare_spent = 0.0
     drive = template._drive
     for seed in range(seeds):
-        template._drive = told = Told(drive)
+        template._drive = recorder = Recorder(drive)
         seconds, result = cpu(lambda: template.run(keep, seed))  # noqa: B023
         template._drive = drive
         simulated, spent = simulated + result.simulated_seconds, spent + seconds
-        bare_spent += bare(template, keep, told.speeds, result.simulated_seconds)
+        bare_spent += bare(template, keep, recorder.speeds, result.simulated_seconds)
     speed, bare_speed = simulated / spent, simulated / bare_spent
     return f"| {name} | {len(keep)} | {speed:.0f} | {bare_speed:.0f} | {speed / bare_speed:.2f} | {TARGETS[name]} |"
 
@@ -84,8 +84,8 @@ def bare(template: Template, keep: frozenset[str], speeds: list[np.ndarray], sim
             simulator = Simulator(built.diagram, shared.diagram_context)
 
             def advance() -> None:
-                for number, told in enumerate(speeds, start=1):
-                    motors.FixValue(context, np.concatenate([np.zeros_like(told), told]))
+                for number, wheels in enumerate(speeds, start=1):
+                    motors.FixValue(context, np.concatenate([np.zeros_like(wheels), wheels]))
                     simulator.AdvanceTo(min(number * period, simulated))
 
             return cpu(advance)[0]

@@ -2,7 +2,7 @@
 
     python sdf/worlds/make_ditch.py
 
-The gap lies across the y axis at x = 0, in the way of a robot that comes along the x axis: a little too wide for its wheels.
+The gap lies across the y axis at x = 0, across the path of a robot that comes along the x axis: a little too wide for its wheels.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ FAR = [
 
 
 def tile(rng: random.Random) -> str:
-    """A plate with rows of blocks, no two neighbours of a row of the same height; its frame lies on its underside."""
+    """A plate with rows of blocks; neighbours in a row differ in height. Its frame lies on its underside."""
     boxes = pieces.box("plate", (0, 0, PLATE / 2), (*TILE, PLATE), MU, pieces.PLYWOOD)
     for row in range(ROWS):
         shift = rng.randrange(len(BLOCK_HEIGHTS))
@@ -85,7 +85,7 @@ def models(repaired: bool) -> Iterator[str]:
         parts = pieces.box("asphalt", (0, 0, 0), (GAP, PLATFORM[1], TOP), MU, pieces.ASPHALT)
         yield pieces.model("filling", (0, 0, TOP / 2, 0, 0, 0), parts)
     places = [(-1, *place) for place in NEAR] + [(1, *place) for place in FAR]
-    # The numbers follow the places from one end of the world to the other, as a person who lays tiles would count.
+    # Tiles are numbered from one end of the world to the other, as a person would lay them.
     places.sort(key=lambda place: (place[0] * place[1], place[2]))
     for number, (side, distance, y, degrees) in enumerate(places, start=1):
         x = side * (GAP / 2 + distance)
@@ -95,7 +95,7 @@ def models(repaired: bool) -> Iterator[str]:
 
 
 def ditch(repaired: bool = False) -> str:
-    """The world, or the one with its ditch filled."""
+    """The world, or the world with its ditch filled."""
     return pieces.world("ditch", models(repaired))
 
 

@@ -40,7 +40,7 @@ GREENS = [
 
 
 def on_road(x: float, y: float, degrees: float = 0.0) -> tuple[float, ...]:
-    """The pose (m, rad) of what lies on the road."""
+    """The pose (m, rad) of something that lies on the road."""
     slope, yaw = math.atan(CROSSFALL), math.radians(degrees)
     # Turned about the vertical first, then laid on the slope.
     roll = math.atan2(math.sin(slope) * math.cos(yaw), math.cos(slope))
@@ -75,7 +75,7 @@ def models(repaired: bool) -> Iterator[str]:
 
 
 def friction(repaired: bool = False) -> str:
-    """The world, or the one whose patches are as rough as the asphalt."""
+    """The world, or the world with patches as rough as the asphalt."""
     return pieces.world("friction", models(repaired))
 
 

@@ -32,7 +32,7 @@ LOOSE = [
 
 
 def board(name: str, x: float, y: float, z: float, pitch: float, yaw: float, length: float, on_edge: bool) -> str:
-    """A board with its middle at (x, y, z)."""
+    """A board with its centre at (x, y, z)."""
     size = (length, THICK, WIDE) if on_edge else (length, WIDE, THICK)
     mass = DENSITY * length * THICK * WIDE
     parts = pieces.box("board", (0, 0, 0), size, MU, pieces.PINE)
@@ -40,7 +40,7 @@ def board(name: str, x: float, y: float, z: float, pitch: float, yaw: float, len
 
 
 def crib(side: int) -> Iterator[str]:
-    """Boards on edge, two a layer, crosswise: taller than the lidar's plane."""
+    """Boards on edge, two in a layer, crosswise: taller than the plane of the lidar."""
     name = "left" if side > 0 else "right"
     y = side * 1.55
     for layer in range(LAYERS):
@@ -84,7 +84,7 @@ def models(repaired: bool) -> Iterator[str]:
 
 
 def rubble(repaired: bool = False) -> str:
-    """The world, or the one without its cinder blocks."""
+    """The world, or the world without its cinder blocks."""
     return pieces.world("rubble", models(repaired))
 
 

@@ -1,4 +1,4 @@
-"""What the worlds are put together from: SDF text for models made of boxes and cylinders."""
+"""SDF text for models made of boxes and cylinders, of which the `make_*.py` scripts build their worlds."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def part(name: str, position: Sequence[float], geometry: str, mu: float, color: 
 
 
 def collision(name: str, position: Sequence[float], geometry: str, mu: float) -> str:
-    """What is only touched."""
+    """A shape that can be touched but not seen."""
     shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry>{geometry}</geometry>"
     return f'        <collision name="{name}">{shape}{friction(mu)}</collision>\n'
 
 
 def visual(name: str, position: Sequence[float], geometry: str, color: str) -> str:
-    """What is only seen."""
+    """A shape that can be seen but not touched."""
     shape = f"<pose>{numbers(position)} 0 0 0</pose><geometry>{geometry}</geometry>"
     return f'        <visual name="{name}">{shape}{material(color)}</visual>\n'
 
@@ -66,7 +66,7 @@ def model(name: str, pose: Sequence[float], parts: str, inertial: str = "") -> s
 
 
 def box_inertial(mass: float, size: Sequence[float]) -> str:
-    """Of a solid box (kg, m) about its middle."""
+    """The inertia of a solid box (kg, m) about its centre."""
     x, y, z = (side * side for side in size)
     moments = {"ixx": y + z, "iyy": x + z, "izz": x + y}
     inertia = "".join(f"<{name}>{mass / 12 * value:.6g}</{name}>" for name, value in moments.items())
@@ -75,7 +75,7 @@ def box_inertial(mass: float, size: Sequence[float]) -> str:
 
 
 def ground(color: str, mu: float | None = None, pose: Sequence[float] = ()) -> str:
-    """The infinite plane that everything stands on, level and at height 0 unless a `pose` says otherwise."""
+    """The infinite ground plane: level and at height 0 unless `pose` says otherwise."""
     place = f"      <pose>{numbers(pose)}</pose>\n" if pose else ""
     surface = "" if mu is None else friction(mu)
     plane = "<geometry><plane><normal>0 0 1</normal><size>60 60</size></plane></geometry>"

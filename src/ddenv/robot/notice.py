@@ -66,12 +66,12 @@ def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range:
     shown = np.abs(offset - math.tau * np.round(offset / math.tau)) <= view_angle / 2
     shown |= (x == 0) & (y == 0)
     for edge in (heading - view_angle / 2, heading + view_angle / 2):
-        shown |= np.hypot(_ways(low[:, :2], high[:, :2], edge), drop) <= view_range
+        shown |= np.hypot(_entry(low[:, :2], high[:, :2], edge), drop) <= view_range
     seen[seen] = shown
     return seen
 
 
-def _ways(low: Floats, high: Floats, direction: Floats) -> Floats:
+def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
     """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m; infinite where the ray misses."""
     ray = np.column_stack([np.cos(direction), np.sin(direction)])
     ray = np.where(np.abs(ray) < PARALLEL, PARALLEL, ray)

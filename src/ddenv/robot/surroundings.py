@@ -23,30 +23,33 @@ def reach(robot: Model) -> float:
 
     Infinite for a robot with loose parts or with unlimited sliding joints.
     """
-    ways = _ways(robot)
+    chains = _chains(robot)
     farthest = 0.0
     for link in robot.links:
         box = solid_bounds(link.collisions, link.pose.inverse())
         if box is None:
             continue
-        if link.name not in ways:
+        if link.name not in chains:
             return math.inf
-        start, way = ways[link.name]
+        start, length = chains[link.name]
         corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
-        farthest = max(farthest, way + math.dist(start, link.pose.position) + corner)
+        farthest = max(farthest, length + math.dist(start, link.pose.position) + corner)
     return farthest
 
 
-def _ways(robot: Model) -> dict[str, tuple[Vector, float]]:
+def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
     """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
-    ways = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
+    chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
     # A file may name its joints in any order.
     for _ in robot.joints:
         for joint in robot.joints:
-            if joint.parent in ways and joint.child not in ways:
-                start, way = ways[joint.parent]
-                ways[joint.child] = joint.pose.position, way + math.dist(start, joint.pose.position) + _slide(joint)
-    return ways
+            if joint.parent in chains and joint.child not in chains:
+                start, length = chains[joint.parent]
+                chains[joint.child] = (
+                    joint.pose.position,
+                    length + math.dist(start, joint.pose.position) + _slide(joint),
+                )
+    return chains
 
 
 def _slide(joint: Joint) -> float:

@@ -71,13 +71,13 @@ def legs_beside(
     `points` (N, 2), N > 0, `starts` and `ends` (K, 2) of the legs are in m. A leg is free if no point is within `side` of its line,
     from `back` before its start to `on` after its end (m; one for all, or (K,)).
     """
-    ways = ends - starts
-    lengths = np.sqrt((ways * ways).sum(axis=1, keepdims=True))
+    directions = ends - starts
+    lengths = np.sqrt((directions * directions).sum(axis=1, keepdims=True))
     np.maximum(lengths, 1e-9, out=lengths)
-    ways = ways / lengths
-    across_them = ways[:, ::-1] * LEFT
-    along = ways @ points.T
-    along -= (ways * starts).sum(axis=1, keepdims=True)
+    directions = directions / lengths
+    across_them = directions[:, ::-1] * LEFT
+    along = directions @ points.T
+    along -= (directions * starts).sum(axis=1, keepdims=True)
     across = across_them @ points.T
     across -= (across_them * starts).sum(axis=1, keepdims=True)
     np.abs(across, out=across)

@@ -115,17 +115,17 @@ class Ends:
     """Where the beams of S scans end: `distances` (S, B) m, infinite for beams that hit nothing.
 
     For each of M hits, of whatever shape along a beam, `beams` (M,) is the number of the beam, counted from the first beam of the
-    first scan, `ways` (M,) the distance (m), and `shapes` (M,) the number of the shape.
+    first scan, `depths` (M,) the distance (m), and `shapes` (M,) the number of the shape.
     """
 
     distances: Floats
     beams: Integers
-    ways: Floats
+    depths: Floats
     shapes: Integers
 
     def first(self) -> tuple[Integers, Integers]:
         """The beams (N,) that end on a shape, and these shapes (N,)."""
-        first = self.ways == self.distances.ravel()[self.beams]
+        first = self.depths == self.distances.ravel()[self.beams]
         return self.beams[first], self.shapes[first]
 
 

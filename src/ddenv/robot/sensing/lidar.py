@@ -72,8 +72,8 @@ def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, part: flo
     cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + tilted + lift + SPARE
     # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
     squares = (frames * frames).sum(axis=0)
-    ways = np.sqrt(np.maximum(squares - up * up, 0.0)) + tilt * np.sqrt(squares)
-    far = ways * (fan.range * (1.0 + SPARE) + around) + lift * np.abs(up) + SPARE
+    extents = np.sqrt(np.maximum(squares - up * up, 0.0)) + tilt * np.sqrt(squares)
+    far = extents * (fan.range * (1.0 + SPARE) + around) + lift * np.abs(up) + SPARE
     met: Booleans = cut & (np.abs(local) - 1.0 <= far).all(axis=0)
     in_way: Integers = numbers[met]
     return in_way
