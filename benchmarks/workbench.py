@@ -88,8 +88,8 @@ def main() -> None:
             print(f"| {what} | {idle[what]} | {loaded[what]} | {large.get(what, '')} | {target} |")
         print(f"| imported of {', '.join(HEAVY)} | {heavy(recorded, environment)} | | | none |", flush=True)
         if not options.quick:
-            figures = hour(recorded, environment, options.hour)
-            print(f"| memory at 10 / 50 / 100 % of an hour, MB | {figures} | | | flat |")
+            memory = hour(recorded, environment, options.hour)
+            print(f"| memory at 10 / 50 / 100 % of an hour, MB | {memory} | | | flat |")
 
 
 def installed(folder: str) -> dict[str, str]:
@@ -102,21 +102,21 @@ def figures(run: Path, environment: dict[str, str], effort: Effort) -> Figures:
     still = run.with_stem(f"{run.stem}-still")
     with closing(sqlite3.connect(run)) as source, closing(sqlite3.connect(still)) as target:
         source.backup(target)
-    figures = {"`ddenv`: first paint": str(starts([], environment, effort.starts))}
-    figures["`ddenv open RUN`: first paint"] = str(starts(["open", str(still)], environment, effort.starts))
+    measured = {"`ddenv`: first paint": str(starts([], environment, effort.starts))}
+    measured["`ddenv open RUN`: first paint"] = str(starts(["open", str(still)], environment, effort.starts))
     with attached(["open", str(run)], environment) as terminal:
         terminal.watch(effort.settle)
         average, most = rate(terminal, effort.watch)
-        figures |= {"bytes a second, on average": f"{average:,.0f}", "bytes in a second, maximum": f"{most:,}"}
+        measured |= {"bytes a second, on average": f"{average:,.0f}", "bytes in a second, maximum": f"{most:,}"}
         alone = [by_itself(terminal, key, effort.presses // 4, 0.05) for key in KEYS]
         changed, looks = sum(len(each.seconds) for each in alone), sum(each.pressed for each in alone)
-        figures["as much changed without a key"] = f"{changed} of {looks}"
+        measured["as much changed without a key"] = f"{changed} of {looks}"
         for key in KEYS:
-            figures[f"key to paint: {key.name}"] = str(answers(terminal, key, effort.presses))
-        figures["memory, MB"] = f"{terminal.memory():.0f}"
+            measured[f"key to paint: {key.name}"] = str(answers(terminal, key, effort.presses))
+        measured["memory, MB"] = f"{terminal.memory():.0f}"
     with attached([str(HERE / "bare.py")], environment, (sys.executable,)) as terminal:
-        figures[f"key to paint: {BARE_KEY.name}"] = str(answers(terminal, BARE_KEY, effort.presses))
-    return figures
+        measured[f"key to paint: {BARE_KEY.name}"] = str(answers(terminal, BARE_KEY, effort.presses))
+    return measured
 
 
 def of_large_run(folder: Path, environment: dict[str, str], effort: Effort) -> Figures:

@@ -98,11 +98,11 @@ def test_it_learns_what_needed_models_are_like():
 
 
 def followed(weights):
-    """Chances told in the first rounds of many reductions, the prior's beside them, and whether the models are needed.
+    """Chances from the first rounds of many reductions, the prior's beside them, and whether the models are needed.
 
     `weights` (30,) say how likely the model at each rank of nearness to the failure is one of the three that are needed.
     """
-    told, at_first, truth = [], [], []
+    learnt, at_first, truth = [], [], []
     for seed in range(60):
         known = evidence(30, seed)
         end = known.failure_position
@@ -117,22 +117,22 @@ def followed(weights):
             round = searching.send(winner)
             if len(round.environment) < 6:
                 break
-            told += learner.chances(round.environment, replace(known, trials=tuple(trials))).tolist()
+            learnt += learner.chances(round.environment, replace(known, trials=tuple(trials))).tolist()
             at_first += spatial_prior(round.environment, known).tolist()
             truth += [name in needed for name in round.environment]
             winner = next((one for one in round.candidates if needed <= one.models), None)
             trials += [Trial(one.models, one is winner) for one in tried(round, winner)]
-    return np.array(told), np.array(at_first), np.array(truth)
+    return np.array(learnt), np.array(at_first), np.array(truth)
 
 
 @pytest.mark.rates
 def test_its_chances_are_right_on_average():
     """Of all models that it gives a chance of about a half while it works, about a half are needed, and so on."""
-    told, _, needed = followed(1.0 / np.arange(1, 31))
+    learnt, _, needed = followed(1.0 / np.arange(1, 31))
     for low, high in ((0.0, 0.05), (0.05, 0.15), (0.15, 0.35), (0.35, 0.65), (0.65, 1.0)):
-        inside = (told >= low) & (told < high)
+        inside = (learnt >= low) & (learnt < high)
         assert inside.sum() > 30
-        assert needed[inside].mean() == pytest.approx(told[inside].mean(), abs=0.15), (low, high)
+        assert needed[inside].mean() == pytest.approx(learnt[inside].mean(), abs=0.15), (low, high)
 
 
 @pytest.mark.rates
@@ -140,12 +140,12 @@ def test_its_chances_are_right_on_average():
     "weights", [1.0 / np.arange(1, 31), np.ones(30), np.arange(30) < 12], ids=["near", "any", "ring"]
 )
 def test_wherever_the_needed_models_are_it_does_better_than_nearness_alone(weights):
-    told, at_first, needed = followed(np.array(weights, dtype=float))
+    learnt, at_first, needed = followed(np.array(weights, dtype=float))
 
     def surprise(chances):
         return -np.mean(np.where(needed, np.log(chances), np.log1p(-chances)))
 
-    assert surprise(told) < 0.95 * surprise(at_first)
+    assert surprise(learnt) < 0.95 * surprise(at_first)
 
 
 def test_likely_models_stand_in_small_partitions():

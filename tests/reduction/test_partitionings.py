@@ -66,7 +66,7 @@ def test_a_robot_that_never_moved_still_splits(split):
 
 
 def turning(*rates):
-    """A robot that turns at so many rad/s in one second after the other, looked at each 0.1 s."""
+    """A robot with one turn rate (rad/s) for each second, sampled every 0.1 s."""
     yaw = np.concatenate([[0.0], np.cumsum(np.repeat(rates, 10)) / 10])
     times = np.arange(len(yaw)) / 10
     return np.column_stack([times, np.cos(yaw), np.sin(yaw), np.zeros(len(yaw)), np.angle(np.exp(1j * yaw))])

@@ -93,11 +93,11 @@ def test_without_a_check_the_first_test_is_already_a_smaller_one():
     assert made[0] != frozenset(ELEMENTS)
 
 
-def test_rounds_are_told_before_they_are_tested():
-    told = []
-    found = ddenv.reduce(ELEMENTS, needs("b"), on_round=told.append, **ALL)
-    assert len(told) == found.rounds
-    assert told[0].environment == ELEMENTS
+def test_rounds_are_reported_before_they_are_tested():
+    reported = []
+    found = ddenv.reduce(ELEMENTS, needs("b"), on_round=reported.append, **ALL)
+    assert len(reported) == found.rounds
+    assert reported[0].environment == ELEMENTS
 
 
 def test_what_the_test_raises_comes_through():
@@ -160,7 +160,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_input_is_told_in_one_line_before_any_test(case):
+def test_wrong_input_is_reported_in_one_line_before_any_test(case):
     options, words = WRONG[case]
     made = []
     with pytest.raises(ddenv.UserError) as error:
@@ -193,7 +193,7 @@ def test_also_the_end_of_an_iterator_comes_through(where):
 
 
 def test_what_a_model_is_like_reaches_the_schemas():
-    """A slippery model far away: the learner finds it in fewer tests when it is told what models are like."""
+    """A slippery model far away: the learner finds it in fewer tests when it knows the models' traits."""
     traits = {name: ddenv.Traits(1.0, 0.01 if name == "h" else 1.0) for name in ELEMENTS}
     found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", traits=traits, touched=["a"], **ALL)
     assert found.kept == ("a",)

@@ -102,7 +102,7 @@ def test_probdd_leaves_out_what_promises_most():
 
 
 def test_steady_growth_halves_what_a_split_leaves_together():
-    """A robot that stood still saw all models at one instant: near and far are told apart all the same."""
+    """A robot that stood still saw all models at one instant: near and far are separated all the same."""
     still = line(a=1, b=2, c=3, d=4, e=5, f=6, g=7, h=8)
     standing = replace(still, trajectory=np.array([[0.0, 0, 0, 0, 0]]))
     pair = ("timeseg", "failure-proximal")

@@ -1,4 +1,4 @@
-"""What a controller is told in a run: readings at their rates, an estimate, and never the truth."""
+"""What a controller gets in a run: readings at their rates, an estimate, and never the truth."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ def test_each_sensor_measures_at_its_rate(world_of, husky, scenario_of):
     scenario = scenario_of(sensors=sensors, controller={"period": 0.05}, failure={"timeout": 2.0})
     heard, _ = listen(world_of(), husky, scenario)
     assert [round(reading.time / 0.05) for reading in heard.readings] == list(range(40))
-    told = {
+    seen = {
         name: [number for number, reading in enumerate(heard.readings) if getattr(reading, name) is not None]
         for name in ("compass", "imu", "wheels", "scan")
     }
     every = {"compass": 4, "imu": 1, "wheels": 2, "scan": 5}
-    assert told == {name: list(range(0, 40, steps)) for name, steps in every.items()}
+    assert seen == {name: list(range(0, 40, steps)) for name, steps in every.items()}
     assert all(reading.scan.time == reading.time for reading in heard.readings if reading.scan)
 
 
-def test_what_was_measured_between_two_commands_is_told_at_the_next(world_of, husky, scenario_of):
+def test_measurements_between_two_commands_reach_the_next(world_of, husky, scenario_of):
     scenario = scenario_of(
         sensors={"compass_rate": 100 / 3, "imu_rate": 20, "odometry_rate": 20},
         controller={"period": 0.1},
@@ -104,7 +104,7 @@ def test_wheels_that_slip_are_believed(world_of, husky, scenario_of):
     assert heard.readings[-1].estimate.x > 2.0
 
 
-def test_the_setup_tells_what_the_robot_is(world_of, husky, scenario_of):
+def test_the_setup_describes_the_robot(world_of, husky, scenario_of):
     scenario = scenario_of(controller={"speed": 0.7, "options": {"side": "left"}}, failure={"timeout": 0.2})
     heard, _ = listen(world_of(), husky, scenario, seed=9)
     setup = heard.setup
@@ -114,7 +114,7 @@ def test_the_setup_tells_what_the_robot_is(world_of, husky, scenario_of):
     assert (setup.speed, setup.options, setup.seed) == (0.7, {"side": "left"}, 9)
 
 
-def test_a_clock_tells_everything_at_whole_steps(scenario_of):
+def test_a_clock_counts_whole_steps(scenario_of):
     sensors = {"compass_rate": 7, "lidar": {"rate": 3}}
     scenario = scenario_of(
         sensors=sensors, failure={"timeout": 3.0}, simulation={"time_step": 0.01}, controller={"period": 0.03}

@@ -75,12 +75,12 @@ def test_numbers_of_numpy_become_plain_ones(tmp_path):
         ("raise ValueError('a\\n\\x1b[31m' + 'b' * 1000)", r"step raised ValueError: a .\[31mb+\.\.\.$"),
     ],
 )
-def test_what_goes_wrong_is_told_in_a_line(tmp_path, line, reason):
+def test_a_mistake_is_reported_in_one_line(tmp_path, line, reason):
     with pytest.raises(ControllerFailed, match=f"^controller Mine: {reason}"):
         own(tmp_path, stepping(line)).step(READING)
 
 
-def test_an_exception_that_cannot_be_told_is_named(tmp_path):
+def test_an_exception_without_text_is_named(tmp_path):
     with pytest.raises(ControllerFailed, match=r"step raised Evil \(mine.py:7\)$"):
         own(tmp_path, stepping("class Evil(Exception):", "    __str__ = None", "raise Evil")).step(READING)
 

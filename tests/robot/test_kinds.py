@@ -80,7 +80,7 @@ def test_who_came_up_again_did_not_fall():
     assert kind(trajectory) == "out of time"
 
 
-def test_the_first_word_that_is_true_is_told():
+def test_the_first_word_that_is_true_wins():
     lying = way(20, lambda t: (0, 0, 0), lambda t: rolled(120 if t > 3 else 0))
     driving = way(20, lambda t: (min(t, 10), 0, 0))
     assert kind(lying, fell=True, arrived=9.0) == "fell"
@@ -97,7 +97,7 @@ def test_who_was_stuck_before_it_believed_to_be_there_is_not_lost():
 
 
 @given(start=st.floats(0, 40), x=st.floats(-RADIUS / 3, RADIUS / 3), degrees=st.floats(-1, 1), rate=st.floats(0.5, 9))
-def test_whoever_is_cut_is_stuck(start, x, degrees, rate):
+def test_a_run_that_was_cut_is_stuck(start, x, degrees, rate):
     """A robot that drove `start` s and then rocks in a rut is cut 8 s after that, and its kind says the same."""
     period = 2 * math.pi / rate
     trajectory = way(

@@ -94,11 +94,11 @@ def test_unknown_models_are_refused(world_of, husky, scenario_of):
         Template(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
 
 
-def test_progress_is_told_every_row(world_of, husky, scenario_of):
-    told = []
+def test_progress_gets_every_row(world_of, husky, scenario_of):
+    reported = []
     template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
-    result = template.run(NOTHING, 1, lambda time_s, pose: told.append((time_s, *pose)))
-    assert np.array(told).tobytes() == result.trajectory.tobytes()
+    result = template.run(NOTHING, 1, lambda time_s, pose: reported.append((time_s, *pose)))
+    assert np.array(reported).tobytes() == result.trajectory.tobytes()
 
 
 def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):

@@ -33,16 +33,16 @@ def built(monkeypatch) -> list[frozenset[str]]:
     """The moving models that are left out of each smaller plant which is built. Building is so cheap that it always pays."""
     monkeypatch.setattr(variants, "BUILD", 0.0)
     monkeypatch.setattr(variants, "PAIR", 0.0)
-    told: list[frozenset[str]] = []
+    reported: list[frozenset[str]] = []
     without = Template.without
 
     def tell(self: Template, names: frozenset[str]) -> Template:
         smaller = without(self, names)
-        told.append(ALL - smaller.names)
+        reported.append(ALL - smaller.names)
         return smaller
 
     monkeypatch.setattr(Template, "without", tell)
-    return told
+    return reported
 
 
 @pytest.fixture

@@ -46,11 +46,11 @@ def test_of_rows_at_one_time_the_last_counts():
     assert read("0,0,0,0,0,0,0,1\n0.1,1,0,0,0,0,0,1\n0.1,2,0,0,0,0,0,1\n")[:, 1].tolist() == [0, 2]
 
 
-def test_progress_is_told_what_is_kept():
-    told = []
-    log = PoseLog(lambda *row: told.append(row))
+def test_progress_gets_what_is_kept():
+    reported = []
+    log = PoseLog(lambda *row: reported.append(row))
     log.add(ROW.encode() + b"1.01,9,9,9,0,0,0,1\n1.1,2,3,5,0,0,0,1\n1.2,2,")
-    assert told == [(1, (2, 3, 4, 1, 0, 0, 0)), (1.1, (2, 3, 5, 1, 0, 0, 0))]
+    assert reported == [(1, (2, 3, 4, 1, 0, 0, 0)), (1.1, (2, 3, 5, 1, 0, 0, 0))]
 
 
 @pytest.mark.parametrize(
@@ -75,10 +75,10 @@ def test_progress_is_told_what_is_kept():
         ("x" * 100_000, "line 1: .* found 'x+[.][.][.]'$"),
     ],
 )
-def test_nonsense_is_told_with_its_line(text, complaint):
-    with pytest.raises(BadLog, match=complaint.replace("(s,", "[(]s,").replace("on)", "on[)]")) as told:
+def test_nonsense_is_reported_with_its_line(text, complaint):
+    with pytest.raises(BadLog, match=complaint.replace("(s,", "[(]s,").replace("on)", "on[)]")) as reported:
         read(text)
-    assert str(told.value).isprintable() and len(str(told.value)) < 200
+    assert str(reported.value).isprintable() and len(str(reported.value)) < 200
 
 
 def test_a_log_that_never_ends_is_too_large_and_takes_no_memory(monkeypatch):

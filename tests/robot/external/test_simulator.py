@@ -33,23 +33,23 @@ def test_exit_code_0_is_a_pass_and_1_a_failure(simulator_of):
 TELL = """
     import os, sys
     print("0,0,0,0,0,0,0,1")
-    told = {name: os.environ[name] for name in os.environ if name.startswith(("DDENV_", "GZ_", "GAZEBO_"))}
+    reported = {name: os.environ[name] for name in os.environ if name.startswith(("DDENV_", "GZ_", "GAZEBO_"))}
     world = open(sys.argv[1]).read()
-    open("told", "w").write(repr((sys.argv[1:], told, world, os.getcwd(), sys.stdin.read())))
+    open("reported", "w").write(repr((sys.argv[1:], reported, world, os.getcwd(), sys.stdin.read())))
 """
 
 
-def test_the_command_is_told_the_world_the_seed_and_the_scenario(simulator_of, tmp_path, monkeypatch):
+def test_the_command_gets_the_world_the_seed_and_the_scenario(simulator_of, tmp_path, monkeypatch):
     monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", "/models")
     monkeypatch.delenv("GAZEBO_MODEL_PATH", raising=False)
     assert simulator_of(TELL, "{world} --seed={seed}").run(frozenset({"deck", "wall"}), 5).outcome == "pass"
-    (world, seed), told, text, cwd, stdin = eval((tmp_path / "told").read_text())
+    (world, seed), reported, text, cwd, stdin = eval((tmp_path / "reported").read_text())
     assert (seed, cwd, stdin) == ("--seed=5", str(tmp_path), "")
     assert "far_box" not in text and "deck" in text and "ground_plane" in text
-    assert (told["DDENV_WORLD"], told["DDENV_SEED"], told["DDENV_TIMEOUT"]) == (world, "5", "5")
-    assert (told["DDENV_SPAWN"], told["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
-    assert told["GZ_SIM_RESOURCE_PATH"] == f"{DATA}{os.pathsep}/models"
-    assert told["GAZEBO_MODEL_PATH"] == str(DATA)
+    assert (reported["DDENV_WORLD"], reported["DDENV_SEED"], reported["DDENV_TIMEOUT"]) == (world, "5", "5")
+    assert (reported["DDENV_SPAWN"], reported["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
+    assert reported["GZ_SIM_RESOURCE_PATH"] == f"{DATA}{os.pathsep}/models"
+    assert reported["GAZEBO_MODEL_PATH"] == str(DATA)
 
 
 def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):
@@ -59,8 +59,8 @@ def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):
     assert simulator_of(write).run(EVERYTHING, 0).end_position == (2, 3, 4)
 
 
-def test_progress_is_told_while_it_runs(simulator_of, tmp_path):
-    # The command goes on only when its first row has been told.
+def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
+    # The command goes on only when its first row has been reported.
     wait = """
         import os, time
         print("0,1,2,3,0,0,0,1", flush=True)
@@ -68,14 +68,14 @@ def test_progress_is_told_while_it_runs(simulator_of, tmp_path):
             time.sleep(0.01)
         print("1,4,2,3,0,0,0,1")
     """
-    told = []
+    reported = []
 
     def progress(time_s, pose):
-        told.append((time_s, pose[0]))
+        reported.append((time_s, pose[0]))
         (tmp_path / "seen").touch()
 
     assert simulator_of(wait).run(EVERYTHING, 0, progress).outcome == "pass"
-    assert told == [(0, 1), (1, 4)]
+    assert reported == [(0, 1), (1, 4)]
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_what_breaks_is_an_error_with_its_reason(simulator_of, code, complaint):
     [
         ("1 / 0", "error"),
         ("raise ExceptionGroup('two', [ValueError('a'), KeyError('b')])", "error"),
-        # What somebody caught and told, and what was stopped because all is over, is no reason for the exit code.
+        # An exception that was caught and printed, or an interruption, is not the reason for the exit code.
         ("import sys; sys.excepthook(*caught()); print('going on', file=sys.stderr); exit(1)", "failed"),
         ("import sys; sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None); exit(1)", "failed"),
         ("import sys; sys.excepthook(*caught()); exit(0)", "pass"),
@@ -172,7 +172,7 @@ def test_output_without_end_neither_fills_memory_nor_blocks(simulator_of, monkey
         assert "larger than" in result.failure
 
 
-def test_the_last_complaint_is_told_and_short(simulator_of):
+def test_the_last_complaint_is_reported_and_short(simulator_of):
     said = simulator_of("import sys; sys.stderr.write('x' * 100000 + '\\nlast ' + 'y' * 1000); exit(9)").run(
         EVERYTHING, 0
     )
@@ -193,7 +193,7 @@ def test_a_program_that_goes_missing_or_cannot_be_executed_is_an_error(simulator
     assert result.outcome == "error" and "gone" in result.failure
 
 
-def test_without_room_for_temporary_files_it_is_told(simulator_of, monkeypatch, tmp_path):
+def test_a_lack_of_room_for_temporary_files_is_reported(simulator_of, monkeypatch, tmp_path):
     simulator = simulator_of(PASS)
     with monkeypatch.context() as patch:
         patch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))

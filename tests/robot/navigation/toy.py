@@ -1,4 +1,4 @@
-"""A robot without weight among circles and walls, all seen from above: it moves exactly as it is told, and its lidar is exact
+"""A robot without weight among circles and walls, all seen from above: it moves exactly as commanded, and its lidar is exact
 but for a little noise."""
 
 from __future__ import annotations
