@@ -75,6 +75,7 @@ def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world)
     assert result.first_sensed == result.first_touched
 
 
+@pytest.mark.rates
 def test_asking_for_contacts_only_near_what_is_untouched_misses_none(ditch, ditch_world, monkeypatch):
     keep = frozenset(ditch_world.elements())
     first = ditch.run(keep, seed=3)

@@ -14,6 +14,7 @@ from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
 from tests.robot.conftest import joint_of, link_of, model_of
+from tests.tiers import slow
 
 ALL = frozenset({"a", "b", "c", "d"})
 
@@ -120,6 +121,7 @@ def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, bui
     assert built == [{"a"}, ALL - {"b"}]
 
 
+@pytest.mark.rates
 def test_those_that_were_used_last_are_held(cubes, husky, scenario, built, monkeypatch):
     monkeypatch.setattr(variants, "MOST", 2)
     smaller = Variants(cubes, husky, scenario)
@@ -128,9 +130,12 @@ def test_those_that_were_used_last_are_held(cubes, husky, scenario, built, monke
     assert built == [{"a"}, {"b"}, {"c"}, {"b"}]
 
 
-@pytest.mark.parametrize(("name", "value"), [("BUILD", 1.0), ("PAIR", 1.0), ("LARGEST", 3), ("HELD", 0.0)])
-def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario, built, monkeypatch, name, value):
-    monkeypatch.setattr(variants, name, value)
+TOO_DEAR = {"BUILD": 1.0, "PAIR": 1.0, "LARGEST": 3, "HELD": 0.0}
+
+
+@pytest.mark.parametrize("limit", slow(pytest.mark.rates, TOO_DEAR, but=["LARGEST"]))
+def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario, built, monkeypatch, limit):
+    monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
     result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
     assert not built
     assert bits(result) == bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
