@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from ddenv.world.files import resources
+from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.files.meshes import pack
-from ddenv.world.files.resources import Disk, Missing, Stored, Unusable
+from ddenv.world.files.resources import Disk, Stored
 
 CUBE = "\n".join(
     [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 2)]

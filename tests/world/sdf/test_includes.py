@@ -103,7 +103,7 @@ def test_a_stand_in_for_a_whole_model(read):
 def test_files_that_include_each_other_are_refused(read, table):
     (table / "a.sdf").write_text(f"<sdf version='1.9'><model name='a'>{included(uri='b.sdf')}</model></sdf>")
     (table / "b.sdf").write_text(f"<sdf version='1.9'><model name='b'>{included(uri='a.sdf')}</model></sdf>")
-    with pytest.raises(UserError, match=r"b\.sdf:1: /sdf/model.*circle: a\.sdf includes b\.sdf includes a\.sdf"):
+    with pytest.raises(UserError, match=r"b\.sdf:1: /sdf/model.*form a cycle: a\.sdf includes b\.sdf includes a\.sdf"):
         read(included(uri="models/a.sdf"))
 
 

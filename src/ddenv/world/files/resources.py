@@ -13,8 +13,6 @@ from ddenv.world.files.resolve import find, model_file, search_folders
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 
-__all__ = ["Disk", "Missing", "Resources", "Stored", "Unusable"]
-
 SDF_LIMIT = 50_000_000  # bytes of a file
 SLOW_MESH = 3_000_000  # bytes; reading a larger mesh is announced
 

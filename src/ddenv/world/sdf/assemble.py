@@ -227,7 +227,7 @@ def read_state(world: Element, context: Context) -> dict[str, list[Saved]]:
     for tag in ("insertions", "deletions"):
         child = states[0].find(tag)
         if child is not None and len(child):
-            raise complain(child, f"<{tag}> in a <state> are not supported; save the world again without them")
+            raise complain(child, f"<{tag}> in <state> is not supported; save the world without it")
     for model in states[0].findall("model"):
         saved.setdefault(name_of(model), []).append(_saved(model, context))
     return saved

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ddenv.errors import UserError
-from ddenv.world.files.resources import Resources, Unusable
+from ddenv.world.files.access import Unusable
+from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.standin import StandIn, matching, parse_stand_ins
@@ -42,27 +43,27 @@ QUIET["axis2"] = QUIET["axis"]
 ONCE = {"pose", "geometry", "inertial", "surface", "material", "static", "scale", "gravity", "self_collide", "density"}
 ONCE |= {"axis", "axis2", "parent", "child", "limit"}
 REASONS = {
-    "plugin": "plugins do not run here",
+    "plugin": "plugins are not run",
     "sensor": "only the robot's own sensors are simulated",
     "actor": "nothing can touch it",
     "road": "it is not drawn",
-    "wind": "no wind blows here",
-    "enable_wind": "no wind blows here",
-    "gripper": "nothing grips here",
+    "wind": "wind is not simulated",
+    "enable_wind": "wind is not simulated",
+    "gripper": "grippers are not simulated",
     "projector": "it is not drawn",
     "particle_emitter": "it is not drawn",
-    "audio_source": "nothing is heard here",
-    "audio_sink": "nothing is heard here",
-    "battery": "it never runs out",
-    "mimic": "no joint follows another",
+    "audio_source": "sound is not simulated",
+    "audio_sink": "sound is not simulated",
+    "battery": "batteries are not simulated",
+    "mimic": "mimic joints are not simulated",
 }
-# By parent and child: physics that is not simulated, and what is simulated instead.
+# By parent and child: physics that is not simulated although it affects motion, with the note.
 WITHOUT = {
-    ("dynamics", "friction"): "joints turn without dry friction",
-    ("dynamics", "spring_stiffness"): "joints have no springs",
-    ("bounce", "restitution_coefficient"): "nothing bounces",
-    ("velocity_decay", "linear"): "nothing but contacts and joints slows a link down",
-    ("velocity_decay", "angular"): "nothing but contacts and joints slows a link down",
+    ("dynamics", "friction"): "dry friction of joints is not simulated",
+    ("dynamics", "spring_stiffness"): "springs of joints are not simulated",
+    ("bounce", "restitution_coefficient"): "bouncing is not simulated",
+    ("velocity_decay", "linear"): "velocity decay is not simulated",
+    ("velocity_decay", "angular"): "velocity decay is not simulated",
 }
 # Substructures without a reader of their own; a reader notes its element itself.
 INSIDE = frozenset(
@@ -166,7 +167,7 @@ def note_unread(element: Element, context: Context) -> None:
     for child in element:
         if child.tag in ONCE:
             if child.tag in once:
-                context.note("ignored", child, f"only the first <{child.tag}> counts")
+                context.note("ignored", child, f"only the first <{child.tag}> is used")
             once.add(child.tag)
         if child.tag not in quiet:
             extension = "}" in child.tag or ":" in child.tag

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ddenv.world.files.resources import Missing
+from ddenv.world.files.access import Missing
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
 from ddenv.world.sdf.standin import SIZES, StandIn
@@ -74,7 +74,7 @@ def _included(include: Element, files: tuple[Path, ...], context: Context) -> Pa
         return None
     if root.source in files:
         chain = " includes ".join(path.name for path in (*files[files.index(root.source) :], root.source))
-        raise complain(include, f"includes go in a circle: {chain}")
+        raise complain(include, f"the includes form a cycle: {chain}")
     model = _only_model(root, include, context)
     if model is None:
         return None
