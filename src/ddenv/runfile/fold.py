@@ -67,65 +67,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
     }
 
 
-def _confirm_started(_: RunState, __: Data, ___: float) -> Changes:
-    return {"confirming": True}
-
-
-def _paused(state: RunState, _: Data, __: float) -> Changes:
-    return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
-
-
-def _resumed(state: RunState, _: Data, __: float) -> Changes:
-    working = "baseline" if state.baseline is None else "running"
-    return {"paused": False, "status": working if state.status == "paused" else state.status}
-
-
-def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
-    mode = one_of(data["mode"], "automatic", "ask")
-    if mode == state.accept_mode:
-        return {}
-    words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"
-    return {"accept_mode": mode, **fold_decisions.decision(state, at, "accept_mode", words)}
-
-
-def _command_handled(state: RunState, data: Data, _: float) -> Changes:
-    return {"last_command": max(state.last_command, int(data["command"]))}
-
-
-def _finished(state: RunState, data: Data, at: float) -> Changes:
-    minimal, size = bool(data["minimal"]), len(state.environment)
-    nodes = list(state.nodes)
-    if nodes:
-        nodes[state.node] = replace(nodes[state.node], minimal=minimal)
-    return {
-        **_ended(state, "finished", data, at),
-        "minimal": minimal,
-        "nodes": tuple(nodes),
-        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
-    }
-
-
-def _engine_stopped(state: RunState, data: Data, at: float) -> Changes:
-    return _ended(state, "stopped", data, at)
-
-
-def _engine_failed(state: RunState, data: Data, at: float) -> Changes:
-    return _ended(state, "failed", data, at)
-
-
-def _ended(state: RunState, status: str, data: Data, at: float) -> Changes:
-    spent = 0.0 if state.started_at is None else max(0.0, at - state.started_at)
-    return {
-        "status": status,
-        "reason": str(data["reason"]),
-        "waiting_candidate": None,
-        "paused": False,
-        "working_seconds": state.working_seconds + spent,
-        "started_at": None,
-    }
-
-
-def test_started(state: RunState, data: Data, _: float) -> Changes:
+def _test_started(state: RunState, data: Data, _: float) -> Changes:
     round, candidate = data["round"], data["candidate"]
     without = data.get("without")
     test = Test(
@@ -147,11 +89,11 @@ def test_started(state: RunState, data: Data, _: float) -> Changes:
         return changes
     if round != _current(state).number:
         raise ValueError(round)
-    one = tried(state, candidate)
-    return changes | with_candidate(state, replace(one, tests=(*one.tests, test.id)))
+    one = _tried(state, candidate)
+    return changes | _with_candidate(state, replace(one, tests=(*one.tests, test.id)))
 
 
-def test_finished(state: RunState, data: Data, _: float) -> Changes:
+def _test_finished(state: RunState, data: Data, _: float) -> Changes:
     distance, pose = data["distance"], data["end_pose"]
     values = {
         "outcome": str(data["outcome"]),
@@ -168,11 +110,11 @@ def test_finished(state: RunState, data: Data, _: float) -> Changes:
     return with_test(state, int(data["test"]), values)
 
 
-def test_lost(state: RunState, data: Data, _: float) -> Changes:
+def _test_lost(state: RunState, data: Data, _: float) -> Changes:
     return with_test(state, int(data["test"]), {"outcome": "lost"})
 
 
-def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
+def _baseline_finished(state: RunState, data: Data, _: float) -> Changes:
     x, y, z = vector(data["position"], 3)
     baseline = Baseline(
         runs=int(data["runs"]),
@@ -201,16 +143,7 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
     }
 
 
-def _with_test_of_trial(state: RunState, test: Test) -> tuple[Trial, ...]:
-    if type(test.trial) is not int or not 0 < test.trial <= len(state.trials):
-        raise IndexError(test.trial)
-    trials = list(state.trials)
-    trial = trials[test.trial - 1]
-    trials[test.trial - 1] = replace(trial, tests=(*trial.tests, test.id))
-    return tuple(trials)
-
-
-def round_started(state: RunState, data: Data, _: float) -> Changes:
+def _round_started(state: RunState, data: Data, _: float) -> Changes:
     environment = names(state.elements, data["environment"])
     partitions = tuple(names(state.elements, part) for part in data["partitions"])
     split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
@@ -223,6 +156,179 @@ def round_started(state: RunState, data: Data, _: float) -> Changes:
     )
     round = Round(int(data["round"]), int(data["n_partitions"]), split, candidates)
     return {**waits_no_more(state), "round": round}
+
+
+def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
+    candidate = replace(
+        _tried(state, data["candidate"]),
+        verdict=one_of(data["verdict"], "similar", "dissimilar"),
+        tests=tuple(map(int, data["tests"])),
+        known=int(data["known"]),
+    )
+    round = _with(_current(state), candidate)
+    if candidate.verdict != "dissimilar":
+        return {"round": round}
+    # Something in the part that it leaves out is needed, and these parts are disjoint.
+    apart = candidate.kind == "complement" or len(round.partitions) == 2
+    round = replace(round, missed=round.missed + apart)
+    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    if needed == state.lower_bound:
+        return {"round": round}
+    point = Point(state.tests_done, len(state.environment), needed)
+    return {"round": round, "lower_bound": needed, "history": (*state.history, point)}
+
+
+def _waiting(state: RunState, data: Data, _: float) -> Changes:
+    return {"status": "waiting", "waiting_candidate": _tried(state, data["candidate"]).index}
+
+
+def _decided(state: RunState, data: Data, at: float) -> Changes:
+    changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
+    candidate = _tried(state, data["candidate"])
+    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_described(state, candidate)}"
+    changes |= decision(state, at, str(data["decision"]), said)
+    if data["decision"] == "accept":
+        return changes
+    return changes | _with_candidate(state, replace(candidate, verdict="rejected"))
+
+
+def _reduced(state: RunState, data: Data, at: float) -> Changes:
+    winner = _tried(state, data["candidate"])
+    # One part alone shows f although several seemed to be needed: the lower bound was wrong.
+    if winner.kind == "partition" and _current(state).missed > 1:
+        state = state.changed(lower_bound=0)
+    changes = arrived(state, data, at, "reduced", winner.label)
+    return changes | {"round": replace(_current(state), winner=winner.index)}
+
+
+def _round_finished(state: RunState, _: Data, __: float) -> Changes:
+    round = _current(state)
+    return {"round": replace(round, done=True), "rounds_done": round.number}
+
+
+def _confirm_started(_: RunState, __: Data, ___: float) -> Changes:
+    return {"confirming": True}
+
+
+def _paused(state: RunState, _: Data, __: float) -> Changes:
+    return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
+
+
+def _resumed(state: RunState, _: Data, __: float) -> Changes:
+    working = "baseline" if state.baseline is None else "running"
+    return {"paused": False, "status": working if state.status == "paused" else state.status}
+
+
+def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
+    mode = one_of(data["mode"], "automatic", "ask")
+    if mode == state.accept_mode:
+        return {}
+    words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"
+    return {"accept_mode": mode, **fold_decisions.decision(state, at, "accept_mode", words)}
+
+
+def _vetoed(state: RunState, data: Data, at: float) -> Changes:
+    verdict = one_of(data["verdict"], "vetoed", "rejected")
+    candidate = replace(_tried(state, data["candidate"]), verdict=verdict)
+    changes = _with_candidate(state, candidate)
+    if data.get("again"):
+        return changes
+    return changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
+
+
+def _unvetoed(state: RunState, data: Data, at: float) -> Changes:
+    candidate = _tried(state, data["candidate"])
+    words = f"took back the veto of {_described(state, candidate)}"
+    if candidate.verdict == "rejected":
+        words = f"took back the rejection of {_described(state, candidate)}"
+    changes = _with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
+    # The first similar candidate wins: a later one must wait for the verdict of this one.
+    if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
+        changes |= waits_no_more(state)
+    return changes
+
+
+def _command_handled(state: RunState, data: Data, _: float) -> Changes:
+    return {"last_command": max(state.last_command, int(data["command"]))}
+
+
+def _finished(state: RunState, data: Data, at: float) -> Changes:
+    minimal, size = bool(data["minimal"]), len(state.environment)
+    nodes = list(state.nodes)
+    if nodes:
+        nodes[state.node] = replace(nodes[state.node], minimal=minimal)
+    return {
+        **_ended(state, "finished", data, at),
+        "minimal": minimal,
+        "nodes": tuple(nodes),
+        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
+    }
+
+
+def _engine_stopped(state: RunState, data: Data, at: float) -> Changes:
+    return _ended(state, "stopped", data, at)
+
+
+def _engine_failed(state: RunState, data: Data, at: float) -> Changes:
+    return _ended(state, "failed", data, at)
+
+
+# Each returns only the changed fields, so that the state is copied once per event.
+_HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
+    "created": _created,
+    "engine_started": _engine_started,
+    "test_started": _test_started,
+    "test_finished": _test_finished,
+    "test_lost": _test_lost,
+    "baseline_finished": _baseline_finished,
+    "round_started": _round_started,
+    "candidate_judged": _candidate_judged,
+    "waiting": _waiting,
+    "decided": _decided,
+    "reduced": _reduced,
+    "round_finished": _round_finished,
+    "confirm_started": _confirm_started,
+    "paused": _paused,
+    "resumed": _resumed,
+    "accept_mode": _accept_mode,
+    "vetoed": _vetoed,
+    "unvetoed": _unvetoed,
+    "pinned": fold_decisions.pinned,
+    "unpinned": fold_decisions.unpinned,
+    "trial_started": fold_decisions.trial_started,
+    "trial_judged": fold_decisions.trial_judged,
+    "adopted": fold_decisions.adopted,
+    "accepted_other": fold_decisions.accepted_other,
+    "went_back": fold_decisions.went_back,
+    "changed": fold_decisions.changed,
+    "leg_started": fold_decisions.leg_started,
+    "command_refused": fold_decisions.command_refused,
+    "command_handled": _command_handled,
+    "finished": _finished,
+    "engine_stopped": _engine_stopped,
+    "engine_failed": _engine_failed,
+}
+
+
+def _ended(state: RunState, status: str, data: Data, at: float) -> Changes:
+    spent = 0.0 if state.started_at is None else max(0.0, at - state.started_at)
+    return {
+        "status": status,
+        "reason": str(data["reason"]),
+        "waiting_candidate": None,
+        "paused": False,
+        "working_seconds": state.working_seconds + spent,
+        "started_at": None,
+    }
+
+
+def _with_test_of_trial(state: RunState, test: Test) -> tuple[Trial, ...]:
+    if type(test.trial) is not int or not 0 < test.trial <= len(state.trials):
+        raise IndexError(test.trial)
+    trials = list(state.trials)
+    trial = trials[test.trial - 1]
+    trials[test.trial - 1] = replace(trial, tests=(*trial.tests, test.id))
+    return tuple(trials)
 
 
 def _check(split: Split, candidates: list[Any]) -> None:
@@ -242,87 +348,18 @@ def _check(split: Split, candidates: list[Any]) -> None:
         raise ValueError("candidates")
 
 
-def candidate_judged(state: RunState, data: Data, _: float) -> Changes:
-    candidate = replace(
-        tried(state, data["candidate"]),
-        verdict=one_of(data["verdict"], "similar", "dissimilar"),
-        tests=tuple(map(int, data["tests"])),
-        known=int(data["known"]),
-    )
-    round = _with(_current(state), candidate)
-    if candidate.verdict != "dissimilar":
-        return {"round": round}
-    # Something in the part that it leaves out is needed, and these parts are disjoint.
-    apart = candidate.kind == "complement" or len(round.partitions) == 2
-    round = replace(round, missed=round.missed + apart)
-    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
-    if needed == state.lower_bound:
-        return {"round": round}
-    point = Point(state.tests_done, len(state.environment), needed)
-    return {"round": round, "lower_bound": needed, "history": (*state.history, point)}
-
-
-def vetoed(state: RunState, data: Data, at: float) -> Changes:
-    verdict = one_of(data["verdict"], "vetoed", "rejected")
-    candidate = replace(tried(state, data["candidate"]), verdict=verdict)
-    changes = with_candidate(state, candidate)
-    if data.get("again"):
-        return changes
-    return changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
-
-
-def unvetoed(state: RunState, data: Data, at: float) -> Changes:
-    candidate = tried(state, data["candidate"])
-    words = f"took back the veto of {_described(state, candidate)}"
-    if candidate.verdict == "rejected":
-        words = f"took back the rejection of {_described(state, candidate)}"
-    changes = with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
-    # The first similar candidate wins: a later one must wait for the verdict of this one.
-    if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
-        changes |= waits_no_more(state)
-    return changes
-
-
-def waiting(state: RunState, data: Data, _: float) -> Changes:
-    return {"status": "waiting", "waiting_candidate": tried(state, data["candidate"]).index}
-
-
-def decided(state: RunState, data: Data, at: float) -> Changes:
-    changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
-    candidate = tried(state, data["candidate"])
-    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_described(state, candidate)}"
-    changes |= decision(state, at, str(data["decision"]), said)
-    if data["decision"] == "accept":
-        return changes
-    return changes | with_candidate(state, replace(candidate, verdict="rejected"))
-
-
-def reduced(state: RunState, data: Data, at: float) -> Changes:
-    winner = tried(state, data["candidate"])
-    # One part alone shows f although several seemed to be needed: the lower bound was wrong.
-    if winner.kind == "partition" and _current(state).missed > 1:
-        state = state.changed(lower_bound=0)
-    changes = arrived(state, data, at, "reduced", winner.label)
-    return changes | {"round": replace(_current(state), winner=winner.index)}
-
-
 def _described(state: RunState, candidate: Candidate) -> str:
     return f"{candidate.label} of round {_current(state).number} ({many(candidate.size)})"
 
 
-def round_finished(state: RunState, _: Data, __: float) -> Changes:
-    round = _current(state)
-    return {"round": replace(round, done=True), "rounds_done": round.number}
-
-
-def tried(state: RunState, index: int) -> Candidate:
+def _tried(state: RunState, index: int) -> Candidate:
     """The candidate of the current round with this index. Raises IndexError or ValueError if there is none."""
     if index < 0:
         raise IndexError(index)
     return _current(state).candidates[index]
 
 
-def with_candidate(state: RunState, candidate: Candidate) -> Changes:
+def _with_candidate(state: RunState, candidate: Candidate) -> Changes:
     """The current round with `candidate` in place of the one with the same index."""
     return {"round": _with(_current(state), candidate)}
 
@@ -336,40 +373,3 @@ def _current(state: RunState) -> Round:
     if state.round is None:
         raise ValueError("no round")
     return state.round
-
-
-# Each returns only the changed fields, so that the state is copied once per event.
-_HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
-    "created": _created,
-    "engine_started": _engine_started,
-    "test_started": test_started,
-    "test_finished": test_finished,
-    "test_lost": test_lost,
-    "baseline_finished": baseline_finished,
-    "round_started": round_started,
-    "candidate_judged": candidate_judged,
-    "waiting": waiting,
-    "decided": decided,
-    "reduced": reduced,
-    "round_finished": round_finished,
-    "confirm_started": _confirm_started,
-    "paused": _paused,
-    "resumed": _resumed,
-    "accept_mode": _accept_mode,
-    "vetoed": vetoed,
-    "unvetoed": unvetoed,
-    "pinned": fold_decisions.pinned,
-    "unpinned": fold_decisions.unpinned,
-    "trial_started": fold_decisions.trial_started,
-    "trial_judged": fold_decisions.trial_judged,
-    "adopted": fold_decisions.adopted,
-    "accepted_other": fold_decisions.accepted_other,
-    "went_back": fold_decisions.went_back,
-    "changed": fold_decisions.changed,
-    "leg_started": fold_decisions.leg_started,
-    "command_refused": fold_decisions.command_refused,
-    "command_handled": _command_handled,
-    "finished": _finished,
-    "engine_stopped": _engine_stopped,
-    "engine_failed": _engine_failed,
-}
