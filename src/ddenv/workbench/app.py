@@ -51,7 +51,14 @@ class Workbench(App[int]):
         Binding(
             "ctrl+q", "leave", "quit", id="app.leave", tooltip="leave; an engine goes on", show=False, priority=True
         ),
-        Binding("ctrl+z", "suspend_process", "suspend", id="app.suspend", tooltip="suspend; fg comes back", show=False),
+        Binding(
+            "ctrl+z",
+            "suspend_process",
+            "suspend",
+            id="app.suspend",
+            tooltip="suspend the workbench; type fg to come back",
+            show=False,
+        ),
         Binding(
             "ctrl+p",
             "command_palette",

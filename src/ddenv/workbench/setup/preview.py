@@ -201,7 +201,7 @@ class PlacePicker(Static):
         self.set_class(bool(self.picked_next), "-on")
         if self.picked_next:
             words = Text("▶ ", "bold", no_wrap=True, overflow="ellipsis").append(ASKS[self.picked_next])
-            self.update(words.append("   escape leaves it", "dim"))
+            self.update(words.append("   escape stops", "dim"))
             return
         spawn, goal = self.spawn, self.goal
         heading = f"{arrow(spawn[2])} {math.degrees(spawn[2]):.0f}°" if spawn else "?"

@@ -32,12 +32,14 @@ KEYS: list[BindingType] = [
     Binding("g", "pick('goal')", "goal", id="setup.pick_goal", tooltip="set the goal on the map", show=False),
     Binding("plus,equals_sign", "zoom(1.25)", "closer", id="setup.closer", tooltip="map: closer", show=False),
     Binding("minus", "zoom(0.8)", "farther", id="setup.farther", tooltip="map: farther away", show=False),
-    Binding("0", "fit", "fit", id="setup.fit", tooltip="map: show all that matters", show=False),
-    Binding("f2", "pane('choose')", "choose", id="setup.choose", tooltip="to what there is to choose", show=False),
+    Binding("0", "fit", "fit", id="setup.fit", tooltip="map: show all of it", show=False),
+    Binding(
+        "f2", "pane('choose')", "choose", id="setup.choose", tooltip="to the scenarios, worlds and runs", show=False
+    ),
     Binding("f3", "pane('map')", "map", id="setup.map", tooltip="to the map", show=False),
     Binding("f4", "pane('settings')", "settings", id="setup.settings", tooltip="to the settings", show=False),
     Binding("R", "app.runs", "runs", id="setup.runs", tooltip="the list of all runs", show=False),
     Binding("f1,question_mark", "app.help", "help", id="setup.help", tooltip="show every key", key_display="?"),
-    Binding("escape", "home", "back", id="setup.home", tooltip="leave picking; back to the list of files", show=False),
+    Binding("escape", "home", "back", id="setup.home", tooltip="stop picking; back to the list of files", show=False),
     Binding("q", "app.leave", "quit", id="setup.quit", tooltip="leave"),
 ]

@@ -1,6 +1,6 @@
 """The cells that were written to the terminal: of all that widgets draw again, only cells that changed are sent.
 
-This leans on two classes inside Textual, which say what is drawn; tests/workbench/test_written.py is the contract with them.
+This leans on two classes inside Textual, which say what is drawn; tests/workbench/terminal/test_written.py is the contract with them.
 Textual itself draws any other update.
 """
 

@@ -3,9 +3,9 @@
 import fake_run
 import pytest
 import yaml
-from setup_session import Opened
 
 from ddenv.workbench.map.world_map import WorldMap
+from tests.workbench.setup.setup_session import Opened
 
 
 class Places:

@@ -3,7 +3,6 @@
 import fake_run
 import pytest
 import yaml
-from setup_session import Opened
 from textual.widgets import Button, Input, OptionList, Select, Static
 
 from ddenv.schemas import explanation, names
@@ -14,6 +13,7 @@ from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import Explained
 from ddenv.workbench.setup.open_file import OpenFile
 from tests.tiers import slow
+from tests.workbench.setup.setup_session import Opened
 
 
 async def test_the_first_scenario_is_previewed_with_its_settings(scenarios):

@@ -1,9 +1,9 @@
 """Files that were opened before are offered again."""
 
 import pytest
-from setup_session import Opened
 
 from ddenv.workbench.setup.file_list import KEPT, FileList, recent_file, recent_files, remember
+from tests.workbench.setup.setup_session import Opened
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ import shlex
 import fake_run
 import pytest
 import yaml
-from setup_session import Opened
 
 from ddenv.cli.app import app as command_line
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.command_line import command, source_of
+from tests.workbench.setup.setup_session import Opened
 
 
 @pytest.fixture

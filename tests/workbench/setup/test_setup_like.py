@@ -4,13 +4,13 @@ import shutil
 
 import fake_run
 import pytest
-from setup_session import Opened
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_like, create_run, read_parts
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.world.load import load_scenario
+from tests.workbench.setup.setup_session import Opened
 
 
 @pytest.fixture

@@ -3,11 +3,11 @@
 import fake_run
 import pytest
 import yaml
-from setup_session import Opened
 from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
 from tests.tiers import slow
+from tests.workbench.setup.setup_session import Opened
 
 GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
 STRANGE = "[bold]x[/] \x1b[31m\u202eסוף" + "m" * 300
