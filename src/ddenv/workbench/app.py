@@ -56,7 +56,7 @@ class Workbench(App[int]):
             "suspend_process",
             "suspend",
             id="app.suspend",
-            tooltip="suspend the workbench; type fg to come back",
+            tooltip="suspend; type fg to come back",
             show=False,
         ),
         Binding(

@@ -1,7 +1,7 @@
 """The cells that were written to the terminal: of all that widgets draw again, only cells that changed are sent.
 
-This leans on two classes inside Textual, which say what is drawn; tests/workbench/terminal/test_written.py is the contract with them.
-Textual itself draws any other update.
+This leans on two classes inside Textual, which say what is drawn. The contract with them is in
+tests/workbench/terminal/test_written.py. Textual itself draws any other update.
 """
 
 from __future__ import annotations
