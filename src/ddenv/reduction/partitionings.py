@@ -14,15 +14,6 @@ from ddenv.arrays import Floats
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.round import one_model_partitions
 
-
-def grouped(environment: Partition, labels: Iterable[int]) -> list[Partition]:
-    """The models of each label, sorted by label; within a partition they keep the environment's order."""
-    groups: dict[int, list[str]] = {}
-    for name, label in zip(environment, labels, strict=True):
-        groups.setdefault(int(label), []).append(name)
-    return [tuple(groups[label]) for label in sorted(groups)]
-
-
 # With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
 # models: it would take a second instead of a tenth.
 MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
@@ -59,11 +50,6 @@ def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> li
     return by_span(environment, np.linspace(times[0], times[-1], n_partitions + 1)[1:-1], evidence)
 
 
-def by_span(environment: Partition, cuts: Floats, evidence: Evidence) -> list[Partition]:
-    """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
-    return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
-
-
 def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
     """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
     scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
@@ -71,6 +57,11 @@ def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence)
     """
     trajectory = evidence.need("trajectory")
     return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)
+
+
+def by_span(environment: Partition, cuts: Floats, evidence: Evidence) -> list[Partition]:
+    """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
+    return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
 
 
 def cuts(trajectory: Floats, delta: float, n_spans: int) -> Floats:
@@ -92,3 +83,11 @@ def turns(trajectory: Floats) -> tuple[Floats, Floats]:
     lasted = np.diff(times)
     rates = np.diff(yaw) / np.where(lasted > 0, lasted, np.inf)
     return times[1:-1], np.abs(np.diff(rates))
+
+
+def grouped(environment: Partition, labels: Iterable[int]) -> list[Partition]:
+    """The models of each label, sorted by label; within a partition they keep the environment's order."""
+    groups: dict[int, list[str]] = {}
+    for name, label in zip(environment, labels, strict=True):
+        groups.setdefault(int(label), []).append(name)
+    return [tuple(groups[label]) for label in sorted(groups)]

@@ -16,70 +16,6 @@ from ddenv.robot.surroundings import Surroundings
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
-# Rows of a recording that are processed together, which shares the overhead of NumPy's calls.
-TOGETHER = 32
-# The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
-PARALLEL = 1e-12
-
-
-def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
-    """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
-    return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
-
-
-def first_in_view(
-    low: Floats, high: Floats, eyes: Floats, headings: Floats, view_range: float, view_angle: float
-) -> Integers:
-    """The first row (N,) in which each of N boxes is in view, see `in_view`; -1 for boxes that never are.
-
-    `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
-    """
-    first = np.full(low.shape[1], -1)
-    for start in range(0, len(eyes), TOGETHER):
-        rows = slice(start, start + TOGETHER)
-        eye = eyes[rows]
-        lowest, highest = low[rows].min(axis=0) - eye.max(axis=0), eye.min(axis=0) - high[rows].max(axis=0)
-        least = np.linalg.norm(np.maximum(np.maximum(lowest, highest), 0.0), axis=1)
-        near = np.flatnonzero((first < 0) & (least <= view_range))
-        seen = in_view(low[rows, near], high[rows, near], eye[:, None], headings[rows, None], view_range, view_angle)
-        ever = seen.any(axis=0)
-        first[near[ever]] = start + seen.argmax(axis=0)[ever]
-    return first
-
-
-def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float) -> Booleans:
-    """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above, in the field of view.
-
-    `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and `heading` (...) rad the middle of the
-    field of view, all in the world frame; `view_angle` (rad) is its full width. A box above, below or around `eye` is always in
-    the field of view.
-    """
-    seen: Booleans = distances(low, high, eye) <= view_range
-    if view_angle >= math.tau:
-        return seen
-    eye, heading = np.broadcast_to(eye, low.shape)[seen], np.broadcast_to(heading, seen.shape)[seen]
-    low, high = low[seen] - eye, high[seen] - eye
-    drop = np.maximum(np.maximum(low[:, 2], -high[:, 2]), 0.0)
-    x, y = np.clip(0.0, low[:, :2], high[:, :2]).T
-    offset = np.arctan2(y, x) - heading
-    # The nearest visible point is the nearest point of the whole box, or lies on an edge of the field of view.
-    shown = np.abs(offset - math.tau * np.round(offset / math.tau)) <= view_angle / 2
-    shown |= (x == 0) & (y == 0)
-    for edge in (heading - view_angle / 2, heading + view_angle / 2):
-        shown |= np.hypot(_entry(low[:, :2], high[:, :2], edge), drop) <= view_range
-    seen[seen] = shown
-    return seen
-
-
-def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
-    """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m; infinite where the ray misses."""
-    ray = np.column_stack([np.cos(direction), np.sin(direction)])
-    ray = np.where(np.abs(ray) < PARALLEL, PARALLEL, ray)
-    enter = np.maximum(np.minimum(low / ray, high / ray).max(axis=1), 0.0)
-    leave = np.maximum(low / ray, high / ray).min(axis=1)
-    return np.where(leave >= enter, enter, np.inf)
-
-
 # While the robot stays this near to where it was, only what it can touch from there is checked, m.
 STRIDE = 0.5
 NOWHERE = (math.inf, math.inf, math.inf)
@@ -203,3 +139,67 @@ class Notice:
                 low, high, np.array(places), np.array(headings), self._sensors.view_range, self._sensors.view_angle
             )
             yield from ((name, times[row]) for name, row in zip(names, rows, strict=True) if row >= 0)
+
+
+# Rows of a recording that are processed together, which shares the overhead of NumPy's calls.
+TOGETHER = 32
+# The least component of a direction along an axis: a ray along the other axis then still crosses, far away.
+PARALLEL = 1e-12
+
+
+def first_in_view(
+    low: Floats, high: Floats, eyes: Floats, headings: Floats, view_range: float, view_angle: float
+) -> Integers:
+    """The first row (N,) in which each of N boxes is in view, see `in_view`; -1 for boxes that never are.
+
+    `low` and `high` (T, N, 3) m, `eyes` (T, 3) m and `headings` (T,) rad have a row for each of T instants, world frame.
+    """
+    first = np.full(low.shape[1], -1)
+    for start in range(0, len(eyes), TOGETHER):
+        rows = slice(start, start + TOGETHER)
+        eye = eyes[rows]
+        lowest, highest = low[rows].min(axis=0) - eye.max(axis=0), eye.min(axis=0) - high[rows].max(axis=0)
+        least = np.linalg.norm(np.maximum(np.maximum(lowest, highest), 0.0), axis=1)
+        near = np.flatnonzero((first < 0) & (least <= view_range))
+        seen = in_view(low[rows, near], high[rows, near], eye[:, None], headings[rows, None], view_range, view_angle)
+        ever = seen.any(axis=0)
+        first[near[ever]] = start + seen.argmax(axis=0)[ever]
+    return first
+
+
+def in_view(low: Floats, high: Floats, eye: Floats, heading: Floats, view_range: float, view_angle: float) -> Booleans:
+    """Which boxes (...) are partly in view of `eye`: within `view_range` (m) and, seen from above, in the field of view.
+
+    `low` and `high` (..., 3) m are the boxes' corners, `eye` (..., 3) m is the viewpoint and `heading` (...) rad the middle of the
+    field of view, all in the world frame; `view_angle` (rad) is its full width. A box above, below or around `eye` is always in
+    the field of view.
+    """
+    seen: Booleans = distances(low, high, eye) <= view_range
+    if view_angle >= math.tau:
+        return seen
+    eye, heading = np.broadcast_to(eye, low.shape)[seen], np.broadcast_to(heading, seen.shape)[seen]
+    low, high = low[seen] - eye, high[seen] - eye
+    drop = np.maximum(np.maximum(low[:, 2], -high[:, 2]), 0.0)
+    x, y = np.clip(0.0, low[:, :2], high[:, :2]).T
+    offset = np.arctan2(y, x) - heading
+    # The nearest visible point is the nearest point of the whole box, or lies on an edge of the field of view.
+    shown = np.abs(offset - math.tau * np.round(offset / math.tau)) <= view_angle / 2
+    shown |= (x == 0) & (y == 0)
+    for edge in (heading - view_angle / 2, heading + view_angle / 2):
+        shown |= np.hypot(_entry(low[:, :2], high[:, :2], edge), drop) <= view_range
+    seen[seen] = shown
+    return seen
+
+
+def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
+    """The distance (N,) along `direction` (N,) rad from the origin to rectangles (N, 2), m; infinite where the ray misses."""
+    ray = np.column_stack([np.cos(direction), np.sin(direction)])
+    ray = np.where(np.abs(ray) < PARALLEL, PARALLEL, ray)
+    enter = np.maximum(np.minimum(low / ray, high / ray).max(axis=1), 0.0)
+    leave = np.maximum(low / ray, high / ray).min(axis=1)
+    return np.where(leave >= enter, enter, np.inf)
+
+
+def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
+    """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
+    return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))

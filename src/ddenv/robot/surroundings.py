@@ -17,46 +17,6 @@ from ddenv.world.extent import Bounds, bounds
 from ddenv.world.model import Collision, Joint, Model, Plane, World
 from ddenv.world.pose import Vector
 
-
-def reach(robot: Model) -> float:
-    """An upper bound of the distance (m) from the origin of the robot's first link to any point of its geometry.
-
-    Infinite for a robot with loose parts or with unlimited sliding joints.
-    """
-    chains = _chains(robot)
-    farthest = 0.0
-    for link in robot.links:
-        box = solid_bounds(link.collisions, link.pose.inverse())
-        if box is None:
-            continue
-        if link.name not in chains:
-            return math.inf
-        start, length = chains[link.name]
-        corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
-        farthest = max(farthest, length + math.dist(start, link.pose.position) + corner)
-    return farthest
-
-
-def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
-    """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
-    chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
-    # A file may name its joints in any order.
-    for _ in robot.joints:
-        for joint in robot.joints:
-            if joint.parent in chains and joint.child not in chains:
-                start, length = chains[joint.parent]
-                chains[joint.child] = (
-                    joint.pose.position,
-                    length + math.dist(start, joint.pose.position) + _slide(joint),
-                )
-    return chains
-
-
-def _slide(joint: Joint) -> float:
-    """How far `joint` moves its child along its axis, m."""
-    return max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
-
-
 # A margin for surfaces that sink into each other, and joints that exceed their limits, m.
 YIELD = 0.1
 
@@ -95,6 +55,45 @@ class Surroundings:
             high=np.array([high for _, _, high, _ in boxes]).reshape(-1, 3),
             visible=np.array([visible for *_, visible in boxes], dtype=bool),
         )
+
+
+def reach(robot: Model) -> float:
+    """An upper bound of the distance (m) from the origin of the robot's first link to any point of its geometry.
+
+    Infinite for a robot with loose parts or with unlimited sliding joints.
+    """
+    chains = _chains(robot)
+    farthest = 0.0
+    for link in robot.links:
+        box = solid_bounds(link.collisions, link.pose.inverse())
+        if box is None:
+            continue
+        if link.name not in chains:
+            return math.inf
+        start, length = chains[link.name]
+        corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
+        farthest = max(farthest, length + math.dist(start, link.pose.position) + corner)
+    return farthest
+
+
+def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
+    """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
+    chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
+    # A file may name its joints in any order.
+    for _ in robot.joints:
+        for joint in robot.joints:
+            if joint.parent in chains and joint.child not in chains:
+                start, length = chains[joint.parent]
+                chains[joint.child] = (
+                    joint.pose.position,
+                    length + math.dist(start, joint.pose.position) + _slide(joint),
+                )
+    return chains
+
+
+def _slide(joint: Joint) -> float:
+    """How far `joint` moves its child along its axis, m."""
+    return max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
 
 
 def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:

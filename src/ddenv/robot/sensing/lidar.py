@@ -20,122 +20,12 @@ from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
 
-# Two poses of the lidar are near each other within this distance (m), this much of it upwards (m), and this tilt (rad).
-AROUND = 0.7
-LIFT = 0.04
-TILT = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Near:
-    """All K shapes that beams may hit from `place` or, with `calm`, from any place near it. `owners` (K,) are their models."""
-
-    place: Pose
-    calm: bool
-    shapes: Shapes
-    owners: Integers
-
-    @classmethod
-    def of(cls, fan: Fan, shapes: Shapes, owners: Integers, place: Pose, calm: bool) -> Near:
-        """Selects from `shapes`, whose models are `owners` (N,)."""
-        rows = in_the_way(fan, shapes, np.array(place.position), place.rotation().T, float(calm))
-        return cls(place, calm, shapes.take(rows), owners[rows])
-
-    def has(self, place: Pose) -> bool:
-        """Whether these include all shapes that beams may hit from `place`."""
-        return self.calm and are_near(self.place, place)
-
-
-def are_near(one: Pose, other: Pose, part: float = 1.0) -> bool:
-    """Whether two poses are near each other; `part` scales all limits."""
-    up = _up(one)
-    if math.dist(one.position, other.position) > part * AROUND or math.dist(up, _up(other)) > part * TILT:
-        return False
-    lift = sum([(to - at) * along for to, at, along in zip(other.position, one.position, up, strict=True)])
-    return abs(lift) <= part * LIFT
-
-
-def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, part: float) -> Integers:
-    """The numbers (K,) of the shapes that the beams may hit from `origin` (3,), or from any place near it.
-
-    `axes` (3, 3) are the lidar's axes, as rows; the beams lie in the plane of the first two. `part` scales what near means: 0 is
-    `origin` alone.
-    """
-    around, lift, tilt = part * AROUND, part * LIFT, part * TILT
-    numbers = _within_reach(fan, shapes, origin, axes, around, lift, tilt)
-    frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
-    local = (away[:, None] * frames).sum(axis=0)
-    up = (axes[2][:, None, None] * frames).sum(axis=0)
-    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical axis.
-    edges = up * shapes.squares.take(numbers, axis=1)
-    tilted = tilt * (np.sqrt((away * away).sum(axis=0)) + around + 2 * shapes.reaches[numbers])
-    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + tilted + lift + SPARE
-    # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
-    squares = (frames * frames).sum(axis=0)
-    extents = np.sqrt(np.maximum(squares - up * up, 0.0)) + tilt * np.sqrt(squares)
-    far = extents * (fan.range * (1.0 + SPARE) + around) + lift * np.abs(up) + SPARE
-    met: Booleans = cut & (np.abs(local) - 1.0 <= far).all(axis=0)
-    in_way: Integers = numbers[met]
-    return in_way
-
-
-def _within_reach(
-    fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, around: float, lift: float, tilt: float
-) -> Integers:
-    """The numbers of the shapes whose bounding spheres the plane of the beams cuts within their range."""
-    # A matrix product may round differently among more shapes: nothing else is computed from this one.
-    ahead, left, above = axes @ (shapes.centers - origin[:, None])
-    flat, high = ahead * ahead + left * left, np.abs(above)
-    tallest = shapes.reaches + lift + tilt * (np.sqrt(flat + high * high) + around)
-    # A tilt brings what lies above or below nearer in the plane by this much.
-    far = (shapes.reaches + (fan.range + around) + tilt * (high + around)) * (1.0 + tilt * tilt)
-    numbers: Integers = ((high <= tallest) & (flat <= far * far)).nonzero()[0]
-    return numbers
-
-
-def _up(place: Pose) -> Vector:
-    """The vertical axis of `place` in the world frame."""
-    w, x, y, z = place.quaternion
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
-
-
 # The maximum number of scans that are computed together.
 TOGETHER = 16
 # The lidar collects what is near for later scans only if it moved less than this part of near since the last scan.
 CALM = 0.5
 # Random numbers reserved for the noise of each scan.
 DRAWS = 2**40
-
-
-@dataclass(slots=True, eq=False)
-class Turn:
-    """Scan `number` of a lidar, at `time` (s): its pose, the shapes that its beams may hit, and its ranges once computed."""
-
-    time: float
-    number: int
-    place: Pose
-    near: Near
-    ranges: Floats | None = None
-
-
-class LazyScan(Scan):
-    """A scan that computes its `ranges` only when they are read. `dataclasses.replace` makes copies whose ranges are an array."""
-
-    __slots__ = ("_ranges",)
-    _ranges: Callable[[], Floats] | Floats
-
-    def __init__(self, time: float, angles: Floats, ranges: Callable[[], Floats] | Floats, origin: Vector) -> None:
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "angles", angles)
-        object.__setattr__(self, "_ranges", ranges)
-        object.__setattr__(self, "origin", origin)
-
-    @property
-    def ranges(self) -> Floats:
-        return self._ranges() if callable(self._ranges) else self._ranges
-
-    def __reduce__(self) -> tuple[type[Scan], tuple[Any, ...]]:
-        return Scan, (self.time, self.angles, self.ranges, self.origin)
 
 
 class Lidar:
@@ -274,3 +164,113 @@ class Lidar:
 def _firsts(models: Sequence[Model]) -> list[int]:
     """The index of each model's first link among the links of all `models`."""
     return [0, *accumulate(len(model.links) for model in models)][:-1]
+
+
+@dataclass(slots=True, eq=False)
+class Turn:
+    """Scan `number` of a lidar, at `time` (s): its pose, the shapes that its beams may hit, and its ranges once computed."""
+
+    time: float
+    number: int
+    place: Pose
+    near: Near
+    ranges: Floats | None = None
+
+
+class LazyScan(Scan):
+    """A scan that computes its `ranges` only when they are read. `dataclasses.replace` makes copies whose ranges are an array."""
+
+    __slots__ = ("_ranges",)
+    _ranges: Callable[[], Floats] | Floats
+
+    def __init__(self, time: float, angles: Floats, ranges: Callable[[], Floats] | Floats, origin: Vector) -> None:
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "_ranges", ranges)
+        object.__setattr__(self, "origin", origin)
+
+    @property
+    def ranges(self) -> Floats:
+        return self._ranges() if callable(self._ranges) else self._ranges
+
+    def __reduce__(self) -> tuple[type[Scan], tuple[Any, ...]]:
+        return Scan, (self.time, self.angles, self.ranges, self.origin)
+
+
+# Two poses of the lidar are near each other within this distance (m), this much of it upwards (m), and this tilt (rad).
+AROUND = 0.7
+LIFT = 0.04
+TILT = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """All K shapes that beams may hit from `place` or, with `calm`, from any place near it. `owners` (K,) are their models."""
+
+    place: Pose
+    calm: bool
+    shapes: Shapes
+    owners: Integers
+
+    @classmethod
+    def of(cls, fan: Fan, shapes: Shapes, owners: Integers, place: Pose, calm: bool) -> Near:
+        """Selects from `shapes`, whose models are `owners` (N,)."""
+        rows = in_the_way(fan, shapes, np.array(place.position), place.rotation().T, float(calm))
+        return cls(place, calm, shapes.take(rows), owners[rows])
+
+    def has(self, place: Pose) -> bool:
+        """Whether these include all shapes that beams may hit from `place`."""
+        return self.calm and are_near(self.place, place)
+
+
+def are_near(one: Pose, other: Pose, part: float = 1.0) -> bool:
+    """Whether two poses are near each other; `part` scales all limits."""
+    up = _up(one)
+    if math.dist(one.position, other.position) > part * AROUND or math.dist(up, _up(other)) > part * TILT:
+        return False
+    lift = sum([(to - at) * along for to, at, along in zip(other.position, one.position, up, strict=True)])
+    return abs(lift) <= part * LIFT
+
+
+def in_the_way(fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, part: float) -> Integers:
+    """The numbers (K,) of the shapes that the beams may hit from `origin` (3,), or from any place near it.
+
+    `axes` (3, 3) are the lidar's axes, as rows; the beams lie in the plane of the first two. `part` scales what near means: 0 is
+    `origin` alone.
+    """
+    around, lift, tilt = part * AROUND, part * LIFT, part * TILT
+    numbers = _within_reach(fan, shapes, origin, axes, around, lift, tilt)
+    frames, away = shapes.frames.take(numbers, axis=2), origin[:, None] - shapes.centers.take(numbers, axis=1)
+    local = (away[:, None] * frames).sum(axis=0)
+    up = (axes[2][:, None, None] * frames).sum(axis=0)
+    # Half the edges of the boxes around the shapes, and their centers, along the lidar's vertical axis.
+    edges = up * shapes.squares.take(numbers, axis=1)
+    tilted = tilt * (np.sqrt((away * away).sum(axis=0)) + around + 2 * shapes.reaches[numbers])
+    cut = np.abs((edges * local).sum(axis=0)) <= np.abs(edges).sum(axis=0) + tilted + lift + SPARE
+    # How far the beams get along each of a shape's axes: a ground may be at the right height, but beyond their range.
+    squares = (frames * frames).sum(axis=0)
+    extents = np.sqrt(np.maximum(squares - up * up, 0.0)) + tilt * np.sqrt(squares)
+    far = extents * (fan.range * (1.0 + SPARE) + around) + lift * np.abs(up) + SPARE
+    met: Booleans = cut & (np.abs(local) - 1.0 <= far).all(axis=0)
+    in_way: Integers = numbers[met]
+    return in_way
+
+
+def _within_reach(
+    fan: Fan, shapes: Shapes, origin: Floats, axes: Floats, around: float, lift: float, tilt: float
+) -> Integers:
+    """The numbers of the shapes whose bounding spheres the plane of the beams cuts within their range."""
+    # A matrix product may round differently among more shapes: nothing else is computed from this one.
+    ahead, left, above = axes @ (shapes.centers - origin[:, None])
+    flat, high = ahead * ahead + left * left, np.abs(above)
+    tallest = shapes.reaches + lift + tilt * (np.sqrt(flat + high * high) + around)
+    # A tilt brings what lies above or below nearer in the plane by this much.
+    far = (shapes.reaches + (fan.range + around) + tilt * (high + around)) * (1.0 + tilt * tilt)
+    numbers: Integers = ((high <= tallest) & (flat <= far * far)).nonzero()[0]
+    return numbers
+
+
+def _up(place: Pose) -> Vector:
+    """The vertical axis of `place` in the world frame."""
+    w, x, y, z = place.quaternion
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
