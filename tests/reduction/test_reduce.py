@@ -195,7 +195,8 @@ def test_also_the_end_of_an_iterator_comes_through(where):
 def test_what_a_model_is_like_reaches_the_schemas():
     """A slippery model far away: the learner finds it in fewer tests when it knows the models' traits."""
     traits = {name: ddenv.Traits(1.0, 0.01 if name == "h" else 1.0) for name in ELEMENTS}
-    found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", traits=traits, touched=["a"], **ALL)
+    known = ALL | {"traits": traits, "touched": ["a"]}
+    found = ddenv.reduce(ELEMENTS, needs("a"), partitioning="learner", **known)
     assert found.kept == ("a",)
 
 
