@@ -26,3 +26,12 @@ def test_views_start_without_drake_and_scikit_learn():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_the_first_paint_of_a_run_waits_for_no_slow_import():
+    code = (
+        "import sys, ddenv.workbench.launch, ddenv.workbench.run.run_screen;"
+        "print([name for name in ('numpy', 'pydantic', 'yaml') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr

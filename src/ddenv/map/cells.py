@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from ddenv.map import arrays as np
-from ddenv.map.footprints import Drawn
 from ddenv.map.paint import PLAIN, RGB, Canvas, blend, packed, readable
 from ddenv.map.raster import EMPTY, View, label_cells, masks, owners
+
+if TYPE_CHECKING:
+    from ddenv.map.footprints import Drawn
 
 Cell = tuple[int, int]
 # With fewer cells than `ROOM` per letter, one letter is kept in each `BLOCK` (rows, columns), and one of each group unless that
