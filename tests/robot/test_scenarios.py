@@ -21,7 +21,6 @@ from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario
-from tests.tiers import slow
 
 # What is left of each, with other models for a part of the world that is more than that.
 MINIMAL = {
@@ -37,11 +36,17 @@ MORE = {
 # Where the robot is when its time is up, m.
 ENDS = {"ditch": (-0.29, 0.04, 2.08), "rubble": (-0.18, 0.03, 0.18), "friction": (2.15, -0.59, 0.12)}
 # `benchmarks/failure_rates.py` has thirty seeds of each.
-SEEDS = {"ditch": 10, "rubble": 6, "friction": 10}
+SEEDS = {"ditch": 10, "rubble": 5, "friction": 10}
 REPAIRED_SEEDS = 5
-each = pytest.mark.parametrize("name", MINIMAL)
-each_often = pytest.mark.parametrize("name", slow(pytest.mark.rates, MINIMAL))
-each_witnessed = pytest.mark.parametrize("name", slow(pytest.mark.rates, MINIMAL, but=["friction"]))
+
+
+def of_each(*quick: str) -> pytest.MarkDecorator:
+    """All three, of which the `quick` ones are in the quick tier. One process builds a world once for all tests of it."""
+
+    def marks(name: str) -> list[pytest.MarkDecorator]:
+        return [pytest.mark.xdist_group(name)] + [pytest.mark.rates] * (name not in quick)
+
+    return pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in MINIMAL])
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ def whole(name: str, seed: int) -> RunResult:
     return part(name).template.run(part(name).everything, seed)
 
 
-@each
+@of_each(*MINIMAL)
 def test_the_file_is_what_its_script_writes(name, script):
     assert script(name)[name]().encode() == part(name).world.text
 
@@ -97,7 +102,7 @@ def test_the_friction_of_patches_differs_a_thousandfold():
     assert max(green) < mus["ground_plane"] < min(red)
 
 
-@each_often
+@of_each()
 def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     results = [whole(name, seed) for seed in range(SEEDS[name])]
     failed = [result for result in results if result.outcome == "failed"]
@@ -109,7 +114,7 @@ def test_the_robot_fails_in_the_same_place_at_a_stable_rate(name):
     assert {failed[number].failure for number in np.flatnonzero(similar)} == {"stuck"}
 
 
-@each_witnessed
+@of_each("friction")
 def test_it_reaches_its_goal_where_the_cause_is_taken_away(name, script):
     scenario = part(name).scenario
     world = parse_world(script(name)[name](repaired=True).encode(), Path("repaired"))
@@ -131,7 +136,7 @@ def shows_f(name: str, keep: set[str], seeds: range) -> list[bool]:
     return [judge(part(name).template.run(frozenset(keep), seed), failure(name)).outcome == "similar" for seed in seeds]
 
 
-@each_often
+@of_each()
 def test_few_models_show_the_same_failure_and_none_of_them_can_be_removed(name):
     assert sum(shows_f(name, MINIMAL[name], range(4))) >= 2
     for left_out in MINIMAL[name]:
@@ -147,7 +152,7 @@ def bits_of_few(name: str) -> bytes:
     return bits(part(name).template.run(few(name), seed=5))
 
 
-@each_often
+@of_each()
 def test_a_used_context_gives_the_same_bits_as_a_fresh_one(name):
     first, template = bits_of_few(name), part(name).template
     template.run(frozenset(MINIMAL[name]), seed=6)
@@ -156,7 +161,7 @@ def test_a_used_context_gives_the_same_bits_as_a_fresh_one(name):
     assert bits(fresh.run(few(name), seed=5)) == first
 
 
-@each_witnessed
+@of_each("friction")
 def test_switching_models_off_gives_the_same_bits_as_building_without_them(name):
     world = part(name).world
     smaller = replace(world, models=tuple(one for one in world.models if one.name in few(name) | {"ground_plane"}))
@@ -164,7 +169,7 @@ def test_switching_models_off_gives_the_same_bits_as_building_without_them(name)
     assert bits(template.run(few(name), seed=5)) == bits_of_few(name)
 
 
-@each_often
+@of_each()
 def test_another_process_gives_the_same_bits(name):
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         elsewhere = pool.submit(bits_of_few, name).result()
