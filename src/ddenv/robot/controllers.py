@@ -119,7 +119,7 @@ FASTEST = 1000.0
 LONGEST_REASON = 300
 # The number of seeds of NumPy's global generator.
 SEEDS = 2**32
-# Tracebacks leave out our own files: they do not help who wrote the controller.
+# Our own files, which a reported place leaves out: they do not help the author of the controller.
 OURS = Path(__file__).parent
 
 
