@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from ddenv.errors import UserError
 from ddenv.world.files.access import Unusable
@@ -76,8 +76,7 @@ class Context:
     """Settings, notes and caches of one reading. `model` is the name of the world's model being read, for the notes.
 
     `used` are the URIs of stand-ins that were asked for, `missing` the errors of missing files by URI, `files` the parsed
-    files. `scopes` and `canonical` are caches by the `id` of a `<model>`: its frames, and the link its own frame is
-    attached to.
+    files. `canonical` holds the link that a model's own frame is attached to, by the `id` of its `<model>`.
     """
 
     resources: Resources
@@ -89,7 +88,6 @@ class Context:
     assembled: int = 0
     missing: dict[str, UserError] = field(default_factory=dict)
     files: dict[Path, Element] = field(default_factory=dict)
-    scopes: dict[int, Any] = field(default_factory=dict)
     canonical: dict[int, str | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -21,20 +21,26 @@ WORLD = "world"
 class Scope:
     """The frames inside one `<model>` or `<world>`; all poses are relative to its own frame."""
 
-    def __init__(self, element: Element, files: tuple[Path, ...], context: Context) -> None:
+    def __init__(
+        self,
+        element: Element,
+        files: tuple[Path, ...],
+        context: Context,
+        scopes: dict[int, Scope] | None = None,
+    ) -> None:
         self.element = element
         self.parts = parts(element, files, context)
         self._context = context
         self._poses: dict[str, Pose] = {}
+        # All scopes inside the outermost one, by the `id` of their element.
+        self._scopes: dict[int, Scope] = {} if scopes is None else scopes
 
     def inside(self, part: Part) -> Scope:
         """The frames inside one of the `parts`, shared by all includes of one model."""
-        scopes = self._context.scopes
         key = id(part.element)
-        if key not in scopes:
-            scopes[key] = Scope(part.element, part.files, self._context)
-        scope: Scope = scopes[key]
-        return scope
+        if key not in self._scopes:
+            self._scopes[key] = Scope(part.element, part.files, self._context, self._scopes)
+        return self._scopes[key]
 
     @cached_property
     def named(self) -> dict[str, Element | Part]:
