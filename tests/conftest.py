@@ -30,9 +30,9 @@ def home(tmp_path, monkeypatch) -> Path:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is slow for one of the named reasons is `slow`."""
+    """What is slow for one of the named reasons is `slow`, but for its witness."""
     for item in items:
-        if any(item.get_closest_marker(name) for name in SLOW):
+        if any(item.get_closest_marker(name) for name in SLOW) and not item.get_closest_marker("witness"):
             item.add_marker("slow")
 
 

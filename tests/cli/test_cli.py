@@ -34,6 +34,8 @@ def reduced(made_once):
     return folder, json.loads((folder / "summary.json").read_text())
 
 
+@pytest.mark.programs
+@pytest.mark.witness
 def test_a_reduction_finds_the_two_that_matter(reduced):
     _, summary = reduced
     assert summary["kept"] == ["deck", "wall"]

@@ -33,6 +33,8 @@ def reduced(made_once):
     return folder / "run.ddenv", (folder / "printed").read_text()
 
 
+@pytest.mark.examples
+@pytest.mark.witness
 def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
     (promise,) = re.findall(r"minimal environment: .*", PAGE)
     assert promise in reduced[1].splitlines()

@@ -9,7 +9,8 @@ from tests.end_to_end.terminal import state_of
 from tests.waiting import wait_until
 
 
-@pytest.mark.parametrize(("width", "height"), [pytest.param(120, 36, marks=pytest.mark.terminal), (80, 24)])
+@pytest.mark.terminal
+@pytest.mark.parametrize(("width", "height"), [pytest.param(120, 36), pytest.param(80, 24, marks=pytest.mark.witness)])
 def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, height):
     first = terminal(width, height, "run", DATA / "wall.yaml", "--name", "one", "--jobs", "1")
     first.see("baseline")

@@ -111,6 +111,8 @@ def near(picture: np.ndarray, color: tuple[int, int, int], reach: int = 40) -> i
     return int((np.abs(picture.astype(int) - color).max(axis=2) <= reach).sum())
 
 
+@pytest.mark.browser
+@pytest.mark.witness
 async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
     writer.baseline()
     writer.round()
