@@ -355,3 +355,31 @@ def test_commands_without_sense_are_marked_and_ignored(tmp_path):
 
 def test_elements_are_those_of_the_world(tmp_path):
     assert drive(new_run(tmp_path), FakePool(needs("wall"), 1)).elements == ELEMENTS
+
+
+class SlowPool(FakePool):
+    """Its tests take a while: most looks at it find nothing finished."""
+
+    def finished(self, seconds):
+        self.looks = getattr(self, "looks", 0) + 1
+        return super().finished(seconds) if self.looks % 40 == 0 else []
+
+
+def forecasts(path):
+    with RunFile(path) as file:
+        return [event.data for event in file.events() if event.kind == "forecast"]
+
+
+def test_each_round_is_forecast_while_tests_run(tmp_path):
+    paths = [new_run(tmp_path) for _ in range(3)]
+    for path, pool in zip(paths, (SlowPool, SlowPool, FakePool), strict=True):
+        state = drive(path, pool(needs("wall", "beam"), 2))
+        assert state.minimal
+    first, second, hasty = map(forecasts, paths)
+    # Rounds without a test of their own have none.
+    assert first
+    assert [each["round"] for each in first] == sorted({each["round"] for each in first})
+    assert all(low <= likely <= high for low, likely, high in (each["tests"] for each in first))
+    assert [each["tests"] for each in second] == [each["tests"] for each in first]
+    # Tests that end at once are not waited for.
+    assert not hasty

@@ -1,149 +1,135 @@
-"""What a reduction is expected to take: held against real ones without a robot, and against what runs say on their way."""
+"""What a search is expected to take: held against real searches, without a robot."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-import ddenv
-from ddenv.forecast.estimate import expect, remaining
-from ddenv.runfile.fold import fold
-from tests.workbench import fake_run
+from ddenv.reduction.evidence import Evidence, Trial
+from ddenv.reduction.forecast import Memory, Moment, interval, plays
+from ddenv.reduction.guide import make_guide, search
+from ddenv.schemas import split_pair
 
 NEAR = "model2model/failure-proximal"
-# The table in docs/benchmarks.md: models, mean tests with a failure that always shows and with one that shows in 80 % of the runs.
-TABLE = (
-    ("ddenv", {"growth": "steady", "skip": "implied"}, ((43, 15.9, 44), (25, 35.0, 120), (200, 54.9, 170))),
-    ("ddenv", {}, ((43, 36.9, 120), (36, 67.9, 242), (200, 238.5, 858))),
-    ("ddmin", {}, ((43, 28.3, 91), (25, 82.9, 304), (200, 156.7, 562))),
-    ("probdd", {}, ((43, 13.1, 37), (25, 28.1, 95), (200, 45.2, 139))),
-    ("splitting", {}, ((43, 11.6, 31), (25, 19.6, 63), (5000, 59.1, 160))),
+
+
+def world(models, seed=0):
+    """Models on 20 x 20 m, and a robot that drove straight to the middle, where it failed."""
+    rng = np.random.default_rng([models, seed])
+    places = rng.uniform(0, 20, (models, 2))
+    elements = tuple(f"m{index}" for index in range(models))
+    times = np.linspace(0, 20, 41)
+    path = np.column_stack([times, np.clip(times, 0, 10), np.full(41, 10.0), np.zeros((41, 2))])
+    sensed = {name: float(place[0]) for name, place in zip(elements, places, strict=True)}
+    positions = {name: (*place, 0.0) for name, place in zip(elements, places.tolist(), strict=True)}
+    return Evidence(elements, positions, path, (10.0, 10.0, 0.0), sensed, seed=seed)
+
+
+def needed_of(known, count):
+    """The models which f needs: likelier the nearer they are to it."""
+    rng = np.random.default_rng([known.seed, count])
+    apart = np.linalg.norm(known.places(known.elements) - known.failure_position, axis=1)
+    weights = np.exp(-apart / 2)
+    return set(rng.choice(known.elements, count, replace=False, p=weights / weights.sum()))
+
+
+def searched(known, needed, algorithm="ddenv", pair=NEAR, iterations=3, **options):
+    """Plays a search and forecasts each round: (the forecast's low, likely, high; the tests that were left)."""
+    trials, verdicts, told = [], {}, []
+    guide = make_guide(*split_pair(pair), lambda: replace(known, trials=trials), **options)
+    memory = Memory()
+    searching, winner = search(algorithm, known.elements, memory.of(guide)), None
+    try:
+        while True:
+            round = searching.send(winner)
+            now = replace(known, trials=tuple(trials))
+            moment = Moment(algorithm, pair, known.elements, round.environment, guide, memory, now, iterations, 1.0)
+            told.append((len(trials), interval(list(plays(moment)))))
+            winner = None
+            for one in round.candidates:
+                if one.models not in verdicts:
+                    verdicts[one.models] = shows = needed <= one.models
+                    trials += [Trial(one.models, shows)] * (1 if shows else 1 + iterations)
+                if verdicts[one.models]:
+                    winner = one
+                    break
+    except StopIteration as end:
+        assert end.value == needed
+        return [(*expected, len(trials) - at) for at, expected in told]
+
+
+def first(models, algorithm="ddenv", pair=NEAR, iterations=3, rate=1.0, known=None, **options):
+    known = world(models) if known is None else known
+    guide = make_guide(*split_pair(pair), lambda: known, **options)
+    return Moment(algorithm, pair, known.elements, known.elements, guide, Memory(), known, iterations, rate)
+
+
+def likely(*arguments, **options):
+    return interval(list(plays(first(*arguments, **options))))[1]
+
+
+AS_PRINTED = {"growth": "paper", "skip": "known"}
+BEST = {"growth": "steady", "skip": "implied"}
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "pair", "options"),
+    [
+        ("ddenv", NEAR, BEST),
+        ("ddenv", NEAR, AS_PRINTED),
+        ("ddenv", "timeseg/avg-trajectory-proximal", BEST),
+        ("ddenv", "learner/random", BEST),
+        ("ddmin", NEAR, {}),
+        ("probdd", NEAR, {}),
+        ("splitting", NEAR, {}),
+    ],
 )
+def test_the_interval_holds_what_is_left_at_the_start_and_in_most_rounds(algorithm, pair, options):
+    at_start, later = [], []
+    for seed in range(3):
+        known = world(24, seed)
+        begin, *rest = searched(known, needed_of(known, 2 + seed), algorithm, pair, **options)
+        at_start.append(begin)
+        later += rest
+    assert sum(low <= left <= high for low, _, high, left in at_start) >= 2
+    assert sum(low <= left <= high for low, _, high, left in later) >= 0.6 * len(later)
+    assert all(low <= middle <= high for low, middle, high, _ in (*at_start, *later))
 
 
-@pytest.mark.parametrize(("algorithm", "options", "cells"), TABLE)
-def test_the_interval_holds_what_random_worlds_took(algorithm, options, cells):
-    for models, steady, flaky in cells:
-        for tests, iterations, rate in ((steady, 0, 1.0), (flaky, 3, 0.8)):
-            expected = expect(models, algorithm, NEAR, iterations, rate, **options)
-            assert expected.tests_low <= tests <= expected.tests_high
-            assert expected.tests_low <= expected.tests <= expected.tests_high
+def test_the_same_moment_gives_the_same_plays():
+    moment = first(43)
+    assert list(plays(moment)) == list(plays(moment))
 
 
-def test_more_is_needed_and_more_is_expected():
-    few, many = (expect(60, "ddenv", NEAR, 3, needed=needed).tests for needed in (0, 6))
-    assert few < many
-    assert expect(60, "ddenv", NEAR, 0).tests < few
-    assert expect(20, "ddenv", NEAR, 3).tests < few
-    assert expect(60, "ddenv", NEAR, 3) == expect(60, "ddenv", NEAR, 3)
+def test_what_makes_a_search_longer_is_expected_to():
+    few = likely(60)
+    assert likely(20) < few
+    assert likely(60, iterations=0) < few
+    assert likely(43, candidates="complements", **AS_PRINTED) < likely(43, **AS_PRINTED)
 
 
-@pytest.mark.parametrize("models", [0, 1, 2, 3])
-@pytest.mark.parametrize("algorithm", ["ddenv", "ddmin", "probdd", "splitting", "theirs"])
+def test_models_that_are_known_to_be_needed_make_a_search_longer():
+    known = world(60)
+    everything = frozenset(known.elements)
+    missed = [Trial(everything - set(known.elements[place : place + 6]), False) for place in range(0, 60, 6)]
+    assert likely(60, **BEST) < likely(60, known=replace(known, trials=missed), **BEST)
+
+
+@pytest.mark.parametrize("models", [1, 2, 3])
+@pytest.mark.parametrize("algorithm", ["ddenv", "ddmin", "probdd", "splitting"])
 def test_tiny_worlds(models, algorithm):
-    expected = expect(models, algorithm, "model2model/random", 3, 0.5, needed=9)
-    assert 0 <= expected.tests_low <= expected.tests_high < 60
+    low, _, high = interval(list(plays(first(models, algorithm, "model2model/random", rate=0.5))))
+    assert 0 <= low <= high < 60
 
 
-def test_complements_alone_take_fewer_tests():
-    assert 0 < expect(43, "ddenv", NEAR, 3, candidates="complements").tests < expect(43, "ddenv", NEAR, 3).tests
+def test_large_worlds_are_played_a_few_times():
+    assert 8 <= len(list(plays(first(400, **AS_PRINTED)))) < len(list(plays(first(20))))
 
 
-@pytest.fixture
-def run(tmp_path):
-    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
-    yield made
-    made.close()
+def test_an_algorithm_that_cannot_be_played_has_no_forecast(monkeypatch):
+    def choosy(elements, guide):
+        raise KeyError("it knows only its own guide")
+        yield
 
-
-def state_of(run):
-    return fold(run.file.events())
-
-
-def left(run, at_work=True):
-    return remaining(state_of(run), at_work)
-
-
-def play(run, needed, iterations=3):
-    """A run whose failure needs some models, written as an engine would; gives what was left to expect, and what was left."""
-    run.created().baseline(4)
-    told, state = [], state_of(run)
-    rounds, tests, verdicts = [], 0, []
-
-    def shows(kept):
-        verdicts.append(set(kept))
-        return needed <= set(kept)
-
-    ddenv.reduce(
-        run.elements,
-        shows,
-        positions={name: (float(place), 0.0, 0.0) for place, name in enumerate(run.elements)},
-        failure_pose=(0.0, 0.0, 0.0),
-        growth="paper",
-        skip="known",
-        iterations=iterations,
-        check=False,
-        on_round=lambda round: rounds.append((len(verdicts), round)),
-    )
-    for at, round in rounds:
-        run.round += 1
-        numbers = [[run.elements.index(name) for name in part] for part in round.partitions]
-        run.write(
-            "round_started",
-            round=run.round,
-            n_partitions=round.n_partitions,
-            environment=sorted(number for part in numbers for number in part),
-            partitions=numbers,
-            candidates=[[one.kind, one.partition, None] for one in round.candidates],
-        )
-        told.append((at, left(run).tests))
-        tests = len(verdicts)
-        kept = next((one for one in round.candidates if needed <= one.models), None)
-        if kept is not None:
-            numbers = sorted(run.elements.index(name) for name in kept.models)
-            run.write("reduced", candidate=round.candidates.index(kept), environment=numbers, evidence_test=1)
-        run.write("round_finished")
-    assert state.baseline is not None
-    return [(low, tests - at, high) for at, (low, _, high) in told]
-
-
-@pytest.mark.parametrize("needed", [{"crate_00", "crate_01"}, {"crate_01", "crate_04", "crate_05"}])
-def test_what_is_left_is_in_the_interval_in_most_rounds(run, needed):
-    told = play(run, needed)
-    assert sum(low <= left <= high for low, left, high in told) >= 0.6 * len(told)
-
-
-def test_what_is_left_grows_less_with_every_test(run):
-    before = left(fake_run.mid_round(run))
-    run.finish(11, "pass")
-    after = left(run)
-    assert after.tests[1] == before.tests[1] - 1
-    # 2 s a test on 2 workers that are busy for most of the time.
-    assert before.seconds[1] == pytest.approx(before.tests[1] * 2 / 1.9)
-
-
-def test_no_time_is_told_while_nothing_runs(run):
-    fake_run.mid_round(run)
-    assert left(run, at_work=False).seconds is None
-    run.write("paused")
-    assert left(run).seconds is None
-
-
-def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
-    assert left(run) is None
-    fake_run.confirming(run)
-    assert left(run) is None
-    run.write("finished", minimal=True, reason="")
-    assert left(run) is None
-
-
-def test_a_budget_ends_it(run):
-    state = state_of(fake_run.mid_round(run))
-    scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": 13}}
-    assert max(remaining(state.changed(scenario=scenario), True).tests) <= 3
-
-
-@pytest.mark.parametrize("value", ["x", None, float("inf"), float("nan"), -3, 10**30, True])
-def test_settings_that_make_no_sense_do_no_harm(run, value):
-    state = state_of(fake_run.mid_round(run))
-    reduction = dict.fromkeys(("iterations", "baseline_runs", "n_partitions", "budget", "pair", "growth"), value)
-    for odd in (state, state.changed(baseline=None), state.changed(round=None), state.changed(pinned=frozenset("x"))):
-        told = remaining(odd.changed(scenario={"reduction": reduction}), True)
-        assert told.tests[0] <= told.tests[1] <= told.tests[2]
+    monkeypatch.setattr("ddenv.reduction.algorithms.splitting", choosy)
+    assert list(plays(first(9, "splitting"))) == []

@@ -182,6 +182,7 @@ class FakeRun:
             candidates=candidates,
             pinned=self.numbers(list(pinned)),
         )
+        self.write("forecast", round=self.round, tests=[12, 51, 72], tests_done=self.tests)
 
     def judge(self, candidate: int, verdict: str, tests: list[int], known: int = 0) -> None:
         self.write("candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known)

@@ -15,10 +15,10 @@ from attached import Attached, starts
 from rich.cells import cell_len
 
 from ddenv.errors import UserError
-from ddenv.forecast.estimate import remaining
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
+from ddenv.runs.tests_left import remaining
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.export.export_dialog import Wanted, suggested, write
 from ddenv.workbench.help.config import read_config

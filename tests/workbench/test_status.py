@@ -110,21 +110,3 @@ async def test_lines_fit_and_are_drawn_only_when_they_changed(run, width, monkey
             monkeypatch.setattr(widget, "refresh", lambda *_, **__: drawn.append(1))
             widget.show(replace(shown, live=()))
         assert drawn == []
-
-
-async def test_what_is_left_is_told_of_all_that_was_read_and_never_stays_old(run, monkeypatch):
-    fake_run.mid_round(run)
-    monkeypatch.setattr("ddenv.workbench.run.status.remaining", lambda state, at_work: state.revision)
-    monkeypatch.setattr("ddenv.workbench.run.status.facts", lambda now, *_: told.append(_[-1](now)) or ())
-    told, shown, later = [], snapshot(run), snapshot(run, revision=1_000)
-    async with Lines().run_test() as pilot:
-        status = pilot.app.query_one(Status)
-        status.show(replace(shown, behind=True))
-        status.show(shown)
-        status.show(later)
-        status.show(later)
-        assert told == [shown.state.revision] * 3
-        monkeypatch.setattr("ddenv.workbench.run.status.LEFT_PERIOD", 0.0)
-        status.show(later)
-        status.show(later)
-        assert told[3:] == [1_000]

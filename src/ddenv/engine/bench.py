@@ -6,7 +6,7 @@ What the user tries by hand goes before all that.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -76,15 +76,23 @@ class Bench:
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
+        self._meanwhile: Iterator[object] = iter(())
 
-    def work(self, phase: str, round: int | None, wanted: Callable[[], Wanted]) -> None:
-        """Makes tests until none is wanted.
+    def work(
+        self,
+        phase: str,
+        round: int | None,
+        wanted: Callable[[], Wanted],
+        meanwhile: Iterator[object] | None = None,
+    ) -> None:
+        """Makes tests until none is wanted. While tests run, `meanwhile` goes on step by step: each takes some milliseconds.
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
         them; it is asked again at every look around. Raises Stopped, Steered, and UserError if nothing can be simulated or all
         tests break.
         """
         full = self._journal.is_full(phase)
+        self._meanwhile = meanwhile or iter(())
         while tests := wanted():
             self._start([test for test in tests if (*test[:2], full) not in self._started], phase, round)
             self.tick()
@@ -143,7 +151,8 @@ class Bench:
 
     def _look_around(self) -> None:
         self._control.poll()
-        finished = self._pool.finished(WAIT)
+        thinks = self._pool.busy > 0 and next(self._meanwhile, self) is not self
+        finished = self._pool.finished(0.0 if thinks else WAIT)
         for test, result in finished:
             self._record(test, result)
             self._give_up_if_all_break(result)

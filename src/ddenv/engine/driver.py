@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -16,6 +16,7 @@ from ddenv.engine.judging import rows_of
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
+from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.verdict import Standing, standing
@@ -87,7 +88,8 @@ class Driver:
     def _begin(self, asked: Reduction, elements: tuple[str, ...], n_partitions: int | None = None) -> Search:
         """The algorithm and the schemas by name. Raises UserError where there are none of these names."""
         partitioning, prioritization = split_pair(asked.pair)
-        guide = make_guide(
+        self._elements, self._memory = elements, Memory()
+        self._guide = make_guide(
             partitioning,
             prioritization,
             lambda: replace(self._evidence, trials=self._trials),
@@ -98,7 +100,7 @@ class Driver:
             growth=asked.growth,
             skip=asked.skip,
         )
-        return search(asked.algorithm, elements, guide)
+        return search(asked.algorithm, elements, self._memory.of(self._guide))
 
     def _keep(self, candidate: Candidate) -> Keep:
         """All that is there when a candidate is tested."""
@@ -168,9 +170,10 @@ class Driver:
         """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""
         self._announce(number, round)
         self._judged = 0
-        winner = self._judge(number, round)
+        forecast = self._forecast(number, self._moment(round))
+        winner = self._judge(number, round, forecast)
         while winner is not None and not self._is_accepted(number, winner):
-            winner = self._judge(number, round)
+            winner = self._judge(number, round, forecast)
         self._learn(number, round, winner)
         if winner is not None:
             self._take(number, round, winner)
@@ -204,7 +207,33 @@ class Driver:
             if verdict := self._journal.refused.get(self._keep(one)):
                 self._journal.record_once("vetoed", number, index, verdict=verdict, again=True)
 
-    def _judge(self, number: int, round: Round) -> int | None:
+    def _moment(self, round: Round) -> Moment:
+        """Where the search stands as a round begins."""
+        return Moment(
+            self._reduction.algorithm,
+            self._reduction.pair,
+            self._elements,
+            round.environment,
+            self._guide,
+            self._memory,
+            replace(self._evidence, trials=tuple(self._trials)),
+            self._reduction.iterations,
+            self._journal.state.baseline.rate,
+            self._journal.state.jobs,
+        )
+
+    def _forecast(self, number: int, moment: Moment) -> Iterator[float]:
+        """Plays the search from `moment` on, and writes how many tests are left; once a round."""
+        if self._journal.has("forecast", number):
+            return
+        done, tests = self._journal.state.tests_done, []
+        for play in plays(moment):
+            tests.append(play)
+            yield play
+        if tests:
+            self._journal.record_once("forecast", number, tests=interval(tests), tests_done=done)
+
+    def _judge(self, number: int, round: Round, forecast: Iterator[float]) -> int | None:
         """The index of the first similar candidate that was not rejected, or None when all are judged."""
 
         def wanted() -> Wanted:
@@ -215,7 +244,7 @@ class Driver:
             self._record_verdicts(number, round, now.verdicts)
             return [(self._keep(round.candidates[index]), run, index) for index, run in now.wanted]
 
-        self._bench.work("round", number, wanted)
+        self._bench.work("round", number, wanted, forecast)
         return self._standing(round).winner
 
     def _standing(self, round: Round) -> Standing:

@@ -14,6 +14,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     leg_started          round (number of the next one), n_partitions: a new search starts after a decision of the user
     round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
                          pinned? [..]
+    forecast             round, tests [low, likely, high]: how many were left when tests_done of them were finished
     candidate_judged     candidate, verdict, tests [ids], known
     waiting              candidate
     decided              candidate, decision: accept or reject

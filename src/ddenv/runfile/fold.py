@@ -11,7 +11,7 @@ from ddenv.runfile import fold_decisions
 from ddenv.runfile.events import Changes, Data, chance, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, waits_no_more, with_outcomes, with_test
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.state import Baseline, Candidate, Node, Point, Round, RunState, Split, Test, Trial, many
+from ddenv.runfile.state import Baseline, Candidate, Forecast, Node, Point, Round, RunState, Split, Test, Trial, many
 from ddenv.runfile.store import Event
 
 
@@ -158,6 +158,14 @@ def _round_started(state: RunState, data: Data, _: float) -> Changes:
     return {**waits_no_more(state), "round": round}
 
 
+def _forecast(_: RunState, data: Data, __: float) -> Changes:
+    low, likely, high = (int(number(tests)) for tests in data["tests"])
+    found = Forecast(low, likely, high, int(data["tests_done"]))
+    if not 0 <= low <= likely <= high or found.tests_done < 0:
+        raise ValueError(data)
+    return {"forecast": found}
+
+
 def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
     candidate = replace(
         _tried(state, data["candidate"]),
@@ -282,6 +290,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "test_lost": _test_lost,
     "baseline_finished": _baseline_finished,
     "round_started": _round_started,
+    "forecast": _forecast,
     "candidate_judged": _candidate_judged,
     "waiting": _waiting,
     "decided": _decided,

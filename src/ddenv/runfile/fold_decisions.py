@@ -118,7 +118,7 @@ def leg_started(state: RunState, data: Data, _: float) -> Changes:
     n_partitions = data["n_partitions"]
     if type(data["round"]) is not int or not (n_partitions is None or (type(n_partitions) is int and n_partitions > 0)):
         raise ValueError(data)
-    return searched_anew(state)
+    return {**searched_anew(state), "forecast": None}
 
 
 def command_refused(state: RunState, data: Data, _: float) -> Changes:

@@ -50,6 +50,7 @@ class RunState:
     baseline: Baseline | None = None
     round: Round | None = None
     rounds_done: int = 0
+    forecast: Forecast | None = None
     tests: PersistentTuple[Test] = field(default_factory=PersistentTuple)
     tally: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_TALLY, 0))
     deflake_runs: int = 0
@@ -334,6 +335,19 @@ class Baseline:
     position: tuple[float, float, float]
     miss_chance: float
     iterations_95: int
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """How many tests of candidates the engine expected to be left when `tests_done` were finished.
+
+    In one case of ten fewer than `low` are left, in one of ten more than `high`.
+    """
+
+    low: int
+    likely: int
+    high: int
+    tests_done: int
 
 
 @dataclass(frozen=True, slots=True)

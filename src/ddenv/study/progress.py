@@ -14,8 +14,8 @@ from typing import TextIO
 from rich.cells import cell_len, set_cell_size
 
 from ddenv.errors import printable
-from ddenv.forecast.estimate import expect, remaining
 from ddenv.runfile.state import RunState
+from ddenv.runs.tests_left import remaining, rough_tests
 from ddenv.study.plan import Cell, Plan, Size
 from ddenv.study.results import read_cell
 from ddenv.study.work import Work
@@ -65,18 +65,8 @@ def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> 
 
 def _expected(cell: Cell, models: int) -> int:
     asked = cell.scenario.reduction
-    tests = expect(
-        models,
-        asked.algorithm,
-        asked.pair,
-        asked.iterations,
-        growth=asked.growth,
-        skip=asked.skip,
-        candidates=asked.candidates,
-        complement_order=asked.complement_order,
-        n_partitions=asked.n_partitions,
-    )
-    return asked.baseline_runs + tests.tests
+    _, likely, _ = rough_tests(models, asked.algorithm, asked.iterations, asked.growth == "paper")
+    return asked.baseline_runs + likely
 
 
 def _spent(state: RunState) -> float:

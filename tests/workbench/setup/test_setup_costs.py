@@ -26,18 +26,18 @@ def test_choices_are_those_of_the_scenario():
         assert field.choices == allowed
 
 
-def test_seconds_and_rate_come_from_earlier_runs_of_the_same_scenario(runs):
+def test_seconds_come_from_earlier_runs_of_the_same_scenario(runs):
     assert past_of(scenario(), runs) == Past()
     fake_run.FakeRun(runs / "a.ddenv").created().baseline().close()
     other = fake_run.scenario(name="other")
     fake_run.FakeRun(runs / "b.ddenv", other).created().baseline(4).close()
     (runs / "bad.ddenv").write_text("no run")
-    assert past_of(scenario(), runs) == Past(1, 2.0, 0.75)
+    assert past_of(scenario(), runs) == Past(1, 2.0)
     assert past_of(scenario(), runs / "none") == Past()
 
 
 def test_tests_and_time_are_told():
-    known = Past(1, 3.0, 1.0)
+    known = Past(1, 3.0)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
     assert "with 2 jobs; 4 of them the baseline; 3.0 s a test in earlier runs" in words

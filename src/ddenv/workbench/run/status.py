@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.forecast.estimate import Remaining, remaining
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState, Test
+from ddenv.runs.tests_left import Remaining, remaining
 from ddenv.version import __version__
 from ddenv.workbench.history.branches import path
 from ddenv.workbench.run.methods import GROUPS, labels
@@ -22,8 +20,6 @@ from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
-# How often it is told what is left, s.
-LEFT_PERIOD = 2.0
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is said in fewer words, or not at all, until the rest has room: from the least important on.
 SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
@@ -82,35 +78,18 @@ class Status(Widget):
         self._besides = ("", "")
         self._tests: PersistentTuple[Test] = PersistentTuple()
         self._cut = 0
-        self._left: Remaining | None = None
-        self._left_of: tuple = ()
-        self._left_at = -math.inf
-        self._left_is_old = False
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
         """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
-        due = self._left_is_old and time.monotonic() - self._left_at >= LEFT_PERIOD
-        if (scene, asked) == self._besides and snapshot is self._snapshot and not due:
+        if (scene, asked) == self._besides and snapshot is self._snapshot:
             return
         tests = snapshot.state.tests
         self._cut = cut_tests(tests, self._tests, self._cut)
         self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
-        self._left_is_old = False
-        now = facts(snapshot, scene, asked, self._cut, self._remaining)
+        now = facts(snapshot, scene, asked, self._cut)
         if now != self._facts:
             self._facts = now
             self.refresh()
-
-    def _remaining(self, snapshot: Snapshot) -> Remaining | None:
-        """What is left takes its time to find: within a round it is told anew each `LEFT_PERIOD`, not after each test."""
-        state, moment = snapshot.state, time.monotonic()
-        number = None if state.round is None else state.round.number
-        of = (snapshot.status, snapshot.behind, state.paused, state.waiting_candidate, state.budget, state.node, number)
-        if of != self._left_of or moment - self._left_at >= LEFT_PERIOD:
-            self._left, self._left_of, self._left_at = remaining(state, snapshot.engine == "alive"), of, moment
-        else:
-            self._left_is_old = True
-        return self._left
 
     def render(self) -> Text:
         text = Text(" ", no_wrap=True, overflow="ellipsis")
@@ -165,7 +144,6 @@ def facts(
     scene: str = "",
     asked: str = "",
     cut: int = 0,
-    left: Callable[[Snapshot], Remaining | None] = lambda now: remaining(now.state, now.engine == "alive"),
 ) -> tuple[Fact, ...]:
     """What there is to say, in the order of the screen."""
     state = snapshot.state
@@ -182,7 +160,7 @@ def facts(
         Fact("tests", tests_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(left(snapshot))),
+        Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
         Fact("mode", (mode, "")),
         Fact("engine", engine_said(snapshot)),
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),

@@ -1,15 +1,17 @@
-"""What a reduction will cost: tests by expectation, and time from earlier runs of the same scenario."""
+"""What a reduction will cost: a rough number of tests, and their time from earlier runs of the same scenario."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
+from ddenv.runs.tests_left import rough_tests
 from ddenv.workbench.wording import count, duration
 
 if TYPE_CHECKING:
@@ -22,11 +24,10 @@ UNKNOWN_TIME = "the time is known after the baseline"
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """From earlier `runs` of a scenario: the median time of a test, real `seconds`, and the `rate` of f in the baseline."""
+    """From earlier `runs` of a scenario: the median time of a test, real `seconds`."""
 
     runs: int = 0
     seconds: float | None = None
-    rate: float | None = None
 
 
 def past_of(scenario: Scenario, folder: Path) -> Past:
@@ -35,17 +36,14 @@ def past_of(scenario: Scenario, folder: Path) -> Past:
         paths = sorted(folder.glob("*.ddenv"), key=lambda path: -path.stat().st_mtime)
     except OSError:
         return Past()
-    found: list[tuple[list[float], float | None]] = []
-    for path in paths[:LOOKED_AT]:
-        if len(found) < ENOUGH and (figures := _figures(path, scenario)) is not None:
-            found.append(figures)
-    seconds = [each for times, _ in found for each in times]
-    rates = [rate for _, rate in found if rate is not None]
-    return Past(len(found), median(seconds) if seconds else None, median(rates) if rates else None)
+    runs = (times for path in paths[:LOOKED_AT] if (times := _times(path, scenario)) is not None)
+    found = list(islice(runs, ENOUGH))
+    seconds = [each for times in found for each in times]
+    return Past(len(found), median(seconds) if seconds else None)
 
 
-def _figures(path: Path, scenario: Scenario) -> tuple[list[float], float | None] | None:
-    """The real times of a run's tests, s, and its failure rate; None for another scenario's run or a damaged one."""
+def _times(path: Path, scenario: Scenario) -> list[float] | None:
+    """The real times of a run's tests, s; None for another scenario's run or a damaged one."""
     try:
         with RunFile(path) as run:
             if not _alike(json.loads(run.document("scenario")), scenario):
@@ -54,8 +52,7 @@ def _figures(path: Path, scenario: Scenario) -> tuple[list[float], float | None]
     except (UserError, ValueError, RecursionError):
         return None
     times = [_positive(event.data.get("wall_seconds")) for event in events if event.kind == "test_finished"]
-    rates = [_positive(event.data.get("rate")) for event in events if event.kind == "baseline_finished"]
-    return [each for each in times if each is not None], next(iter(rates), None)
+    return [each for each in times if each is not None]
 
 
 def _alike(data: Any, scenario: Scenario) -> bool:
@@ -75,7 +72,8 @@ def _positive(value: Any) -> float | None:
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     """The line with the tests and the time that all of a reduction may take."""
     reduction = scenario.reduction
-    low, middle, high = _tests(models, scenario, jobs, past)
+    rough = rough_tests(models, reduction.algorithm, reduction.iterations, reduction.growth == "paper")
+    low, middle, high = (tests + reduction.baseline_runs for tests in rough)
     budget = getattr(reduction, "budget", None)
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
@@ -87,16 +85,3 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     spent = duration(middle * past.seconds / jobs)
     before = f"{reduction.baseline_runs} of them the baseline; {past.seconds:.1f} s a test in earlier runs"
     return f"{words}, {spent} with {count(jobs, 'job')}; {before}"
-
-
-def _tests(models: int, scenario: Scenario, jobs: int, past: Past) -> tuple[int, int, int]:
-    """Least, expected and most tests, with the baseline's."""
-    from ddenv.forecast.estimate import expect
-
-    reduction = scenario.reduction
-    rate = past.rate if past.rate is not None else 1.0
-    how = {key: getattr(reduction, key) for key in ("growth", "skip", "candidates", "complement_order", "n_partitions")}
-    expected = expect(models, reduction.algorithm, reduction.pair, reduction.iterations, rate, jobs=jobs, **how)
-    all = (expected.tests_low, expected.tests, expected.tests_high)
-    low, middle, high = (round(each) + reduction.baseline_runs for each in all)
-    return low, middle, high
