@@ -1,6 +1,6 @@
 """The lines that are printed while a run is followed."""
 
-from ddenv.cli.summary import broken
+from ddenv.cli.follow import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import SCHEMA_VERSION, RunFile
 from tests.command import ddenv, in_process
 from tests.conftest import DATA
@@ -208,16 +209,11 @@ MISTAKES = {
         ["run", WALL, "--algorithm", "ddmn"],
         "reduction.algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
     ),
-    "delta": (["run", WALL, "--delta", "0"], "reduction.delta: should be greater than 0"),
-    "candidates": (
-        ["run", WALL, "--candidates", "complement"],
-        "reduction.candidates: 'complement' is not allowed (did you mean complements?); use one of both",
+    "epsilon": (["run", WALL, "--epsilon", "0"], "failure.epsilon: should be greater than 0"),
+    "similarity": (
+        ["run", WALL, "--similarity", "end"],
+        "failure.similarity: 'end' is not allowed",
     ),
-    "complement order": (
-        ["run", WALL, "--complement-order", "far"],
-        "reduction.complement_order: 'far' is not allowed",
-    ),
-    "prior": (["run", WALL, "--prior", "flat"], "reduction.prior: 'flat' is not allowed"),
     "iterations": (["run", WALL, "--iterations", "-1"], "reduction.iterations: should be greater than or equal to 0"),
     "timeout": (["run", WALL, "--timeout", "0"], "failure.timeout: should be greater than 0"),
     "not a number": (["run", WALL, "--seed", "x"], "'x' is not a valid integer"),
@@ -251,27 +247,28 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
 def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
     from ddenv.cli.app import app
     from ddenv.runs.creation import read_parts
+    from ddenv.runs.scenarios import with_options
 
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
-    monkeypatch.setattr("ddenv.cli.app._follow", lambda *_: 0)
+    monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, RunState()))
     options = {
         "pair": "trajectoryseg/timestep",
         "algorithm": "probdd",
-        "delta": 0.25,
-        "candidates": "complements",
-        "complement_order": "far-first",
-        "growth": "steady",
-        "skip": "implied",
-        "prior": "uniform",
+        "iterations": 7,
+        "budget": 90,
+        "baseline_runs": 6,
+        "seed": 4,
+        "timeout": 12.5,
     }
     words = [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", str(value))]
-    words += ["--early-stop", "--epsilon", "0.2"]
+    words += ["--early-stop", "--epsilon", "0.2", "--as-printed"]
     assert app(["run", WALL, *words, "--output", str(home / "asked.ddenv")], standalone_mode=False) == 0
     assert app(["run", WALL, "--output", str(home / "plain.ddenv")], standalone_mode=False) == 0
     with RunFile(home / "asked.ddenv") as asked, RunFile(home / "plain.ddenv") as plain:
         own, found = read_parts(plain)[0], read_parts(asked)[0]
-    assert found.reduction == own.reduction.model_copy(update=options)
-    assert found.failure == own.failure.model_copy(update={"early_stop": True, "epsilon": 0.2})
+    assert found == with_options(own, **options, early_stop=True, epsilon=0.2, as_printed=True)
+    assert (own.reduction.growth, own.reduction.skip) == ("steady", "implied")
+    assert (found.reduction.growth, found.reduction.skip) == ("paper", "known")
 
 
 @pytest.mark.programs
@@ -336,7 +333,7 @@ def test_a_newer_run_file_is_refused(reduced, tmp_path):
 def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
     from types import SimpleNamespace
 
-    from ddenv.cli.app import _tell_notes
+    from ddenv.cli.run_command import announce_notes
 
-    _tell_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
+    announce_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
     assert capsys.readouterr().out.startswith(words)

@@ -82,6 +82,8 @@ def test_what_makes_fewer_tests_is_asked_for_where_nobody_says_otherwise(tmp_pat
     assert asked(said) == ("paper", "known")
     assert asked(said, growth="steady") == ("steady", "known")
     assert asked(plain, growth="paper", skip=None) == ("paper", "implied")
+    assert asked(plain, as_printed=True) == ("paper", "known")
+    assert asked(said, as_printed=False) == ("steady", "implied")
 
 
 @pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (2, 6), (1, 0)])

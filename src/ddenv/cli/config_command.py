@@ -8,7 +8,7 @@ import click
 @click.command("config")
 @click.option("--example", is_flag=True, help="Print a file with every action, to begin with.")
 def config_command(example: bool) -> int:
-    """Tells where the file with your keys and your theme is, and lists all actions with their keys."""
+    """Shows where the file with your keys and your theme is, and lists all actions with their keys."""
     from ddenv.workbench.help.config import example_lines, lines
 
     print("\n".join(example_lines() if example else lines()))

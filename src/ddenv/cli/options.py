@@ -1,20 +1,21 @@
-"""Options that several commands share."""
+"""What several commands share: options, the scenario that they ask for, and how a longer wait is announced."""
 
 from __future__ import annotations
 
 import math
 import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-JOBS = os.cpu_count() or 1
-# What `ddenv.world.scenario.IGNORABLE` holds, which is too slow to import for every command.
-IGNORABLE = ("heightmap", "image", "mesh", "include", "joint")
+from ddenv.errors import UserError, printable
+from ddenv.settings import IGNORABLE, JOBS, OPTIONS, Setting
 
 
-class Numbers(click.ParamType):
+class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
     """Comma-separated finite numbers, at least and at most so many."""
 
     def __init__(self, name: str, fewest: int, most: int) -> None:
@@ -34,90 +35,97 @@ class Numbers(click.ParamType):
         return numbers
 
 
-def scenario_options(command):
-    """How a scenario is chosen and changed: shared by the commands that take one."""
-    for option in reversed(
-        (
-            click.option(
-                "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
-            ),
-            click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it shall go, m (for an SDF world)."),
-            click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
-            click.option("--timeout", type=float, help="Simulated time the robot has, s."),
-        )
-    ):
-        command = option(command)
-    return command
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+Command = Callable[..., Any]
+Option = Callable[[Command], Command]
 
 
-def reading_options(command):
-    """How the world's SDF is read where it names other files: shared by the commands that read one."""
-    for option in reversed(
-        (
-            click.option(
-                "--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."
-            ),
-            click.option(
-                "--stand-in",
-                multiple=True,
-                metavar="URI=SHAPE",
-                help="A shape for what cannot be found there, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
-            ),
-            click.option(
-                "--ignore",
-                multiple=True,
-                type=click.Choice(IGNORABLE),
-                help="Leave such elements out instead of refusing the file; may be repeated.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+def _together(*options: Option) -> Option:
+    def add(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
 
 
-def method_options(command):
-    """By which method one world is reduced, in place of what the scenario says."""
-    for option in reversed(
-        (
-            click.option("--pair", help="Partitioning/prioritization, such as model2model/failure-proximal."),
-            click.option("--algorithm", help="How the environment is searched; 'ddenv schemas' lists all."),
-            click.option("--budget", type=click.IntRange(0), help="The most tests in all; 0: any number."),
-            click.option("--seed", type=int, help="Seed of the first run; run i of each candidate uses seed + i."),
-        )
-    ):
-        command = option(command)
-    return command
+def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) -> Option:
+    """An option for each setting that has one, in place of what the scenario says."""
+    chosen = (one for one in OPTIONS if (not only or one.name in only) and one.name not in without)
+    return _together(*map(_option, chosen))
 
 
-def search_options(command):
-    """How candidates are tried and judged, in place of what the scenario says: what is left out stays the scenario's."""
-    for option in reversed(
-        (
-            click.option("--iterations", type=int, help="Re-runs of a candidate that did not show the failure."),
-            click.option("--baseline-runs", type=int, help="Runs of the whole world before the first round."),
-            click.option("--n-partitions", type=int, help="Partitions in the first round."),
-            click.option("--delta", type=float, help="Change of the angular velocity where trajectoryseg cuts, rad/s."),
-            click.option(
-                "--candidates", metavar="both|partitions|complements", help="What ddenv tries of each partition."
-            ),
-            click.option(
-                "--complement-order", metavar="paper|far-first", help="In which order ddenv tries the complements."
-            ),
-            click.option("--growth", metavar="paper|steady", help="When n grows: after every round, or a vain one."),
-            click.option(
-                "--skip", metavar="known|implied", help="What is not tried: judged sets, or their subsets too."
-            ),
-            click.option("--prior", metavar="spatial|uniform", help="Where probdd and splitting begin."),
-            click.option("--epsilon", type=float, help="How near to the failure's end a similar failure ends, m."),
-            click.option(
-                "--similarity", metavar="end-pose|trajectory", help="Where it ends, or also how it got there."
-            ),
-            click.option(
-                "--early-stop/--no-early-stop",
-                default=None,
-                help="End a test when the robot is stuck for good; full runs confirm what is left.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+def _option(one: Setting) -> Option:
+    words = f"{one.summary[:1].upper()}{one.summary[1:]}"
+    if one.none:
+        words += "; 0: no limit"
+    if one.kind is bool:
+        return click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=f"{words}.")
+    # The range is checked with the scenario, which says what else is allowed.
+    kind = click.IntRange(0) if one.none else one.kind
+    more = f" {one.more}" if one.shown == "method" else ""
+    return click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=f"{words}.{more}")
+
+
+def jobs_option(what: str = "Tests") -> Option:
+    """How many tests or runs are made at the same time."""
+    allowed = click.IntRange(int(JOBS.least or 1), int(JOBS.most or 1))
+    words = f"{what} at the same time."
+    return click.option("--jobs", type=allowed, default=os.cpu_count() or 1, show_default=True, help=words)
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
+
+# Which scenario, and what is in it: for commands that take one.
+scenario_options = _together(
+    click.option(
+        "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
+    ),
+    click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it has to go, m (for an SDF world)."),
+    click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
+)
+
+# How the world's SDF is read where it names other files: for commands that read one.
+reading_options = _together(
+    click.option("--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."),
+    click.option(
+        "--stand-in",
+        multiple=True,
+        metavar="URI=SHAPE",
+        help="A shape for what cannot be found there, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
+    ),
+    click.option(
+        "--ignore",
+        multiple=True,
+        type=click.Choice(IGNORABLE),
+        help="Leave such elements out instead of refusing the file; may be repeated.",
+    ),
+)
+
+READING = ("model_path", "stand_in", "ignore")
+
+
+def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
+    """The scenario of a name or a file with what the options above say. Raises UserError."""
+    from ddenv.runs.scenarios import reading_of, scenario_for_world, with_options
+    from ddenv.world.load import find_scenario, load_scenario
+
+    reading = {option: given[option] for option in READING}
+    others = {option: value for option, value in given.items() if option not in READING}
+    if Path(name).suffix.lower() not in (".sdf", ".world"):
+        scenario = load_scenario(find_scenario(name))
+        return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
+    spawn, goal, world = (others.pop(option) for option in ("spawn", "goal", "world"))
+    if spawn is None or goal is None:
+        raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
+    if world is not None:
+        raise UserError(f"--world: goes with a scenario; {name} is a world already")
+    scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
+    return with_options(scenario, reading=reading_of(**reading), **others)
+
+
+def announce(line: str) -> None:
+    """Says that something takes longer, without disturbing what is printed for programs."""
+    print(printable(line), file=sys.stderr, flush=True)

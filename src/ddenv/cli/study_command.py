@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
-from ddenv.cli.options import JOBS, search_options
+from ddenv.cli.options import jobs_option, setting_options
 
 
 @click.command("study")
@@ -32,7 +33,7 @@ from ddenv.cli.options import JOBS, search_options
     help="Algorithms separated by commas, or 'all'.",
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Reductions of each.")
-@click.option("--jobs", type=click.IntRange(1, 1024), default=JOBS, show_default=True, help="Tests at the same time.")
+@jobs_option()
 @click.option(
     "-o",
     "--output",
@@ -43,13 +44,14 @@ from ddenv.cli.options import JOBS, search_options
     metavar="DIR",
     help="Where the study is written; one that is there goes on.",
 )
-@search_options
-def study_command(scenarios, pairs: str, algorithms: str, seeds: int, jobs: int, folder: Path, **options) -> int:
-    """Makes the paper's tables and figures: reduces each scenario with each pair, and writes what came of it.
+@setting_options(without=("pair", "algorithm", "seed", "budget", "timeout"))
+def study_command(
+    scenarios: tuple[str, ...], pairs: str, algorithms: str, seeds: int, jobs: int, folder: Path, **options: Any
+) -> int:
+    """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
     Stopped at any moment, the same command goes on where it was. Each reduction is a run in DIR/runs, for 'ddenv open'.
-    Where neither the scenario nor an option says otherwise, n grows steadily and what is implied is skipped; the paper's
-    algorithm to the letter is --growth paper --skip known.
+    With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
     """
     from ddenv.study.conduct import conduct
     from ddenv.study.plan import make_plan

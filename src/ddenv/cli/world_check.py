@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ddenv.cli.schemas_command import cut, wrapped
+from ddenv.cli.wrapping import cut, wrapped
 from ddenv.errors import printable
 from ddenv.map.names import padded, shortened, width
 from ddenv.words import count, first_of
@@ -117,9 +117,9 @@ def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
     wide = [sum(widths[i] for i in choice) + len(GAP) * (len(choice) - 1) for choice in CHOICES]
     fitting = (choice for choice, each in zip(CHOICES, wide, strict=True) if columns is None or each <= columns)
     shown = next(fitting, None)
-    if shown is None:
-        shown = CHOICES[-1]
+    if shown is None and columns is not None:
         widths[0] = max(SHORTEST_NAME, widths[0] - (wide[-1] - columns))
+    shown = shown or CHOICES[-1]
     return [cut(GAP.join(_cell(row[i], widths[i], i) for i in shown).rstrip(), columns) for row in rows]
 
 

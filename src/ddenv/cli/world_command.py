@@ -7,11 +7,15 @@ import os
 import shutil
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ddenv.cli.options import Numbers, reading_options
-from ddenv.errors import UserError, printable
+from ddenv.cli.options import Numbers, announce, reading_options
+from ddenv.errors import UserError
+
+if TYPE_CHECKING:
+    from ddenv.world.model import World
 
 
 @click.group("world")
@@ -23,8 +27,8 @@ def world_group() -> None:
 @click.argument("file", type=Path)
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
-def check(file: Path, as_json: bool, **reading) -> int:
-    """Tells what is read of FILE: each model, what was replaced or ignored, and why."""
+def check(file: Path, as_json: bool, **reading: Any) -> int:
+    """Shows what is read from FILE: each model, what was replaced or ignored, and why."""
     from ddenv.cli.world_check import lines, report
 
     world = _read(file, reading)
@@ -37,23 +41,25 @@ def check(file: Path, as_json: bool, **reading) -> int:
 @click.argument("file", type=Path)
 @reading_options
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark where a robot starts, m and rad.")
-@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark where it shall go, m.")
+@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark where it has to go, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
-def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
+def show(
+    file: Path, spawn: tuple[float, ...] | None, goal: tuple[float, float] | None, svg: Path | None, **reading: Any
+) -> int:
     """Draws the map of FILE, from above."""
     from ddenv.cli.world_show import terminal_map
     from ddenv.map.svg import svg_map
     from ddenv.world.files.access import write_file
 
     world = _read(file, reading)
-    marks = {"spawn": spawn and (*spawn, 0.0)[:3], "goal": goal}
+    start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
     if svg is not None:
-        write_file(svg, svg_map(world, **marks).encode())
+        write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
         print(f"wrote {svg}")
         return 0
     columns, rows = shutil.get_terminal_size((100, 36))
     color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
-    print(terminal_map(world, columns, rows - 1, color=color, **marks))
+    print(terminal_map(world, columns, rows - 1, color=color, spawn=start, goal=goal))
     return 0
 
 
@@ -63,7 +69,7 @@ def show(file: Path, spawn, goal, svg: Path | None, **reading) -> int:
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
 )
-def convert(file: Path, output: Path, **reading) -> int:
+def convert(file: Path, output: Path, **reading: Any) -> int:
     """Writes FILE as clean SDF 1.9 that Drake's own parser loads."""
     from ddenv.world.write import write_converted
 
@@ -72,10 +78,10 @@ def convert(file: Path, output: Path, **reading) -> int:
     return 0
 
 
-def _read(file: Path, reading: dict):
+def _read(file: Path, reading: dict[str, Any]) -> World:
     from ddenv.runs.scenarios import reading_of
     from ddenv.world.read import read_world
 
     if file.suffix.lower() in (".yaml", ".yml"):
         raise UserError(f"{file}: is a scenario; give the SDF file of its world")
-    return read_world(file, reading_of(**reading), lambda line: print(printable(line), file=sys.stderr, flush=True))
+    return read_world(file, reading_of(**reading), announce)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.map.cells import FAINT, PLAIN, picture, signs
+from ddenv.map.cells import FAINT, picture, signs
 from ddenv.map.footprints import Drawn, plan
 from ddenv.map.frame import tick_step, tick_text, ticks
 from ddenv.map.names import padded, shortened, width
-from ddenv.map.paint import Canvas, Run
+from ddenv.map.paint import PLAIN, Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.words import count
 from ddenv.world.model import World
@@ -26,6 +26,9 @@ GAP = "  "
 START, GOAL, WHITE = 0x1F6FEB, 0x1A7F37, 0xFFFFFF
 
 Entry = tuple[str, str, str, str]
+# x, y m, and yaw rad.
+Pose = tuple[float, float, float]
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +47,8 @@ def terminal_map(
     rows: int,
     *,
     color: bool,
-    spawn: tuple[float, float, float] | None = None,
-    goal: tuple[float, float] | None = None,
+    spawn: Pose | None = None,
+    goal: Point | None = None,
 ) -> str:
     """The world from above, without its ground: at most `rows` lines of at most `columns` characters (not less than 12 and 40).
 
@@ -76,7 +79,7 @@ def terminal_map(
     return "\n".join([title, *(f"{line}{GAP}{text}".rstrip() for line, text in zip(drawn, told, strict=True))])
 
 
-def _title(world: World, models: Sequence[Drawn], spawn, goal) -> str:
+def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Point | None) -> str:
     words = [world.path.name, count(len(models), "model")]
     if spawn is not None:
         words.append(f"S start ({spawn[0]:g}, {spawn[1]:g}), yaw {spawn[2]:g}")
@@ -204,8 +207,8 @@ def _grid(canvas: Canvas, view: View) -> None:
                 canvas.fore[row, column] = FAINT
 
 
-def _marks(canvas: Canvas, view: View, spawn, goal, color: bool) -> None:
-    signs = [] if spawn is None else [(spawn, f"S{arrow(spawn[2])}", START)]
+def _marks(canvas: Canvas, view: View, spawn: Pose | None, goal: Point | None, color: bool) -> None:
+    signs: list[tuple[Pose | Point, str, int]] = [] if spawn is None else [(spawn, f"S{arrow(spawn[2])}", START)]
     signs += [] if goal is None else [(goal, "G", GOAL)]
     for point, sign, back in signs:
         canvas.put(view.cell(*point[:2]), sign, WHITE if color else PLAIN, back if color else None)

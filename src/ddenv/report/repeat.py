@@ -1,4 +1,4 @@
-"""What a run was asked to do, and how it is done again."""
+"""The settings of a run, and the commands that repeat it."""
 
 from __future__ import annotations
 
@@ -7,67 +7,37 @@ from typing import Any
 
 from ddenv.page.blocks import Block, Code, Name, Section, Table, plain, say, section
 from ddenv.report.run_data import Record
+from ddenv.settings import JOBS, OPTIONS, PRINTED, SETTINGS, Setting, read
 
-# (title, part of the scenario, key, unit), in the order in which they are told.
-TOLD = (
-    ("algorithm", "reduction", "algorithm", ""),
-    ("pair: partitioning/prioritization", "reduction", "pair", ""),
-    ("parts in the first round", "reduction", "n_partitions", ""),
-    ("candidates of each part", "reduction", "candidates", ""),
-    ("order of complements", "reduction", "complement_order", ""),
-    ("n grows", "reduction", "growth", ""),
-    ("what is not tried again", "reduction", "skip", ""),
-    ("re-runs of a candidate", "reduction", "iterations", ""),
-    ("runs of the whole world", "reduction", "baseline_runs", ""),
-    ("most tests in all", "reduction", "budget", ""),
-    ("seed of the first run", "reduction", "seed", ""),
-    ("a similar run ends within", "failure", "epsilon", "m"),
-    ("what is compared", "failure", "similarity", ""),
-    ("simulated time of a run", "failure", "timeout", "s"),
-    ("ends when stuck for good", "failure", "early_stop", ""),
-    ("who drives", "controller", "use", ""),
-    ("time step", "simulation", "time_step", "s"),
-    ("contact", "simulation", "contact", ""),
-)
-# Options of `ddenv run` by the part of the scenario and the key that they set.
-OPTIONS = (
-    ("algorithm", "reduction", "algorithm"),
-    ("pair", "reduction", "pair"),
-    ("iterations", "reduction", "iterations"),
-    ("n-partitions", "reduction", "n_partitions"),
-    ("candidates", "reduction", "candidates"),
-    ("complement-order", "reduction", "complement_order"),
-    ("growth", "reduction", "growth"),
-    ("skip", "reduction", "skip"),
-    ("seed", "reduction", "seed"),
-    ("epsilon", "failure", "epsilon"),
-    ("timeout", "failure", "timeout"),
-)
 LONGEST_VALUE = 120
 
 
 def settings(record: Record) -> Section:
-    """The section on what was asked for."""
-    scenario = record.state.scenario
-    rows = [_row(scenario, record.asked, *each) for each in TOLD]
-    others = [("start", _place(section(scenario, "robot").get("spawn"))), ("goal", _place(scenario.get("goal")))]
-    others += [("workers at the same time", str(record.state.jobs) if record.state.jobs else "")]
-    if isinstance(scenario.get("oracle"), dict):
-        others.append(("simulator", _value(scenario["oracle"].get("command", ""))))
-    table = Table(("setting", "value"), tuple((title, Name(value)) for title, value in [*rows, *others] if value))
+    """The section with the settings."""
+    scenario, jobs = record.state.scenario, record.state.jobs
+    rows = [
+        (one.label, _read(scenario, record.asked, one), one.meaning)
+        for one in SETTINGS.values()
+        if one.name in section(scenario, one.section) or not one.stored
+    ]
+    rows += [("driver", _value(section(scenario, "controller").get("use")), "who drives the robot")]
+    rows += [("start", _place(section(scenario, "robot").get("spawn")), "where the robot starts")]
+    rows += [("goal", _place(scenario.get("goal")), "where it has to go")]
+    rows += [(JOBS.label, str(jobs) if jobs else "", JOBS.meaning)]
+    rows += [("simulator", _value(section(scenario, "oracle").get("command")), "what runs the robot in place of Drake")]
+    table = Table(
+        ("setting", "value", "meaning"), tuple((name, Name(value), meaning) for name, value, meaning in rows if value)
+    )
     blocks: list[Block] = [table]
     if dump := _dump(scenario):
         blocks.append(Code(dump, folded="The whole scenario, as YAML"))
     return Section("Settings", tuple(blocks))
 
 
-def _row(scenario: dict, asked: dict, title: str, part: str, key: str, unit: str) -> tuple[str, str]:
-    value = _value(section(scenario, part).get(key))
-    if not value:
-        return title, ""
-    told = f"{value} {unit}".strip()
-    first = _value(section(asked, part).get(key))
-    return title, told if first == value else f"{told} (changed on the way; at first {first or 'none'})"
+def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
+    """The value of a setting, and what it was at first where that was changed on the way."""
+    now, first = (_value(read(each, one)) or one.none for each in (scenario, asked))
+    return now if first == now else f"{now} (changed on the way; at first {first})"
 
 
 def _value(value: Any) -> str:
@@ -83,11 +53,12 @@ def _place(values: Any) -> str:
     if not isinstance(values, dict):
         return ""
     units = {"yaw": "rad", "tolerance": "m", "x": "m", "y": "m", "z": "m"}
-    told = [f"{key} {_value(value)} {units[key]}" for key, value in values.items() if key in units and _value(value)]
-    return ", ".join(told)
+    return ", ".join(
+        f"{key} {_value(value)} {units[key]}" for key, value in values.items() if key in units and _value(value)
+    )
 
 
-def _dump(scenario: dict) -> tuple[str, ...]:
+def _dump(scenario: dict[str, Any]) -> tuple[str, ...]:
     import yaml
 
     try:
@@ -117,19 +88,20 @@ def repeat(record: Record) -> Section:
 
 
 def _is_bundled(record: Record) -> bool:
+    """Whether options can say all that was asked for: a bundled scenario with no other settings than these."""
     from ddenv.world.load import bundled_names
 
-    return record.asked.get("name") in bundled_names()
+    without = (one for one in SETTINGS.values() if one.section == "reduction" and not one.option)
+    usual = PRINTED if read(record.asked, SETTINGS["as_printed"]) else {}
+    others = [one.name for one in without if read(record.asked, one) != usual.get(one.name, one.default)]
+    return record.asked.get("name") in bundled_names() and not others
 
 
 def _command(record: Record, bundled: bool) -> str:
-    """`ddenv run` with what was asked for first, whatever the scenario's file says today."""
+    """`ddenv run` with the first settings, whatever the scenario's file says today."""
     name = plain(record.asked.get("name", "scenario"))
     words = ["ddenv", "run", name if bundled else f"{name}.yaml"]
-    for option, part, key in OPTIONS:
-        if value := _value(section(record.asked, part).get(key)):
-            words += [f"--{option}", value]
-    early = section(record.asked, "failure").get("early_stop")
-    if isinstance(early, bool):
-        words.append("--early-stop" if early else "--no-early-stop")
+    for one in OPTIONS:
+        if one.name in section(record.asked, one.section) or (bundled and not one.stored):
+            words += one.words(read(record.asked, one))
     return shlex.join(words)

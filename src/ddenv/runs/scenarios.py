@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
+from ddenv.settings import SETTINGS, Ignorable, Value, put
 from ddenv.world.command import command_words
 from ddenv.world.files.access import read_bytes
 from ddenv.world.load import SDF, validate
@@ -22,7 +25,7 @@ def reading_of(
     *,
     model_path: Sequence[Path] = (),
     stand_in: Sequence[str] = (),
-    ignore: Sequence[str] = (),
+    ignore: Sequence[Ignorable] = (),
 ) -> Reading:
     """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`) and ignored kinds of elements. Raises UserError."""
     for folder in model_path:
@@ -51,38 +54,38 @@ def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], go
 def with_options(
     scenario: Scenario,
     *,
-    timeout: float | None = None,
-    epsilon: float | None = None,
-    early_stop: bool | None = None,
-    similarity: str | None = None,
-    budget: int | None = None,
     spawn: Sequence[float] | None = None,
     goal: Sequence[float] | None = None,
     world: Path | None = None,
     reading: Reading | None = None,
-    **reduction: str | int | float | None,
+    **values: Value,
 ) -> Scenario:
     """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
 
-    `timeout` is in simulated s, `epsilon` in m, `early_stop` and `similarity` as in the section `failure`, `budget` the
-    most tests in all, 0 for any number, `spawn` x, y, z m and yaw rad (0 if
-    left out), `goal` x, y m. All others are keys of the scenario's section `reduction`.
+    `spawn` is x, y, z m and yaw rad (0 if left out), `goal` x, y m. `values` are settings by name; 0 takes back a limit.
     """
-    data = scenario.model_dump(mode="json")
-    failure = {"timeout": timeout, "epsilon": epsilon, "early_stop": early_stop, "similarity": similarity}
-    data["reduction"].update({key: value for key, value in reduction.items() if value is not None})
-    data["failure"].update({key: value for key, value in failure.items() if value is not None})
-    if budget is not None:
-        data["reduction"]["budget"] = budget or None
+    given = {name: value for name, value in values.items() if value is not None}
+    chosen = with_values(scenario.model_dump(mode="json"), given)
     if spawn is not None:
-        data["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
+        chosen["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
     if goal is not None:
-        data["goal"].update(zip(("x", "y"), goal, strict=True))
+        chosen["goal"].update(zip(("x", "y"), goal, strict=True))
     if world is not None:
-        data["world"] = str(world.resolve())
+        chosen["world"] = str(world.resolve())
     if reading is not None:
-        data["reading"] = reading.model_dump(mode="json")
-    return validate(data, "options")
+        chosen["reading"] = reading.model_dump(mode="json")
+    return validate(chosen, "options")
+
+
+def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+    """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
+    for name in values:
+        if name not in SETTINGS:
+            raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
+    # What stands for several settings comes first: each of them may be given as well.
+    for name in sorted(values, key=lambda each: SETTINGS[each].stored):
+        put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])
+    return data
 
 
 def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) -> tuple[World, Model]:

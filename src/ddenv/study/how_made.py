@@ -7,23 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ddenv.page.blocks import Block, Code, Name, Section, Table, duration, moment, plain, say, thousands
+from ddenv.settings import SETTINGS, Setting
 from ddenv.study.plan import Plan
 from ddenv.study.results import Found
 from ddenv.study.study_folder import RUNS, Sitting
 from ddenv.world.scenario import Scenario
 
-# Of the section `reduction`, what is asked of every cell.
-ASKED = (
-    "n_partitions",
-    "iterations",
-    "candidates",
-    "complement_order",
-    "growth",
-    "skip",
-    "baseline_runs",
-)
-# And of some: by the algorithms and partitionings that look at it.
-FOR_SOME = {"prior": ("probdd", "splitting"), "delta": ("trajectoryseg",)}
+# Each cell has its own.
+OF_A_CELL = ("algorithm", "pair", "seed", "budget")
 COLUMNS = (
     (
         "tests",
@@ -61,29 +52,27 @@ def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], fold
 
 def _settings(plan: Plan) -> list[Block]:
     """What differs between scenarios has a column for each."""
-    keys = [*ASKED, *(key for key, names in FOR_SOME.items() if any(_uses(plan, name) for name in names))]
-    told = [(key, [_value(scenario, key) for scenario in plan.scenarios]) for key in keys]
-    told += [
-        ("seeds", [", ".join(map(str, _seeds(plan, scenario))) for scenario in plan.scenarios]),
-        ("epsilon, m", [f"{scenario.failure.epsilon:g}" for scenario in plan.scenarios]),
-        ("simulated time of a test, s", [f"{scenario.failure.timeout:g}" for scenario in plan.scenarios]),
-        ("ends when stuck for good", ["yes" if each.failure.early_stop else "no" for each in plan.scenarios]),
-    ]
+    asked = [one for one in SETTINGS.values() if one.section != "simulation" and one.name not in OF_A_CELL]
+    said = [(one.label, [_value(scenario, one) for scenario in plan.scenarios]) for one in asked if _is_used(plan, one)]
+    said.append(("seeds", [", ".join(map(str, _seeds(plan, scenario))) for scenario in plan.scenarios]))
     head = ("setting", *(plain(scenario.name) for scenario in plan.scenarios))
-    rows = tuple((key.replace("_", " "), *values) for key, values in told)
+    rows = tuple((label, *values) for label, values in said)
     return [Table(head, rows, frozenset(range(1, len(head))))]
 
 
-def _uses(plan: Plan, name: str) -> bool:
-    return any(name in (method.algorithm, *method.parts) for method in plan.methods)
+def _is_used(plan: Plan, one: Setting) -> bool:
+    """Whether any method of the study looks at it."""
+    return not one.used_by or any({method.algorithm, *method.parts} & set(one.used_by) for method in plan.methods)
 
 
 def _seeds(plan: Plan, scenario: Scenario) -> list[int]:
     return sorted({cell.seed for cell in plan.cells if cell.scenario.name == scenario.name})
 
 
-def _value(scenario: Scenario, key: str) -> str:
-    value = getattr(scenario.reduction, key)
+def _value(scenario: Scenario, one: Setting) -> str:
+    value = getattr(getattr(scenario, one.section), one.name)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

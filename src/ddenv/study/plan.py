@@ -23,9 +23,6 @@ MOST_SEED = 2**31
 NO_NAME = re.compile(r"[^\w-]+")
 # Bytes of a scenario's name in the names of files.
 LONGEST_NAME = 80
-# What is asked of the search where neither the scenario nor the user says otherwise, as in the library: fewer tests, and the
-# same end. With "paper" and "known" it is the paper's algorithm to the letter.
-FEWER_TESTS = {"growth": "steady", "skip": "implied"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +117,7 @@ def make_plan(
 
 
 def _loaded(name: str, options: dict[str, Any]) -> Scenario:
-    scenario = load_scenario(find_scenario(name))
-    said = scenario.reduction.model_fields_set
-    unsaid = {key: value for key, value in FEWER_TESTS.items() if key not in said}
-    given = {key: value for key, value in options.items() if value is not None}
-    return with_options(scenario, **{**unsaid, **given})
+    return with_options(load_scenario(find_scenario(name)), **options)
 
 
 def _names(option: str, words: str) -> tuple[str, ...]:

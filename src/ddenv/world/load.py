@@ -7,7 +7,7 @@ import reprlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
+from ddenv.settings import SETTINGS
 from ddenv.world.files.access import read_bytes
 from ddenv.world.scenario import Scenario
 
@@ -103,8 +104,10 @@ def complaint(error: Any, model: type[BaseModel]) -> str:
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
-        known = sorted(_section(model, location[:-1]).model_fields)
+        known = sorted([*_section(model, location[:-1]).model_fields, *_shorthands(location[:-1])])
         return f"{key}: unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
+    if error["type"] == "as_printed":
+        return f"{key}.as_printed: {error['msg']}"
     if error["type"] == "missing":
         return f"{key}: is missing"
     context = error.get("ctx", {})
@@ -122,8 +125,14 @@ def complaint(error: Any, model: type[BaseModel]) -> str:
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
     for part in location:
-        model = model.model_fields[part].annotation
+        hint = model.model_fields[part].annotation
+        # A section that may be missing is a union with None.
+        model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))
     return model
+
+
+def _shorthands(location: list[str]) -> list[str]:
+    return [each.name for each in SETTINGS.values() if not each.stored and [each.section] == location]
 
 
 def _shown(value: Any) -> str:

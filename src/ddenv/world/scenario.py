@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic_core import PydanticCustomError
+
+from ddenv import settings
+from ddenv.settings import Ignorable
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
-# What a world may have without being refused for it, if the user says so.
-Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
-IGNORABLE: tuple[str, ...] = Ignorable.__args__
 
 
 class Section(BaseModel):
@@ -83,12 +83,12 @@ class Lidar(Section):
     straight ahead.
     """
 
-    rate: Positive = Field(10.0, description="scans a second, Hz")
-    beams: int = Field(541, ge=2, le=10_000)
-    angle: Positive = Field(math.radians(270), le=math.tau, description="field of view, rad")
-    range: Positive = Field(20.0, description="nothing beyond is measured, m")
-    nearest: NotNegative = Field(0.05, description="nothing nearer is measured, m")
-    noise: NotNegative = Field(0.01, description="standard deviation of a range, m")
+    rate: Positive = Field(default=10.0, description="scans a second, Hz")
+    beams: int = Field(default=541, ge=2, le=10_000)
+    angle: Positive = Field(default=math.radians(270), le=math.tau, description="field of view, rad")
+    range: Positive = Field(default=20.0, description="nothing beyond is measured, m")
+    nearest: NotNegative = Field(default=0.05, description="nothing nearer is measured, m")
+    noise: NotNegative = Field(default=0.01, description="standard deviation of a range, m")
     x: Finite = 0.30
     y: Finite = 0.0
     z: Finite = 0.36
@@ -100,38 +100,38 @@ class Sensors(Section):
     The noise is drawn anew at every reading, a `*_bias` once in a run. A period is rounded to whole time steps.
     """
 
-    compass: NotNegative = Field(0.02, description="compass heading, rad")
-    compass_bias: NotNegative = Field(0.0, description="constant error of the compass, rad")
-    gyro: NotNegative = Field(0.01, description="IMU yaw rate, rad/s")
-    gyro_bias: NotNegative = Field(0.0, description="constant error of the yaw rate, rad/s")
-    tilt: NotNegative = Field(0.005, description="IMU roll and pitch, rad")
-    odometry: NotNegative = Field(0.02, description="wheel speeds, as a fraction of the speed")
+    compass: NotNegative = Field(default=0.02, description="compass heading, rad")
+    compass_bias: NotNegative = Field(default=0.0, description="constant error of the compass, rad")
+    gyro: NotNegative = Field(default=0.01, description="IMU yaw rate, rad/s")
+    gyro_bias: NotNegative = Field(default=0.0, description="constant error of the yaw rate, rad/s")
+    tilt: NotNegative = Field(default=0.005, description="IMU roll and pitch, rad")
+    odometry: NotNegative = Field(default=0.02, description="wheel speeds, as a fraction of the speed")
     odometry_bias: NotNegative = Field(
-        0.0, description="constant error of the wheel speeds, as a fraction of the speed"
+        default=0.0, description="constant error of the wheel speeds, as a fraction of the speed"
     )
     view_range: NotNegative = Field(
-        0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
+        default=0.0, description="how far the robot sees models, m; 0: it only feels what it touches"
     )
-    view_angle: Positive = Field(math.tau, le=math.tau, description="field of view about its heading, rad")
-    compass_rate: Positive = Field(10.0, description="readings a second, Hz")
-    imu_rate: Positive = Field(20.0, description="readings a second, Hz")
-    odometry_rate: Positive = Field(20.0, description="readings a second, Hz")
-    lidar: Lidar | None = Field(None, description="a robot without one is blind")
+    view_angle: Positive = Field(default=math.tau, le=math.tau, description="field of view about its heading, rad")
+    compass_rate: Positive = Field(default=10.0, description="readings a second, Hz")
+    imu_rate: Positive = Field(default=20.0, description="readings a second, Hz")
+    odometry_rate: Positive = Field(default=20.0, description="readings a second, Hz")
+    lidar: Lidar | None = Field(default=None, description="a robot without one is blind")
 
 
 class Planner(Section):
     """How the controller `costmap` finds its way, as move_base does: a map of what the lidar sees rolls along with the robot."""
 
-    size: float = Field(12.0, ge=4, le=100, description="length and width of the map, m")
-    resolution: float = Field(0.1, ge=0.02, le=0.5, description="of the map, m")
-    padding: NotNegative = Field(0.05, description="kept free around the robot, m")
-    inflation: NotNegative = Field(0.6, description="how far from obstacles they still cost, m")
-    look_ahead: Positive = Field(0.8, description="how far ahead on its plan the robot aims, m")
-    replan: Positive = Field(2.0, description="longest time between two plans, s")
-    patience: Positive = Field(4.0, description="time without progress before the robot tries to recover, s")
-    recoveries: int = Field(6, ge=0, description="attempts to recover in a row before the robot gives up")
+    size: float = Field(default=12.0, ge=4, le=100, description="length and width of the map, m")
+    resolution: float = Field(default=0.1, ge=0.02, le=0.5, description="of the map, m")
+    padding: NotNegative = Field(default=0.05, description="kept free around the robot, m")
+    inflation: NotNegative = Field(default=0.6, description="how far from obstacles they still cost, m")
+    look_ahead: Positive = Field(default=0.8, description="how far ahead on its plan the robot aims, m")
+    replan: Positive = Field(default=2.0, description="longest time between two plans, s")
+    patience: Positive = Field(default=4.0, description="time without progress before the robot tries to recover, s")
+    recoveries: int = Field(default=6, ge=0, description="attempts to recover in a row before the robot gives up")
     lowest: Finite = Field(
-        0.1, description="what is seen lower than this above where the robot stands is no obstacle, m"
+        default=0.1, description="what is seen lower than this above where the robot stands is no obstacle, m"
     )
 
 
@@ -142,58 +142,89 @@ class Controller(Section):
     `module:Class`, whose module is searched in the scenario's folder first and which is given `options`.
     """
 
-    use: str = Field("straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
+    use: str = Field(default="straight", pattern=r"^(straight|costmap|[\w.]+:\w+)$")
     options: dict[str, Any] = {}
-    period: Positive = Field(0.05, description="time between two commands, s; a whole number of time steps")
-    speed: Positive = Field(1.0, description="greatest forward speed, m/s")
-    acceleration: Positive = Field(1.0, description="greatest growth of the forward speed, m/s^2")
-    turn_rate: Positive = Field(1.0, description="greatest commanded turn rate, rad/s")
-    heading_gain: Positive = Field(1.5, description="turn rate for an error of the heading, 1/s")
-    skid: Positive = Field(0.48, le=1, description="part of a commanded turn that is carried out; 1 without skidding")
-    motor_gain: Positive = Field(30.0, description="wheel torque for an error of its speed, N m s/rad")
+    period: Positive = Field(default=0.05, description="time between two commands, s; a whole number of time steps")
+    speed: Positive = Field(default=1.0, description="greatest forward speed, m/s")
+    acceleration: Positive = Field(default=1.0, description="greatest growth of the forward speed, m/s^2")
+    turn_rate: Positive = Field(default=1.0, description="greatest commanded turn rate, rad/s")
+    heading_gain: Positive = Field(default=1.5, description="turn rate for an error of the heading, 1/s")
+    skid: Positive = Field(
+        default=0.48, le=1, description="part of a commanded turn that is carried out; 1 without skidding"
+    )
+    motor_gain: Positive = Field(default=30.0, description="wheel torque for an error of its speed, N m s/rad")
     planner: Planner = Planner()
-    answer_within: Positive = Field(1.0, description="real time that an own controller has for a command, s")
+    answer_within: Positive = Field(default=1.0, description="real time that an own controller has for a command, s")
 
 
-class FailureSpec(Section):
-    """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
-
-    epsilon: Positive = Field(0.33, description="greatest distance from the end of f, m")
-    timeout: Positive = Field(45.0, description="simulated time the robot has, s")
-    similarity: Literal["end-pose", "trajectory"] = "end-pose"
-    early_stop: bool = Field(False, description="ends a run when the robot is stuck for good")
+def _with_as_printed(schema: dict[str, Any]) -> None:
+    one = settings.SETTINGS["as_printed"]
+    schema["properties"][one.name] = {"type": "boolean", "default": one.default, "description": one.summary}
 
 
-class Reduction(Section):
-    """How the world is reduced."""
+class _Printed(Section):
+    """`as_printed: true` in a scenario file stands for the settings that it sets; it is not kept beside them."""
 
-    algorithm: str = Field("ddenv", description="how the environment is searched; see `ddenv.schemas`")
-    pair: str = Field("model2model/avg-trajectory-proximal", description="partitioning/prioritization")
-    n_partitions: int = Field(2, ge=2, description="partitions in the first round")
-    iterations: int = Field(3, ge=0, le=1000, description="re-runs of a candidate that did not show the failure")
-    candidates: Literal["both", "partitions", "complements"] = "both"
-    complement_order: Literal["paper", "far-first"] = "paper"
-    growth: Literal["paper", "steady"] = Field(
-        "paper", description="when n grows: after every round, or after a vain one"
-    )
-    skip: Literal["known", "implied"] = Field(
-        "known", description="what is not tried: judged sets, or also their subsets"
-    )
-    delta: Positive = Field(0.5, description="change of the angular velocity where trajectoryseg cuts, rad/s")
-    prior: Literal["spatial", "uniform"] = Field("spatial", description="where probdd and splitting begin")
-    seed: int = Field(0, ge=0, lt=2**31)
-    baseline_runs: int = Field(10, ge=1, le=1000, description="runs of the whole world before the first round")
-    budget: int | None = Field(
-        None, ge=1, description="the most tests in all; then the run stops, and can go on with more"
-    )
+    model_config = ConfigDict(json_schema_extra=_with_as_printed)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _spelled_out(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or "as_printed" not in data:
+            return data
+        given = {key: value for key, value in data.items() if key != "as_printed"}
+        if not isinstance(data["as_printed"], bool):
+            raise _wrong(f"should be true or false, found {data['as_printed']!r:.40}")
+        if not data["as_printed"]:
+            return given
+        for name, value in settings.PRINTED.items():
+            if given.setdefault(name, value) != value:
+                raise _wrong(f"the paper has {name}: {value}, but {name} is {given[name]!r:.40}; leave one of them out")
+        return given
+
+    @property
+    def as_printed(self) -> bool:
+        """Whether all of the settings that it stands for are the paper's."""
+        return settings.is_printed(self.__dict__)
 
 
-class Simulation(Section):
-    """How Drake simulates. `wall_timeout` bounds one test in real time."""
+def _wrong(words: str) -> PydanticCustomError:
+    return PydanticCustomError("as_printed", "{words}", {"words": words})
 
-    time_step: Positive = Field(0.005, le=0.05)
-    contact: Literal["lagged", "sap", "similar"] = "lagged"
-    wall_timeout: Positive = 120.0
+
+def _section(name: str, section: str, base: type[Section] = Section) -> Any:
+    """The model of a section whose keys are settings."""
+    declaration = settings.SECTIONS[section]
+    hints = get_type_hints(declaration)
+    fields: dict[str, Any] = {
+        each.name: (hints[each.name], _field(each)) for each in settings.declared(section, declaration) if each.stored
+    }
+    return create_model(name, __base__=base, __module__=__name__, __doc__=declaration.__doc__, **fields)
+
+
+def _field(one: settings.Setting) -> Any:
+    finite = False if one.kind is float else None
+    limits: dict[str, Any] = {"ge": one.least, "gt": one.above, "le": one.most, "allow_inf_nan": finite}
+    given = {limit: value for limit, value in limits.items() if value is not None}
+    return Field(one.default, description=one.summary, **given)
+
+
+# Type checkers see the declarations.
+if TYPE_CHECKING:
+
+    class Reduction(settings.Reduction, Section):
+        pass
+
+    class FailureSpec(settings.Failure, Section):
+        pass
+
+    class Simulation(settings.Simulation, Section):
+        pass
+
+else:
+    Reduction = _section("Reduction", "reduction", _Printed)
+    FailureSpec = _section("FailureSpec", "failure")
+    Simulation = _section("Simulation", "simulation")
 
 
 class Oracle(Section):
@@ -221,8 +252,8 @@ class Scenario(Section):
     goal: Goal
     sensors: Sensors = Sensors()
     controller: Controller = Controller()
-    oracle: Oracle | None = Field(None, description="another simulator than Drake")
+    oracle: Oracle | None = Field(default=None, description="another simulator than Drake")
     failure: FailureSpec = FailureSpec()
     reduction: Reduction = Reduction()
     simulation: Simulation = Simulation()
-    protected: tuple[str, ...] = Field((), description="models that always stay")
+    protected: tuple[str, ...] = Field(default=(), description="models that always stay")

@@ -44,15 +44,9 @@ OTHER = {
     "epsilon": "0.125",
     "seed": "4",
     "baseline_runs": "6",
-    "n_partitions": "3",
-    "delta": "0.75",
     "early_stop": "on",
     "similarity": "trajectory",
-    "candidates": "complements",
-    "complement_order": "far-first",
-    "growth": "steady",
-    "skip": "implied",
-    "prior": "uniform",
+    "as_printed": "on",
     "spawn_x": "-5.5",
     "spawn_y": "-0.25",
     "spawn_z": "0.3",
@@ -92,12 +86,12 @@ async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, start
     async with Opened() as session:
         assert session.told("command") == "$ ddenv run crates"
         await session.press("f9")
-        session.fill(iterations="5", growth="steady", spawn_x="-6.25", goal_y="-0.5", jobs="2", name="mine")
+        session.fill(iterations="5", as_printed="on", spawn_x="-6.25", goal_y="-0.5", jobs="2", name="mine")
         session.screen.query_one("#algorithm").value = "ddmin"
         await session.pilot.pause()
         shown = session.told("command").removeprefix("$ ")
         assert shown.startswith("ddenv run crates --spawn=-6.25,0,0.2,0 --goal=6,-0.5 --algorithm ddmin --iterations 5")
-        assert shown.endswith("--growth steady --jobs 2 --name mine")
+        assert shown.endswith("--as-printed --jobs 2 --name mine")
         await session.press("f8")
         assert session.app.clipboard == shown
         await session.press("ctrl+s")

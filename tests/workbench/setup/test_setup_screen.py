@@ -97,19 +97,19 @@ async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
 @pytest.mark.screens
 async def test_another_scenario_brings_its_own_explanation(scenarios):
     other = fake_run.scenario(name="other")
-    other["reduction"] |= {"algorithm": "probdd", "prior": "uniform"}
+    other["reduction"] |= {"algorithm": "probdd", "as_printed": True}
     (scenarios / "other.yaml").write_text(yaml.safe_dump(other))
     async with Opened() as session:
         await session.press("down")
         assert session.explained()[0] == "algorithm probdd"
-        assert session.screen.form.texts["prior"] == "uniform"
+        assert session.screen.form.texts["as_printed"] == "on"
 
 
 @pytest.mark.screens
 async def test_each_field_says_what_it_means_and_costs(scenarios):
     async with Opened() as session:
         await session.press("f9")
-        for id, label in (("growth", "growth"), ("goal_x", "goal x m"), ("accept", "accept")):
+        for id, label in (("as_printed", "as printed"), ("goal_x", "goal x m"), ("accept", "accept")):
             session.screen.query_one(f"#{id}").focus()
             await session.pilot.pause()
             title, words = session.explained()
@@ -130,14 +130,14 @@ async def test_rarely_used_settings_are_opened_and_closed(scenarios):
         await session.press("enter")
         advanced = session.screen.query_one("#advanced")
         assert advanced.display
-        assert session.value("growth") == "paper"
+        assert session.value("as_printed") == "off"
         await session.press("f9")
         assert not advanced.display
-        session.fill(delta="0")
+        session.fill(baseline_runs="0")
         await session.press("ctrl+s")
-        assert "reduction.delta" in session.wrong()
+        assert "reduction.baseline_runs" in session.wrong()
         assert advanced.display
-        assert session.app.focused.id == "delta"
+        assert session.app.focused.id == "baseline_runs"
 
 
 UNUSED = {
@@ -244,7 +244,7 @@ WRONG = (
     ("timeout", "nan", "timeout"),
     ("epsilon", "0", "epsilon"),
     ("seed", "99999999999", "seed"),
-    ("jobs", "0", "jobs: expected 1 to 256, found 0"),
+    ("jobs", "0", "jobs: expected 1 to 1024, found 0"),
     ("name", " ", "run name: is missing"),
 )
 
@@ -318,10 +318,10 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
 async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, started):
     own = {
         "failure": {"timeout": 12, "epsilon": 0.25},
-        "reduction": {"iterations": 9, "n_partitions": 5, "seed": 4, "pair": "timeseg/random", "algorithm": "ddmin"},
+        "reduction": {"iterations": 9, "baseline_runs": 5, "seed": 4, "pair": "timeseg/random", "algorithm": "ddmin"},
     }
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | own))
-    fields = ("timeout", "epsilon", "iterations", "n_partitions", "seed")
+    fields = ("timeout", "epsilon", "iterations", "baseline_runs", "seed")
     async with Opened() as session:
         assert [session.value(id) for id in fields] == ["12", "0.25", "9", "5", "4"]
         assert session.method() == ["ddmin", "timeseg", "random"]
@@ -329,7 +329,7 @@ async def test_a_bare_world_starts_with_the_defaults_of_a_scenario(scenarios, st
         await session.press("ctrl+s")
         assert session.screen.query_one("#timeout", Input).has_class("-wrong")
         await session.open(scenarios / "crates.sdf")
-        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.33", "3", "2", "0", "4"]
+        assert [session.value(id) for id in (*fields, "jobs")] == ["45", "0.33", "3", "10", "0", "4"]
         assert session.method() == ["ddenv", "model2model", "avg-trajectory-proximal"]
         assert not session.screen.query(".-wrong")
         assert session.wrong() == ""

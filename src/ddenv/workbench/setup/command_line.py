@@ -7,31 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ddenv.settings import OPTIONS, number_text, read
 from ddenv.workbench.setup.form import read_key
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-# The scenario's keys that have an option of their own, which is named like the key.
-OPTIONS = (
-    "reduction.algorithm",
-    "reduction.pair",
-    "reduction.iterations",
-    "reduction.budget",
-    "reduction.baseline_runs",
-    "reduction.n_partitions",
-    "reduction.candidates",
-    "reduction.complement_order",
-    "reduction.growth",
-    "reduction.skip",
-    "reduction.delta",
-    "reduction.prior",
-    "reduction.seed",
-    "failure.timeout",
-    "failure.epsilon",
-    "failure.similarity",
-    "failure.early_stop",
-)
 PLACES = {
     "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
     "goal": ("goal.x", "goal.y"),
@@ -58,11 +39,11 @@ def command(
     for place, keys in PLACES.items():
         numbers = [read_key(after, key) for key in keys]
         if own is None or numbers != [read_key(before, key) for key in keys]:
-            words.append(f"--{place}={','.join(map(_number, numbers))}")
-    for key in OPTIONS:
-        value = read_key(after, key)
-        if value != read_key(before, key):
-            words += _option(key.rpartition(".")[2], value)
+            words.append(f"--{place}={','.join(map(number_text, numbers))}")
+    for one in OPTIONS:
+        value = read(after, one)
+        if value != read(before, one):
+            words += one.words(value)
     for option, values in reading.items():
         for value in values:
             words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
@@ -76,18 +57,6 @@ def source_of(path: Path, bundled: Path) -> str:
     if path.parent == bundled and path.suffix == ".yaml":
         return path.stem
     return _path(path)
-
-
-def _option(name: str, value: Any) -> list[str]:
-    flag = f"--{name.replace('_', '-')}"
-    if isinstance(value, bool):
-        return [flag if value else f"--no-{flag[2:]}"]
-    # No limit has no number of its own.
-    return [flag, _number(0 if value is None else value)]
-
-
-def _number(value: Any) -> str:
-    return str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e9 else str(value)
 
 
 def _path(path: Path) -> str:

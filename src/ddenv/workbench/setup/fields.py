@@ -19,7 +19,7 @@ from ddenv.errors import UserError
 from ddenv.schemas import Kind, names, uses
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.meanings import Circumstances, cost, meaning, not_used
+from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ class OptionsForm(Vertical):
 
     def _explain_field(self, field: form.Field) -> None:
         now = self.circumstances()
-        words = f"{meaning(field)} {cost(field, self.texts, now)}".strip()
+        words = f"{field.meaning} {cost(field, self.texts, now)}".strip()
         self.query_one(Explained).show(field.label, words, not_used(field, now))
 
     def _dim(self, algorithm: str = "") -> None:

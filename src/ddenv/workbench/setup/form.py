@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
+from ddenv.settings import JOBS, OPTIONS, SETTINGS, Setting, Shown, Value, read
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-Value = int | float | str | bool | None
 ON, OFF = "on", "off"
 
 
@@ -20,7 +20,8 @@ class Field:
     """`id` is the field's name on the screen, `label` what stands before it, `kind` int, float, str or bool.
 
     `key` is the scenario's key for it, "" where a scenario has none. `choices` are the words it may be, if these are few. A field
-    may be empty where `empty` says so: it is shown in its place.
+    may be empty where `empty` says so: it is shown in its place. `meaning` is a sentence. `setting` is the setting that the field
+    is for, if any.
     """
 
     id: str
@@ -29,38 +30,52 @@ class Field:
     key: str = ""
     choices: tuple[str, ...] = ()
     empty: str = ""
+    meaning: str = ""
+    setting: Setting | None = None
 
 
-BASIC = (
-    Field("iterations", "iterations", int, "reduction.iterations"),
-    Field("budget", "budget", int, "reduction.budget", empty="none"),
-    Field("timeout", "timeout s", float, "failure.timeout"),
-    Field("epsilon", "epsilon m", float, "failure.epsilon"),
-    Field("seed", "seed", int, "reduction.seed"),
-    Field("jobs", "jobs", int),
-)
+def _field(one: Setting) -> Field:
+    meaning = f"{one.summary[:1].upper()}{one.summary[1:]}. {one.more}".strip()
+    choices = (OFF, ON) if one.kind is bool else one.choices
+    return Field(one.name, one.label, one.kind, one.key, choices, one.none, meaning, one)
+
+
+def _shown(where: Shown) -> tuple[Field, ...]:
+    return tuple(_field(one) for one in OPTIONS if one.shown == where)
+
+
+JOBS_FIELD = _field(JOBS)
+BASIC = (*_shown("basic"), JOBS_FIELD)
 PLACES = (
-    Field("spawn_x", "spawn x m", float, "robot.spawn.x"),
-    Field("spawn_y", "spawn y m", float, "robot.spawn.y"),
-    Field("spawn_z", "spawn z m", float, "robot.spawn.z"),
-    Field("spawn_yaw", "yaw rad", float, "robot.spawn.yaw"),
-    Field("goal_x", "goal x m", float, "goal.x"),
-    Field("goal_y", "goal y m", float, "goal.y"),
+    Field("spawn_x", "spawn x m", float, "robot.spawn.x", meaning="Where the robot starts, m."),
+    Field("spawn_y", "spawn y m", float, "robot.spawn.y", meaning="Where the robot starts, m."),
+    Field(
+        "spawn_z",
+        "spawn z m",
+        float,
+        "robot.spawn.z",
+        meaning="Height of the robot's frame at the start, m. A place picked on the map fills it in.",
+    ),
+    Field(
+        "spawn_yaw", "yaw rad", float, "robot.spawn.yaw", meaning="Heading at the start, rad, counterclockwise from x."
+    ),
+    Field("goal_x", "goal x m", float, "goal.x", meaning="Where the robot has to go, m."),
+    Field("goal_y", "goal y m", float, "goal.y", meaning="Where the robot has to go, m."),
 )
-ADVANCED = (
-    Field("baseline_runs", "baseline runs", int, "reduction.baseline_runs"),
-    Field("n_partitions", "n_partitions", int, "reduction.n_partitions"),
-    Field("delta", "delta rad/s", float, "reduction.delta"),
-    Field("early_stop", "early stop", bool, "failure.early_stop", (OFF, ON)),
-    Field("similarity", "similarity", str, "failure.similarity", ("end-pose", "trajectory")),
-    Field("candidates", "candidates", str, "reduction.candidates", ("both", "partitions", "complements")),
-    Field("complement_order", "complement order", str, "reduction.complement_order", ("paper", "far-first")),
-    Field("growth", "growth", str, "reduction.growth", ("paper", "steady")),
-    Field("skip", "skip", str, "reduction.skip", ("known", "implied")),
-    Field("prior", "prior", str, "reduction.prior", ("spatial", "uniform")),
+ADVANCED = _shown("more")
+NAME = Field(
+    "name",
+    "run name",
+    str,
+    meaning="The name of the run: a file in the runs folder, or a path that ends in .ddenv.",
 )
-NAME = Field("name", "run name", str)
-ACCEPT = Field("accept", "accept", str, "", ("automatic", "ask"))
+ACCEPT = Field(
+    "accept",
+    "accept",
+    str,
+    choices=("automatic", "ask"),
+    meaning="Whether each reduction is taken at once (automatic), or waits for you to accept or reject it (ask).",
+)
 ALL = (*BASIC, *PLACES, *ADVANCED, NAME, ACCEPT)
 
 
@@ -82,7 +97,7 @@ def value(field: Field, text: str) -> Value:
     if not text:
         raise FieldError(field.id, f"{field.label}: is missing")
     try:
-        return field.kind(text)
+        return str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
         wanted = "a whole number" if field.kind is int else "a number"
         raise FieldError(field.id, f"{field.label}: expected {wanted}, found '{text[:40]}'") from None
@@ -94,10 +109,10 @@ def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Val
 
 
 def jobs(text: str) -> int:
-    """At least one test at a time, and no more than a large machine can do. Raises FieldError."""
-    number = value(BASIC[-1], text)
-    if not 1 <= number <= 256:
-        raise FieldError("jobs", f"jobs: expected 1 to 256, found {number}")
+    """The number of tests at the same time. Raises FieldError."""
+    number = value(JOBS_FIELD, text)
+    if not isinstance(number, int) or not JOBS.allows(number):
+        raise FieldError("jobs", f"jobs: expected {JOBS.least} to {JOBS.most}, found {number}")
     return number
 
 
@@ -122,39 +137,42 @@ def text_of(value: Value) -> str:
 
 def read_key(data: Mapping[str, Any], key: str) -> Any:
     """The value of a scenario's key such as `robot.spawn.x`; None where it is not there."""
+    found: Any = data
     for part in key.split("."):
-        data = data.get(part) if isinstance(data, Mapping) else None
-    return data
+        found = found.get(part) if isinstance(found, Mapping) else None
+    return found
 
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
     """What a scenario's own settings are, as texts for the fields."""
     data = scenario.model_dump(mode="json")
-    return {field.id: text_of(read_key(data, field.key)) for field in ALL if field.key}
+    values = {field.id: read(data, field.setting) for field in ALL if field.key and field.setting}
+    places = {field.id: read_key(data, field.key) for field in PLACES}
+    return {id: text_of(value) for id, value in (values | places).items()}
 
 
 def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
     """`base` with what stands in the fields. Raises UserError, a FieldError where a text is no number."""
+    from ddenv.runs.scenarios import with_values
     from ddenv.world.load import validate
 
     data = base.model_dump(mode="json")
-    fields = tuple(field for field in (*BASIC, *PLACES, *ADVANCED) if field.key)
-    asked = values(fields, texts)
-    for field in fields:
+    given = values(tuple(field for field in ALL if field.key), texts)
+    chosen = {name: asked for name, asked in given.items() if name in SETTINGS}
+    data = with_values(data, chosen | {"pair": pair, "algorithm": algorithm})
+    for field in PLACES:
         section, _, key = field.key.rpartition(".")
-        # A field that is left empty, or that this scenario does not know, changes nothing that is not there.
-        if asked[field.id] is not None or read_key(data, field.key) is not None:
-            read_key(data, section)[key] = asked[field.id]
-    data["reduction"] |= {"pair": pair, "algorithm": algorithm}
+        read_key(data, section)[key] = given[field.id]
     return validate(data, "options")
 
 
 def place(what: str, texts: Mapping[str, str]) -> tuple[float, ...] | None:
     """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m); None while any of them is no number."""
     try:
-        return tuple(values(tuple(field for field in PLACES if field.id.startswith(what)), texts).values())
+        numbers = values(tuple(field for field in PLACES if field.id.startswith(what)), texts)
     except FieldError:
         return None
+    return tuple(float(number) for number in numbers.values() if number is not None)
 
 
 def field_of(error: UserError) -> str | None:

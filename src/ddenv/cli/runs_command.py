@@ -1,13 +1,22 @@
-"""Lists the runs of the runs folder."""
+"""`ddenv runs`: the list of runs."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import click
+
 from ddenv.errors import UserError, printable
-from ddenv.runfile.fold import fold
-from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.store import RunFile
+
+
+@click.command("runs")
+def runs_command() -> int:
+    """Lists the runs."""
+    from ddenv.runs.folder import runs_folder
+
+    lines = run_lines(runs_folder())
+    print("\n".join(lines) if lines else f"no runs yet in {runs_folder()}; 'ddenv run ditch' makes one")
+    return 0
 
 
 def run_lines(folder: Path) -> list[str]:
@@ -25,6 +34,10 @@ def _changed(path: Path) -> float:
 
 
 def _line(path: Path) -> str:
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.lock import engine_is_alive
+    from ddenv.runfile.store import RunFile
+
     try:
         with RunFile(path) as file:
             state = fold(file.events())

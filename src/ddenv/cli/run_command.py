@@ -1,0 +1,62 @@
+"""`ddenv run`: a reduction without a screen."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ddenv.cli.options import (
+    announce,
+    chosen_scenario,
+    jobs_option,
+    json_option,
+    reading_options,
+    scenario_options,
+    setting_options,
+)
+from ddenv.errors import printable
+
+if TYPE_CHECKING:
+    from ddenv.world.model import World
+
+
+@click.command("run")
+@click.argument("scenario")
+@scenario_options
+@reading_options
+@setting_options()
+@jobs_option()
+@click.option("--name", help="Name of the run.")
+@click.option(
+    "--output", type=Path, help="A .ddenv file or a folder for the run; or a .sdf file for the minimal world."
+)
+@json_option
+def run_command(scenario: str, name: str | None, output: Path | None, jobs: int, as_json: bool, **options: Any) -> int:
+    """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
+    from ddenv.cli.export_command import announce_needs
+    from ddenv.cli.follow import follow_to_summary
+    from ddenv.runs.creation import create_run
+    from ddenv.runs.export import export_world
+    from ddenv.runs.folder import run_path
+    from ddenv.runs.programs import start_engine
+
+    chosen = chosen_scenario(scenario, options)
+    path = run_path(chosen.name, name, output)
+    announce_notes(create_run(chosen, path, announce), as_json)
+    code, state = follow_to_summary(path, start_engine(path, jobs), as_json)
+    if output is not None and output.suffix in (".sdf", ".world") and state.baseline is not None:
+        announce_needs(output, export_world(path, output, None).needs)
+    return code
+
+
+def announce_notes(world: World, as_json: bool) -> None:
+    """Counts the parts of a world that were not read as they are written, if there are any."""
+    from ddenv.words import count
+
+    if world.notes:
+        were = f"{count(len(world.notes), 'part')} of {world.path} {'was' if len(world.notes) == 1 else 'were'}"
+        line = f"{were} replaced or ignored; 'ddenv world check' says which and why"
+        print(printable(line), file=sys.stderr if as_json else sys.stdout, flush=True)

@@ -1,0 +1,104 @@
+"""`ddenv test`: single runs of the robot."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ddenv.cli.options import (
+    announce,
+    chosen_scenario,
+    jobs_option,
+    reading_options,
+    scenario_options,
+    setting_options,
+)
+from ddenv.errors import UserError, printable
+
+if TYPE_CHECKING:
+    from ddenv.engine.single_test import Subject
+
+
+@click.command("test")
+@click.argument("subject", metavar="SCENARIO_OR_RUN")
+@scenario_options
+@setting_options(only=("timeout",))
+@reading_options
+@click.option("--keep", help="Only these models, by name, separated by commas.")
+@click.option("--minimal", is_flag=True, help="Only the models that the run has left.")
+@click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
+@click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
+@click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up.")
+@click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Runs of each.")
+@jobs_option("Runs")
+@click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
+def test_command(
+    subject: str,
+    keep: str | None,
+    minimal: bool,
+    leave_out: tuple[str, ...],
+    leave_each_out: bool,
+    seed: int | None,
+    repeat: int,
+    jobs: int,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Runs the robot in a scenario, or in a run's world, and prints each run's outcome."""
+    from ddenv.engine.single_test import plan, run_trials
+
+    what = _subject(subject, options)
+    names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
+    trials = plan(
+        what,
+        keep=names,
+        minimal=minimal,
+        leave_out=list(leave_out),
+        leave_each_out=leave_each_out,
+        seed=seed,
+        repeat=repeat,
+    )
+    results = []
+    for result in run_trials(what, trials, jobs):
+        results.append(result)
+        if not as_json:
+            print(printable(_line(result)), flush=True)
+    if as_json:
+        print(json.dumps({"runs": results}))
+    return 0
+
+
+def _subject(name: str, options: Mapping[str, Any]) -> Subject:
+    """A run where there is one of that name, else a scenario."""
+    from ddenv.engine.single_test import Subject, subject_of_run
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.scenarios import load_parts
+
+    path = find_run(name)
+    if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
+        if any(value is not None and value != () for value in options.values()):
+            raise UserError(
+                "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore go with a scenario; "
+                "a run keeps its own"
+            )
+        with RunFile(path) as file:
+            return subject_of_run(file)
+    scenario = chosen_scenario(name, options)
+    return Subject(scenario, *load_parts(scenario, announce))
+
+
+def _line(result: Mapping[str, Any]) -> str:
+    without = f"  without {result['without']}" if result["without"] else ""
+    if result["end_pose"] is None:
+        return f"seed {result['seed']:<4} {result['outcome']:<8} {result['failure']}{without}"
+    x, y, z = result["end_pose"][:3]
+    distance = "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
+    failure = f"  {result['failure']}" if result["failure"] else ""
+    return (
+        f"seed {result['seed']:<4} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
+        f"after {result['simulated_seconds']:.1f} s{failure}{distance}{without}"
+    )

@@ -1,0 +1,278 @@
+"""Each setting of a run, once: type, default, unit, range, meaning, where it shows, and whether it may change on the way.
+
+The scenario's sections, the setup form, the command line and its help, the tables in the docs, and the report come from here. A
+new setting is one line in a class below. Nothing heavy is imported: the command line needs this file at once.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from ddenv.errors import printable
+
+Value = int | float | str | bool | None
+
+# What a world may have without being refused for it, if the user says so.
+Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
+IGNORABLE: tuple[str, ...] = get_args(Ignorable)
+
+# Where a setting shows. "method" is chosen by schemas, "basic" and "more" are fields of the setup form, and all three are options
+# of the command line. "scenario" is in scenario files (and in `ddenv.reduce`) alone.
+Shown = Literal["method", "basic", "more", "scenario"]
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A setting and all that is known about it.
+
+    `meaning` is a short phrase for every place, without a full stop; `more` are sentences for those with room. `cost` says in a
+    sentence what the setting costs. A value is at least `least`, greater than `above`, at most `most`. `none` is the word for no
+    value, where there may be none. `printed` is the paper's value. `used_by` are the algorithms or partitionings that look at it,
+    where not all do. `stored` is False for what only stands for other settings. The last four come from the declaration.
+    """
+
+    default: Value
+    meaning: str
+    unit: str = ""
+    least: float | None = None
+    above: float | None = None
+    most: float | None = None
+    shown: Shown = "scenario"
+    more: str = ""
+    cost: str = ""
+    none: str = ""
+    may_change: bool = False
+    used_by: tuple[str, ...] = ()
+    printed: Value = None
+    stored: bool = True
+    section: str = ""
+    name: str = ""
+    kind: type = str
+    choices: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Its place in a scenario, such as `reduction.iterations`; "" where it has none."""
+        return f"{self.section}.{self.name}" if self.section else ""
+
+    @property
+    def label(self) -> str:
+        """Its name for people, with its unit."""
+        return f"{self.name.replace('_', ' ')} {self.unit}".strip()
+
+    @property
+    def option(self) -> str:
+        """Its option on the command line, "" where it has none."""
+        return "" if self.shown == "scenario" else f"--{self.name.replace('_', '-')}"
+
+    @property
+    def summary(self) -> str:
+        """The meaning with its unit."""
+        return f"{self.meaning}, {self.unit}" if self.unit else self.meaning
+
+    def words(self, value: Value) -> list[str]:
+        """The option with `value`, as typed on the command line."""
+        if self.kind is bool:
+            return [self.option if value else f"--no-{self.option[2:]}"]
+        # No limit has no number of its own.
+        return [self.option, number_text(0 if value is None else value)]
+
+    def allows(self, value: Any) -> bool:
+        """Whether `value` has the right type and is in range."""
+        if value is None:
+            return bool(self.none)
+        if self.kind in (bool, str) or isinstance(value, bool):
+            return isinstance(value, self.kind) and (not self.choices or value in self.choices)
+        if not isinstance(value, int if self.kind is int else (int, float)) or not math.isfinite(value):
+            return False
+        below = (self.least is not None and value < self.least) or (self.above is not None and value <= self.above)
+        return not below and (self.most is None or value <= self.most)
+
+
+def number_text(value: Value) -> str:
+    """A value as short as it can be typed."""
+    return str(int(value)) if isinstance(value, float) and value.is_integer() and abs(value) < 1e9 else str(value)
+
+
+def setting(default: Value, meaning: str, **more: Any) -> Any:
+    """Declares a setting in a class of settings; the annotation beside it is its type."""
+    return Setting(default, meaning, **more)
+
+
+class Reduction:
+    """How the world is reduced."""
+
+    algorithm: str = setting(
+        "ddenv",
+        "how the environment is searched",
+        shown="method",
+        may_change=True,
+        more="'ddenv schemas' explains each.",
+    )
+    pair: str = setting(
+        "model2model/avg-trajectory-proximal",
+        "how the environment is split and in which order its parts are tried: partitioning/prioritization",
+        shown="method",
+        may_change=True,
+        more="'ddenv schemas' explains each.",
+    )
+    iterations: int = setting(
+        3,
+        "maximum re-runs of a candidate that did not show the failure",
+        least=0,
+        most=1000,
+        shown="basic",
+        may_change=True,
+    )
+    budget: int | None = setting(
+        None,
+        "maximum number of tests, the baseline included",
+        least=1,
+        shown="basic",
+        may_change=True,
+        none="none",
+        more="The run stops there with what is left then, and can go on with a larger budget.",
+    )
+    seed: int = setting(
+        0,
+        "seed of the first run; run i of each candidate uses seed + i",
+        least=0,
+        most=2**31 - 1,
+        shown="basic",
+        more="The same seed repeats the same runs.",
+        cost="Costs nothing.",
+    )
+    baseline_runs: int = setting(10, "runs of the whole world before the first round", least=1, most=1000, shown="more")
+    as_printed: bool = setting(
+        False,
+        "follow the paper's algorithm to the letter, not the variant that needs fewer tests",
+        shown="more",
+        stored=False,
+        used_by=("ddenv",),
+        cost="On needs many more tests, for a result that is as minimal.",
+    )
+    growth: Literal["paper", "steady"] = setting(
+        "steady",
+        "when n grows: after every round (paper), or only after a round without success (steady)",
+        printed="paper",
+        used_by=("ddenv",),
+    )
+    skip: Literal["known", "implied"] = setting(
+        "implied",
+        "what is not tested: sets judged before (known), or also all that lacks what was missed before (implied)",
+        printed="known",
+        used_by=("ddenv",),
+    )
+    candidates: Literal["both", "partitions", "complements"] = setting(
+        "both",
+        "what is tried in a round: each part, its complement (the world without the part), or both",
+        printed="both",
+        used_by=("ddenv",),
+    )
+    complement_order: Literal["paper", "far-first"] = setting(
+        "paper",
+        "each complement after its part (paper), or first those that leave out what is farthest away (far-first)",
+        printed="paper",
+        used_by=("ddenv",),
+    )
+    n_partitions: int = setting(2, "partitions in the first round", least=2, used_by=("ddenv",))
+    delta: float = setting(
+        0.5,
+        "change of the angular velocity where trajectoryseg cuts",
+        unit="rad/s",
+        above=0,
+        used_by=("trajectoryseg",),
+    )
+    prior: Literal["spatial", "uniform"] = setting(
+        "spatial", "where probdd and splitting begin", used_by=("probdd", "splitting")
+    )
+
+
+class Failure:
+    """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
+
+    timeout: float = setting(45.0, "simulated time the robot has", unit="s", above=0, shown="basic")
+    epsilon: float = setting(
+        0.33,
+        "maximum distance between the ends of two similar failures",
+        unit="m",
+        above=0,
+        shown="basic",
+        cost="Wider accepts more failures as the same one; narrower misses f more often.",
+    )
+    early_stop: bool = setting(
+        False,
+        "end a test when the robot is stuck for good; full runs confirm what is left",
+        shown="more",
+        cost="Saves the rest of a test that is stuck; at the end there are at least two full runs.",
+    )
+    similarity: Literal["end-pose", "trajectory"] = setting(
+        "end-pose",
+        "what similar failures share: where they end (end-pose), or also how they got there (trajectory)",
+        shown="more",
+        cost="Costs no tests by itself; trajectory is stricter, so less may be removed.",
+    )
+
+
+class Simulation:
+    """How Drake simulates. `wall_timeout` bounds one test in real time."""
+
+    time_step: float = setting(0.005, "time step of the simulation", unit="s", above=0, most=0.05)
+    contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
+    wall_timeout: float = setting(120.0, "maximum real time of one test", unit="s", above=0)
+
+
+def _kind(hint: Any) -> type:
+    """The type of a value that is there."""
+    if get_origin(hint) is Literal:
+        return str
+    if get_origin(hint) in (Union, types.UnionType):
+        return _kind(next(each for each in get_args(hint) if each is not type(None)))
+    return hint if isinstance(hint, type) else str
+
+
+def declared(section: str, declaration: type) -> Iterator[Setting]:
+    """The settings of a class, with their names and types."""
+    for name, hint in get_type_hints(declaration).items():
+        choices = get_args(hint) if get_origin(hint) is Literal else ()
+        yield replace(vars(declaration)[name], section=section, name=name, kind=_kind(hint), choices=choices)
+
+
+SECTIONS: dict[str, type] = {"reduction": Reduction, "failure": Failure, "simulation": Simulation}
+SETTINGS: dict[str, Setting] = {
+    each.name: each for section, declaration in SECTIONS.items() for each in declared(section, declaration)
+}
+OPTIONS = tuple(each for each in SETTINGS.values() if each.option)
+CHANGEABLE = tuple(each.name for each in SETTINGS.values() if each.may_change)
+PRINTED: dict[str, Value] = {each.name: each.printed for each in SETTINGS.values() if each.printed is not None}
+# Not in a scenario: it changes nothing about the result.
+JOBS = Setting(None, "tests at the same time", least=1, most=1024, shown="basic", name="jobs", kind=int)
+
+
+def is_printed(reduction: Mapping[str, Any]) -> bool:
+    """Whether a scenario's section `reduction` asks for the paper's algorithm to the letter."""
+    return all(reduction.get(name, SETTINGS[name].default) == value for name, value in PRINTED.items())
+
+
+def read(scenario: Mapping[str, Any], one: Setting) -> Value:
+    """The value of a setting in a scenario as plain data; its default where it is missing or damaged."""
+    section = scenario.get(one.section)
+    if not isinstance(section, Mapping):
+        return one.default
+    value = section.get(one.name, one.default) if one.stored else is_printed(section)
+    if not one.allows(value):
+        return one.default
+    return printable(" ".join(value.split())) if isinstance(value, str) else value
+
+
+def put(scenario: Mapping[str, dict[str, Any]], one: Setting, value: Value) -> None:
+    """Writes a setting to a scenario as plain data, as it is: whether it is allowed, the scenario's model says."""
+    section = scenario[one.section]
+    if one.stored:
+        section[one.name] = value
+    elif bool(value) != is_printed(section):
+        section.update(PRINTED if value else {name: SETTINGS[name].default for name in PRINTED})
