@@ -74,6 +74,13 @@ class Setting:
         """The meaning with its unit."""
         return f"{self.meaning}, {self.unit}" if self.unit else self.meaning
 
+    @property
+    def range(self) -> str:
+        """The numbers that it may be, in words."""
+        if self.least is None:
+            return "any number" if self.above is None else f"more than {self.above:g}"
+        return f"{self.least:g} or more" if self.most is None else f"{self.least:.0f} to {self.most:.0f}"
+
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""
         if self.kind is bool:
@@ -87,7 +94,9 @@ class Setting:
             return bool(self.none)
         if self.kind in (bool, str) or isinstance(value, bool):
             return isinstance(value, self.kind) and (not self.choices or value in self.choices)
-        if not isinstance(value, int if self.kind is int else (int, float)) or not math.isfinite(value):
+        if not isinstance(value, int if self.kind is int else (int, float)) or (
+            isinstance(value, float) and not math.isfinite(value)
+        ):
             return False
         below = (self.least is not None and value < self.least) or (self.above is not None and value <= self.above)
         return not below and (self.most is None or value <= self.most)
@@ -106,16 +115,16 @@ def setting(default: Value, meaning: str, **more: Any) -> Any:
 class Reduction:
     """How the world is reduced."""
 
-    algorithm: str = setting(
-        "ddenv",
-        "how the environment is searched",
+    pair: str = setting(
+        "model2model/avg-trajectory-proximal",
+        "how the environment is split and in which order its parts are tried: partitioning/prioritization",
         shown="method",
         may_change=True,
         more="'ddenv schemas' explains each.",
     )
-    pair: str = setting(
-        "model2model/avg-trajectory-proximal",
-        "how the environment is split and in which order its parts are tried: partitioning/prioritization",
+    algorithm: str = setting(
+        "ddenv",
+        "how the environment is searched",
         shown="method",
         may_change=True,
         more="'ddenv schemas' explains each.",

@@ -16,14 +16,12 @@ from ddenv.errors import UserError
 from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
+from ddenv.settings import SETTINGS, Setting
 from ddenv.workbench.run.methods import KINDS, note, paragraph
 from ddenv.workbench.wording import count, plain
 
-MEANINGS = {
-    "iterations": "re-runs of a candidate before it counts as dissimilar",
-    "budget": "most tests in all, those so far included; empty for no limit",
-}
-LARGEST = {"iterations": 1000, "budget": 1_000_000}
+# Beside the pair and the algorithm, which have lists.
+NUMBERS = tuple(one for one in SETTINGS.values() if one.may_change and one.shown != "method")
 
 
 class Change(ModalScreen[dict[str, Any] | None]):
@@ -45,7 +43,8 @@ class Change(ModalScreen[dict[str, Any] | None]):
             "partitioning": partitioning,
             "prioritization": prioritization,
         }
-        self._numbers = {"iterations": str(options.iterations), "budget": str(state.budget or "")}
+        now = {one.name: getattr(options, one.name) for one in NUMBERS}
+        self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
         self._done = state.tests_done
 
     def compose(self) -> ComposeResult:
@@ -58,11 +57,12 @@ class Change(ModalScreen[dict[str, Any] | None]):
                         yield Static(kind, classes="label", markup=False)
                         yield self._select(kind)
                     yield Static("", id=f"{kind}-meaning", classes="meaning", markup=False)
-                for key, meaning in MEANINGS.items():
+                for one in NUMBERS:
                     with Horizontal(classes="row"):
-                        yield Static(key, classes="label", markup=False)
-                        yield Input(self._numbers[key], id=key, compact=True)
-                    yield Static(meaning, classes="meaning", markup=False)
+                        yield Static(one.label, classes="label", markup=False)
+                        yield Input(self._texts[one.name], id=one.name, compact=True)
+                    empty = "; empty for no limit" if one.none else ""
+                    yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Change", id="apply", variant="primary")
@@ -90,18 +90,22 @@ class Change(ModalScreen[dict[str, Any] | None]):
         return {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
-            "iterations": _whole("iterations", self.query_one("#iterations", Input).value, 0),
-            "budget": self._budget(),
+            **{one.name: self._number(one) for one in NUMBERS},
         }
 
-    def _budget(self) -> int | None:
-        text = self.query_one("#budget", Input).value
-        if not text.strip():
+    def _number(self, one: Setting) -> int | None:
+        text = self.query_one(f"#{one.name}", Input).value.strip()
+        if not text and one.none:
             return None
-        budget = _whole("budget", text, 1)
-        if budget <= self._done:
+        try:
+            number = int(text)
+        except ValueError:
+            raise UserError(f"{one.name}: expected a whole number, found '{text[:20]}'") from None
+        if not one.allows(number):
+            raise UserError(f"{one.name}: expected {one.range}, found {number}")
+        if one.name == "budget" and number <= self._done:
             raise UserError(f"budget: {count(self._done, 'test')} are made already; give more, or leave it empty")
-        return budget
+        return number
 
     @on(Input.Submitted)
     def action_apply(self) -> None:
@@ -122,13 +126,3 @@ class Change(ModalScreen[dict[str, Any] | None]):
 
     def action_cancel(self) -> None:
         self.dismiss(None)
-
-
-def _whole(what: str, text: str, least: int) -> int:
-    try:
-        number = int(text.strip())
-    except ValueError:
-        raise UserError(f"{what}: expected a whole number, found '{text[:20]}'") from None
-    if not least <= number <= LARGEST[what]:
-        raise UserError(f"{what}: expected {least} to {LARGEST[what]}, found {number}")
-    return number

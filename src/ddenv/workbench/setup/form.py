@@ -112,7 +112,7 @@ def jobs(text: str) -> int:
     """The number of tests at the same time. Raises FieldError."""
     number = value(JOBS_FIELD, text)
     if not isinstance(number, int) or not JOBS.allows(number):
-        raise FieldError("jobs", f"jobs: expected {JOBS.least} to {JOBS.most}, found {number}")
+        raise FieldError("jobs", f"jobs: expected {JOBS.range}, found {number}")
     return number
 
 
