@@ -77,9 +77,10 @@ class Setting:
     @property
     def range(self) -> str:
         """The numbers that it may be, in words."""
-        if self.least is None:
-            return "any number" if self.above is None else f"more than {self.above:g}"
-        return f"{self.least:g} or more" if self.most is None else f"{self.least:.0f} to {self.most:.0f}"
+        if self.least is not None:
+            return f"{self.least:g} or more" if self.most is None else f"{self.least:.0f} to {self.most:.0f}"
+        above = "any number" if self.above is None else f"more than {self.above:g}"
+        return above if self.most is None else f"{above}, at most {self.most:g}"
 
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""
