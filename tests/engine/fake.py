@@ -19,6 +19,7 @@ from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
+from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
 from tests.conftest import DATA
@@ -82,10 +83,10 @@ class FakePool:
 
 
 def new_run(folder: Path, *, early_stop: bool = False, **reduction) -> Path:
-    """A run file of the small world."""
+    """A run file of the small world, reduced as printed: the tests know the paper's rounds."""
     scenario = load_scenario(DATA / "wall.yaml")
     changed = {
-        "reduction": scenario.reduction.model_copy(update=reduction),
+        "reduction": scenario.reduction.model_copy(update=PRINTED | reduction),
         "failure": scenario.failure.model_copy(update={"early_stop": early_stop}),
     }
     scenario = scenario.model_copy(update=changed)
