@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
+from ddenv.settings import PRINTED
 from ddenv.version import __version__
 from ddenv.world.read import parse_world
 
@@ -56,11 +57,17 @@ def scenario(protected: tuple[str, ...] = ("floor",), name: str = "crates") -> d
     }
 
 
+def as_printed() -> dict:
+    """The same with the settings of the paper: the screens show its lines, and the rounds below are its rounds."""
+    data = scenario()
+    return data | {"reduction": data["reduction"] | PRINTED}
+
+
 class FakeRun:
     """A run file and the events an engine would write. `with run.engine():` holds the lock as an engine does."""
 
     def __init__(self, path: Path, data: dict | None = None, world: bytes | None = None) -> None:
-        data = data or scenario()
+        data = data or as_printed()
         self.path, self.data = path, data
         self.world = world or world_text()
         documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
