@@ -8,9 +8,8 @@ from pathlib import Path
 
 import yaml
 
-from ddenv.study.check import APART
 from ddenv.study.plan import Cell, Plan, make_plan
-from ddenv.study.results import Found, read_cell
+from ddenv.study.results import APART, Found, read_cell
 from ddenv.study.study_folder import check_path, run_path
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA

@@ -8,14 +8,12 @@ import pytest
 
 from ddenv.page.blocks import Strong, Table
 from ddenv.runfile.state import Baseline
-from ddenv.study.best import best
-from ddenv.study.check import APART, Check
 from ddenv.study.figures import chart
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import Found
+from ddenv.study.results import APART, Check, Found
 from ddenv.study.rows import groups, spread
 from ddenv.study.study_page import content
-from ddenv.study.tables import behind, numbers
+from ddenv.study.tables import behind, best, numbers
 from tests.study.made import crates, plan_of
 
 MODELS = tuple(f"m{number}" for number in range(16))

@@ -15,8 +15,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
-from ddenv.study.conduct import conduct
-from ddenv.study.progress import Progress
+from ddenv.study.conduct import Progress, conduct
 from ddenv.study.results import read_cell
 from ddenv.study.study_folder import run_path, sittings
 from tests.study.made import plan_of, wall

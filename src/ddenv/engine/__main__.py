@@ -61,9 +61,10 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     try:
         _begin(journal, jobs, options.accept_mode)
         control = Control(journal, terminated, options.since)
-        pool = Pool(scenario, world, robot, jobs)
+        workers = Pool(scenario, world, robot, jobs)
+        pool: Pool | SharingPool = workers
         if options.share is not None:
-            pool = SharingPool(pool, tests_of_others(file, scenario, options.share))
+            pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
         try:
             Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
         finally:

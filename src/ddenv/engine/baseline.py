@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ddenv.engine.judging import end_of
 from ddenv.reduction.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, judge_trajectory, medoid
 from ddenv.runfile.state import Test
@@ -24,8 +25,8 @@ def fix_failure(
     failing = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
     if not failing:
         return _no_failure(tests)
-    first = failing[medoid(np.array([test.end_pose[:3] for test in failing]))]
-    failure = Failure(first.end_pose[:3], trajectories[first.id], spec.epsilon, spec.similarity)
+    first = failing[medoid(np.array([end_of(test) for test in failing]))]
+    failure = Failure(end_of(first), trajectories[first.id], spec.epsilon, spec.similarity)
     judged = {test.id: judge_trajectory(trajectories[test.id], failure) for test in failing}
     similar = sum(judgement.outcome == "similar" for judgement in judged.values())
     rate = similar / len(tests)

@@ -14,6 +14,7 @@ from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.judging import failures_of, told
 from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.shared import SharingPool
 from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
@@ -66,7 +67,7 @@ class Bench:
     Before f is fixed, a run that failed is recorded as "failed".
     """
 
-    def __init__(self, journal: Journal, pool: Pool, control: Control) -> None:
+    def __init__(self, journal: Journal, pool: Pool | SharingPool, control: Control) -> None:
         self._failures: tuple[Failure, ...] = ()
         self._failed: tuple[int, ...] = ()
         self._journal = journal

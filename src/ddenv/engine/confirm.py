@@ -7,6 +7,7 @@ from itertools import islice
 
 from ddenv.engine.bench import Wanted
 from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.judging import known_failure
 
 AGAIN = "run again with --no-early-stop"
 
@@ -56,7 +57,7 @@ class Confirmation:
 
     def _shows(self) -> bool:
         # f itself may be a later baseline run.
-        runs = range(max(len(self._runs), self._journal.state.baseline.runs))
+        runs = range(max(len(self._runs), known_failure(self._journal.state).runs))
         return any(self._is_similar(self._kept, run) for run in runs)
 
     def _missing(self, keep: Keep) -> Wanted:

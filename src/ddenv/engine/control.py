@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from typing import Any
 
 from ddenv.engine.journal import Journal
 from ddenv.engine.steering import STEERING, Steering
@@ -123,26 +124,26 @@ class Control:
     def _handled(self, command: Event) -> None:
         self._journal.record("command_handled", command=command.id)
 
-    def _obey_pause(self, _: dict) -> None:
+    def _obey_pause(self, _: dict[str, Any]) -> None:
         if not self._paused:
             self._pause()
 
-    def _obey_resume(self, _: dict) -> None:
+    def _obey_resume(self, _: dict[str, Any]) -> None:
         self._run(credit=None, pause_after_round=False)
 
-    def _obey_step(self, data: dict) -> None:
+    def _obey_step(self, data: dict[str, Any]) -> None:
         if data.get("unit") == "round":
             self._run(credit=None, pause_after_round=True)
         else:
             self._run(credit=1, pause_after_round=False)
 
-    def _obey_accept_mode(self, data: dict) -> str:
+    def _obey_accept_mode(self, data: dict[str, Any]) -> str:
         if data.get("mode") not in ("automatic", "ask"):
             return "the accept mode is automatic or ask"
         self._journal.record("accept_mode", mode=data["mode"])
         return ""
 
-    def _obey_stop(self, _: dict) -> None:
+    def _obey_stop(self, _: dict[str, Any]) -> None:
         raise Stopped("stopped by the user")
 
     def _run(self, credit: int | None, pause_after_round: bool) -> None:

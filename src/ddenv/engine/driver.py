@@ -6,13 +6,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.confirm import Confirmation
 from ddenv.engine.control import Control, Steered
 from ddenv.engine.journal import Journal, Keep, other_way
-from ddenv.engine.judging import rows_of
+from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
@@ -92,7 +93,7 @@ class Driver:
         self._guide = make_guide(
             partitioning,
             prioritization,
-            lambda: replace(self._evidence, trials=self._trials),
+            self._known,
             prior=asked.prior,
             n_partitions=n_partitions or asked.n_partitions,
             candidates=asked.candidates,
@@ -101,6 +102,11 @@ class Driver:
             skip=asked.skip,
         )
         return search(asked.algorithm, elements, self._memory.of(self._guide))
+
+    def _known(self) -> Evidence:
+        """What the schemas go by; only rounds ask for it, after the first similar run."""
+        assert self._evidence is not None
+        return replace(self._evidence, trials=self._trials)
 
     def _keep(self, candidate: Candidate) -> Keep:
         """All that is there when a candidate is tested."""
@@ -190,6 +196,7 @@ class Driver:
             return float(f"{round.scores[candidate.partition]:.3f}") if shown else None
 
         partitions = [self._numbers(partition) for partition in round.partitions]
+        more: dict[str, Any] = {"pinned": self._numbers(self._pinned)} if self._pinned else {}
         self._journal.record_once(
             "round_started",
             number,
@@ -197,11 +204,11 @@ class Driver:
             environment=self._numbers((*round.environment, *self._pinned)),
             partitions=partitions,
             candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
-            **({"pinned": self._numbers(self._pinned)} if self._pinned else {}),
+            **more,
         )
         if self._journal.partitions[number] != partitions:
             raise UserError(other_way(number))
-        if self._journal.state.round.number != number:
+        if self._journal.current.number != number:
             return
         for index, one in enumerate(round.candidates) if self._journal.refused else ():
             if verdict := self._journal.refused.get(self._keep(one)):
@@ -216,9 +223,9 @@ class Driver:
             round.environment,
             self._guide,
             self._memory,
-            replace(self._evidence, trials=tuple(self._trials)),
+            replace(self._known(), trials=tuple(self._trials)),
             self._reduction.iterations,
-            self._journal.state.baseline.rate,
+            known_failure(self._journal.state).rate,
             self._journal.state.jobs,
         )
 
@@ -311,8 +318,9 @@ class Driver:
         self._journal.record_once("reduced", number, winner, environment=environment, evidence_test=test)
         self._look_at(test)
 
-    def _look_at(self, test: int) -> None:
+    def _look_at(self, test: int | None) -> None:
         """The schemas see `test`, the last similar run."""
+        assert test is not None
         self._evidence = self._sight.evidence(
             self._journal.state, test, rows_of(self._journal.file, test), self._trials
         )

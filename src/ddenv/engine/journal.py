@@ -8,7 +8,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.state import Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
@@ -114,11 +114,10 @@ class Journal:
         if self.steered:
             first = max(self.partitions, default=0) + 1
             self.record("leg_started", round=first, n_partitions=self._fineness.get(self.state.node))
-        elif self.leg is None:
+        if self.leg is None:
             state = self.state
-            self.leg = Leg(
-                1, None, state.elements, frozenset(), state.baseline.failure_test, state.scenario["reduction"]
-            )
+            f = None if state.baseline is None else state.baseline.failure_test
+            self.leg = Leg(1, None, state.elements, frozenset(), f, state.scenario["reduction"])
         return self.leg
 
     def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
@@ -144,12 +143,12 @@ class Journal:
 
         Raises UserError for a test of a round that is over: the file must not hold what makes no sense.
         """
-        if round is not None and round != self.state.round.number:
+        if round is not None and round != self.current.number:
             raise UserError(other_way(round))
         test = len(self.state.tests) + 1
         self._keeps[test] = keep
         seed = self.state.scenario["reduction"]["seed"] + run
-        place = {"round": round, "candidate": candidate}
+        place: dict[str, Any] = {"round": round, "candidate": candidate}
         if phase == "confirm":
             left_out = [name for name in self.state.environment if name not in keep]
             place["without"] = self.state.elements.index(left_out[0]) if left_out else None
@@ -163,6 +162,13 @@ class Journal:
         for test in self.state.tests:
             if test.outcome == "running":
                 self.record("test_lost", test=test.id)
+
+    @property
+    def current(self) -> Round:
+        """The current round. Raises UserError where there is none yet."""
+        if self.state.round is None:
+            raise UserError("damaged run file: there is no round yet")
+        return self.state.round
 
     def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
         """Whether an event of a round or a candidate is written already."""
@@ -248,12 +254,12 @@ class Journal:
         if test.phase == "confirm":
             return frozenset(self.state.environment) - {test.without}
         if test.phase == "hand":
-            return frozenset(self.state.trials[test.trial - 1].models)
-        return self._keep_of(test.candidate)
+            return frozenset(self.state.trials[(test.trial or 0) - 1].models)
+        return self._keep_of(test.candidate or 0)
 
     def _keep_of(self, candidate: int) -> Keep:
         """The models of a candidate of the current round."""
-        return frozenset(self.state.round.candidates[candidate].models)
+        return frozenset(self.current.candidates[candidate].models)
 
 
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {

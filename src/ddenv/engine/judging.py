@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ddenv.engine.pool import Broken
+from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import Baseline, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.world.scenario import FailureSpec
 
@@ -26,7 +27,7 @@ def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[s
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
-        unnoticed = {"first_sensed": {}, "first_touched": {}}
+        unnoticed: dict[str, dict[str, float]] = {"first_sensed": {}, "first_touched": {}}
         return {"outcome": result.outcome, "failure": result.failure, **nothing, **unnoticed, "cut": False}
     outcome, distance = result.outcome, None
     if failures:
@@ -57,6 +58,21 @@ def _to_ms(times: dict[str, float]) -> dict[str, float]:
     return {name: round(seconds, 3) for name, seconds in times.items()}
 
 
+def known_failure(state: RunState) -> Baseline:
+    """The baseline, which fixed f. Raises UserError before it is done."""
+    if state.baseline is None:
+        raise UserError("damaged run file: f is not known before the baseline is done")
+    return state.baseline
+
+
+def end_of(test: Test) -> tuple[float, float, float]:
+    """Where the robot was at the end, x, y, z m. Raises UserError for a test without an end."""
+    if test.end_pose is None:
+        raise UserError(f"damaged run file: test {test.id} has no end pose")
+    x, y, z = test.end_pose[:3]
+    return x, y, z
+
+
 def failures_of(file: RunFile, state: RunState, spec: FailureSpec) -> tuple[Failure, ...]:
     """f first; none before it is fixed. Raises UserError for a damaged run file."""
     return tuple(failure_of(file, state, test, spec) for test in state.failures)
@@ -64,8 +80,8 @@ def failures_of(file: RunFile, state: RunState, spec: FailureSpec) -> tuple[Fail
 
 def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> Failure:
     """The failure that a test showed. Raises UserError for a damaged run file."""
-    f = state.baseline
-    end = f.position if test == f.failure_test else state.tests[test - 1].end_pose[:3]
+    f = known_failure(state)
+    end = f.position if test == f.failure_test else end_of(state.tests[test - 1])
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
 

@@ -37,7 +37,7 @@ class _DrakeProcess(SpawnProcess):
     """Is started with `FOR_DRAKE`: libraries read such variables before a line of Python runs."""
 
     @staticmethod
-    def _Popen(process: SpawnProcess) -> object:
+    def _Popen(process: SpawnProcess) -> object:  # type: ignore[override]  # a private part of the standard library
         with _environment(FOR_DRAKE):
             return SpawnProcess._Popen(process)
 
@@ -97,7 +97,7 @@ class Pool:
         self._parts = (scenario, world, robot)
         self._wall_timeout = scenario.simulation.wall_timeout + (0.0 if scenario.oracle is None else MARGIN)
         self._free = list(range(jobs))
-        self._running: dict[Future, Job] = {}
+        self._running: dict[Future[RunResult], Job] = {}
         self._breaks = 0
         self._pool = self._workers()
 
@@ -161,9 +161,10 @@ class Pool:
             self._start_again([])
         return results
 
-    def _result(self, future: Future) -> RunResult | Broken:
+    def _result(self, future: Future[RunResult]) -> RunResult | Broken:
         try:
-            return future.result()
+            result: RunResult = future.result()
+            return result
         except TimeoutError:
             return Broken("timeout", f"took longer than {self._wall_timeout:g} s of wall clock")
         except ProcessExpired as error:
@@ -180,5 +181,6 @@ class Pool:
 
     def close(self) -> None:
         """Kills what runs."""
-        self._pool.stop()
+        # pebble is not typed in full.
+        self._pool.stop()  # type: ignore[no-untyped-call]
         self._pool.join()

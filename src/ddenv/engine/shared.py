@@ -80,9 +80,9 @@ def _is_alike(run: RunFile, other: RunFile) -> bool:
     first, second = ([event.data for event in file.events(most=1)] for file in (run, other))
     if not first or not second:
         return False
-    (first,), (second,) = first, second
-    asked, elements = _asked(first.get("scenario")), first.get("elements")
-    if asked is None or asked != _asked(second.get("scenario")) or elements != second.get("elements"):
+    ours, theirs = first[0], second[0]
+    asked, elements = _asked(ours.get("scenario")), ours.get("elements")
+    if asked is None or asked != _asked(theirs.get("scenario")) or elements != theirs.get("elements"):
         return False
     if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
         return False

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ddenv.engine.judging import end_of, known_failure
 from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.runfile.state import RunState, Test
 from ddenv.world.extent import center, model_bounds
@@ -30,8 +31,11 @@ def traits_of(model: Model) -> Traits:
 
 def _end(state: RunState, run: Test) -> tuple[float, float, float]:
     """Where f ended; of several failures that count as f the one that `run` showed."""
-    ends = [state.baseline.position, *(state.tests[test - 1].end_pose[:3] for test in state.failures[1:])]
-    return ends[0] if run.end_pose is None else min(ends, key=lambda end: math.dist(end, run.end_pose[:3]))
+    ends = [known_failure(state).position, *(end_of(state.tests[test - 1]) for test in state.failures[1:])]
+    if run.end_pose is None:
+        return ends[0]
+    here = end_of(run)
+    return min(ends, key=lambda end: math.dist(end, here))
 
 
 class Sight:
@@ -47,7 +51,7 @@ class Sight:
 
     def evidence(self, state: RunState, test: int, rows: np.ndarray, trials: Sequence[Trial]) -> Evidence:
         """What is known when `test` was the last similar run; `rows` (N, 8) is its trajectory."""
-        run, f = state.tests[test - 1], state.baseline
+        run, f = state.tests[test - 1], known_failure(state)
         return Evidence(
             elements=self._elements,
             positions=self._positions,

@@ -38,7 +38,8 @@ def markdown(report: Report, stem: str) -> str:
         frozenset(range(len(report.figures))),
     )
     lines = [f"# {_name(report.name)}: {_text(report.verdict)}", ""]
-    for block in (*report.lead, figures):
+    opening: tuple[Block, ...] = (*report.lead, figures)
+    for block in opening:
         lines += [*_block(block, stem), ""]
     for section in report.sections:
         lines += _section(section, stem)

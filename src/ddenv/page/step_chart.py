@@ -15,6 +15,8 @@ LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0
 MOST_POINTS = 2000
 
 Steps = list[tuple[float, float]]
+# Where (tests, models) is on the chart, pixels.
+At = Callable[[float, float], tuple[float, float]]
 
 
 def chart(state: RunState) -> str:
@@ -61,7 +63,7 @@ def steps(points: Sequence[tuple[int, int]]) -> Steps:
     return corners
 
 
-def axes(at: Callable[[float, float], tuple[float, float]], last: int, most: int) -> Iterator[str]:
+def axes(at: At, last: int, most: int) -> Iterator[str]:
     """Both axes up to `last` tests and `most` models; `at` gives x and y of a number of tests and of models, pixels."""
     step = max(1.0, tick_step(most, 6))
     for value in ticks(0, most, step):
@@ -78,7 +80,7 @@ def axes(at: Callable[[float, float], tuple[float, float]], last: int, most: int
     yield f'<text class="tick" x="{LEFT - 7:.1f}" y="13" text-anchor="start">models left</text>'
 
 
-def _told(state: RunState, at, last: int, most: int, bounded: bool) -> Iterator[str]:
+def _told(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
     """The number at the end, and what the lower line is."""
     x, y = at(last, len(state.environment))
     yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'

@@ -82,7 +82,8 @@ def _drawn(state: RunState) -> Iterator[tuple[int, str]]:
     """Each node's number with the lines before it. The branch where the run is now goes on without an indent."""
     children: dict[int, list[int]] = {}
     for node in state.nodes[1:]:
-        children.setdefault(node.parent, []).append(node.number)
+        if node.parent is not None:
+            children.setdefault(node.parent, []).append(node.number)
     path = _path(state)
     waiting = [(0, "", "")]
     while waiting:
@@ -97,7 +98,8 @@ def _drawn(state: RunState) -> Iterator[tuple[int, str]]:
 
 def _path(state: RunState) -> frozenset[int]:
     """The current node and all above it; a parent has a smaller number than its child."""
-    found, number = set(), state.node
+    found: set[int] = set()
+    number: int | None = state.node
     while number is not None and number not in found:
         found.add(number)
         number = state.nodes[number].parent
@@ -114,7 +116,7 @@ def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
     return f"{indent}{node.number}", str(len(node.environment)), came, round, str(node.tests), ", ".join(marks)
 
 
-def _cut(rows: list[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:
+def _cut(rows: Sequence[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:
     """The first and the last rows, with what is between them told in the column `words`."""
     if len(rows) <= MOST:
         return tuple(rows)

@@ -64,12 +64,15 @@ def _baseline(state: RunState) -> list[Block]:
         words += f" {count(state.other_failures, 'run')} failed in another way."
     if state.broken_runs:
         words += f" {count(state.broken_runs, 'run')} broke."
-    return [say(words), Picture("interval", interval(base), "The failure rate with its interval."), *_missed(state)]
+    return [
+        say(words),
+        Picture("interval", interval(base), "The failure rate with its interval."),
+        *_missed(state, base),
+    ]
 
 
-def _missed(state: RunState) -> list[Block]:
+def _missed(state: RunState, base: Baseline) -> list[Block]:
     """What the failure rate means for a candidate."""
-    base = state.baseline
     iterations = section(state.scenario, "reduction").get("iterations", 3)
     if base.rate >= 1 or not isinstance(iterations, int):
         return []

@@ -28,7 +28,7 @@ from ddenv.report.result import result
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import Baseline, RunState
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
@@ -107,21 +107,22 @@ def _failure(state: RunState) -> list[Paragraph]:
         seen = count(state.tests_done, "run")
         words = f"The whole world is run first to fix the failure: {seen} ended so far."
         return [*told, say(words)] if state.tests_done else told
-    words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m{_short_of(state)}{_after(state)}."
+    words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m"
+    words += f"{_short_of(state, base)}{_after(state, base)}."
     return [*told, say(words)]
 
 
-def _short_of(state: RunState) -> str:
+def _short_of(state: RunState, base: Baseline) -> str:
     goal = section(state.scenario, "goal")
     x, y = goal.get("x"), goal.get("y")
-    if not all(isinstance(value, (int, float)) for value in (x, y)):
+    if not isinstance(x, (int, float)) or not isinstance(y, (int, float)):
         return ""
-    away = math.dist((x, y), state.baseline.position[:2])
+    away = math.dist((x, y), base.position[:2])
     return f", {away:.1f} m short of the goal at ({x:g}, {y:g})" if math.isfinite(away) else ""
 
 
-def _after(state: RunState) -> str:
-    number = state.baseline.failure_test
+def _after(state: RunState, base: Baseline) -> str:
+    number = base.failure_test
     if not 0 < number <= len(state.tests) or state.failure not in DEEDS:
         return ""
     test = state.tests[number - 1]

@@ -167,10 +167,10 @@ def _places(record: Record) -> tuple[Any, Any, Any]:
 
 
 def _point(place: dict[str, Any]) -> tuple[float, float] | None:
-    values = (place.get("x"), place.get("y"))
-    if not all(isinstance(value, (int, float)) and abs(value) < FAR for value in values):
-        return None
-    return float(values[0]), float(values[1])
+    numbers = [
+        value for value in (place.get("x"), place.get("y")) if isinstance(value, (int, float)) and abs(value) < FAR
+    ]
+    return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
 
 
 def _sort(record: Record, name: str) -> str:
@@ -233,7 +233,7 @@ def _closed(corners: np.ndarray) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in corners) + "Z"
 
 
-def _way(samples: array | None, frame: Frame) -> str:
+def _way(samples: array[float] | None, frame: Frame) -> str:
     """The robot's way, or "" where none is known."""
     if not samples:
         return ""
@@ -247,15 +247,17 @@ def _way(samples: array | None, frame: Frame) -> str:
 def _near(record: Record, frame: Frame, goal: Any, end: Any) -> Iterator[str]:
     """Around the goal where it is reached, and around f's end where a similar run ends, seen from above."""
     scenario = record.state.scenario
-    pairs = ((goal, section(scenario, "goal").get("tolerance", 0.5), "reach"),)
-    pairs += ((end, section(scenario, "failure").get("epsilon", 0.33), "around"),)
+    pairs = [(goal, section(scenario, "goal").get("tolerance", 0.5), "reach")]
+    pairs += [(end, section(scenario, "failure").get("epsilon", 0.33), "around")]
     for point, radius, name in pairs:
         if point is not None and isinstance(radius, (int, float)) and 0 < radius < FAR:
             x, y = frame.pixels(np.array([point]))[0]
             yield f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{min(FAR, radius * frame.scale):.1f}"/>'
 
 
-def _labels(models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence) -> Iterator[str]:
+def _labels(
+    models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence[tuple[float, float]]
+) -> Iterator[str]:
     """Names of the models that are left, the largest first; of a world that is whole, of all."""
     # What was removed is so faint that a name may stand on it.
     seen = [each for each in models if sorts[each.model.name] != "gone"][-MOST_AVOIDED:]

@@ -85,7 +85,8 @@ def _touched(state: RunState) -> dict[str, float]:
 def _stay(record: Record) -> list[Block]:
     """What is no element, and so was always there."""
     elements = frozenset(record.state.elements)
-    others = [model for model in record.world.models if model.name not in elements]
+    models = () if record.world is None else record.world.models
+    others = [model for model in models if model.name not in elements]
     if not others:
         return []
     grounds = [model.name for model in others if is_ground(model)]

@@ -36,8 +36,8 @@ class Record:
     started: float = 0.0
     alive: bool = False
     world: World | None = None
-    original: array | None = None
-    evidence: array | None = None
+    original: array[float] | None = None
+    evidence: array[float] | None = None
     troubles: tuple[str, ...] = ()
     elements: frozenset[str] = frozenset()
     kept: frozenset[str] = frozenset()
@@ -103,7 +103,7 @@ def _world(file: RunFile, troubles: list[str]) -> World | None:
         return None
 
 
-def _path(file: RunFile, test: int | None, troubles: list[str]) -> array | None:
+def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:
     try:
         samples = None if test is None else file.motion(test)
     except UserError as error:

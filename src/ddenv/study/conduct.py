@@ -1,24 +1,183 @@
-"""A study from its beginning to its end: what is there, what is left to do, and when it was worked on."""
+"""A study from start to end: what is left to do, what is shown meanwhile, and when it was worked on."""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import shutil
 import sys
 import time
 from collections.abc import Sequence, Set
 from dataclasses import replace
 from pathlib import Path
+from statistics import mean
 from typing import TextIO
 
+from rich.cells import cell_len, set_cell_size
+
 from ddenv.errors import printable
+from ddenv.runfile.state import RunState
+from ddenv.runs.tests_left import remaining, rough_tests
 from ddenv.study.plan import Cell, Plan, Size, longest_first, sizes
-from ddenv.study.progress import Progress
+from ddenv.study.results import read_cell
 from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.study.study_page import write_study
 from ddenv.study.work import PER_CELL, Work, is_done, made, work
-from ddenv.words import count
+from ddenv.words import count, duration
+
+
+def seconds_left(
+    running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
+) -> float | None:
+    """Until the last cell has ended, s; None where nothing tells."""
+    times = [_of_running(each) for each in running]
+    times += [_of_waiting(cell, (*running, *ended), worlds) for cell in waiting]
+    known = [each for each in times if each is not None]
+    if len(known) < len(times):
+        return None
+    alone = [seconds / each.workers for seconds, each in zip(known, running, strict=False)]
+    return max([sum(known) / jobs, *alone])
+
+
+def _of_running(each: Work) -> float | None:
+    """What one worker would still need, s; None if nothing is known."""
+    left = remaining(each.state, True)
+    if left is not None and left.seconds is not None:
+        return left.seconds[1] * max(1, each.state.jobs)
+    # Full runs at the end, and the check: a handful of tests.
+    return 0.0 if each.check is not None or each.state.confirming else None
+
+
+def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
+    """What one worker would need, s: what other cells of the scenario took, or what such a cell is expected to take."""
+    same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
+    over = [_spent(each.state) for each in same if each.state.status == "finished"]
+    if over:
+        return mean(over)
+    size = worlds[cell.scenario.name]
+    one = [seconds for each in same if (seconds := _of_a_test(each.state)) is not None]
+    if not one:
+        costs = [
+            seconds * size.cost / worlds[each.cell.scenario.name].cost
+            for each in others
+            if (seconds := _of_a_test(each.state)) is not None
+        ]
+        one = [mean(costs)] if costs else []
+    if not one:
+        return None
+    return mean(one) * _expected(cell, size.models)
+
+
+def _expected(cell: Cell, models: int) -> int:
+    asked = cell.scenario.reduction
+    _, likely, _ = rough_tests(models, asked.algorithm, asked.iterations, asked.growth == "paper")
+    return asked.baseline_runs + likely
+
+
+def _spent(state: RunState) -> float:
+    """What a cell's tests took, s, one after another; those taken over from another cell cost nothing."""
+    return sum(test.wall_seconds for test in state.finished_tests if not test.taken)
+
+
+def _of_a_test(state: RunState) -> float | None:
+    tests = [test.wall_seconds for test in state.finished_tests]
+    return mean(tests) if tests else None
+
+
+# What is left takes a while to find, s.
+LOOK_PERIOD = 2.0
+# To the beginning of the line, and nothing on it any more.
+CLEAR = "\r\x1b[K"
+# Logs and pipes get a line on what happens now so often, s.
+QUIET = 60.0
+# Less than this is not told of what is left, s.
+LEAST = 5.0
+
+
+class Progress:
+    """Tells of the study `plan` in `folder`, of which so many cells were `done` before; `jobs` workers make it."""
+
+    def __init__(self, plan: Plan, folder: Path, done: int, worlds: dict[str, Size], jobs: int, out: TextIO) -> None:
+        self._in_all, self._before = len(plan.cells), done
+        self._folder, self._seeds = folder, plan.seeds
+        self._worlds, self._jobs = worlds, jobs
+        self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
+        self._told = 0
+        self._next_look = 0.0
+        self._next_line = time.monotonic() + QUIET
+        self._left: float | None = None
+
+    def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
+        """Tells what is new."""
+        for each in ended[self._told :]:
+            self._told += 1
+            seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
+            self._say(f"{self._done}  {each.cell.label}{seed}: {self._ending(each)}")
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._left = seconds_left(running, waiting, ended, self._worlds, self._jobs) if running else None
+            self._next_look = now + LOOK_PERIOD
+        if self._live:
+            line = self._now(running, shutil.get_terminal_size().columns - 1)
+            print(f"{CLEAR}{printable(line)}", end="", file=self._out, flush=True)
+        elif now >= self._next_line and running:
+            self._next_line = now + QUIET
+            self._say(self._now(running))
+
+    @property
+    def _done(self) -> str:
+        return f"{self._before + self._told}/{self._in_all}"
+
+    def close(self) -> None:
+        """Takes the last line away."""
+        if self._live:
+            # The terminal may be what is gone.
+            with contextlib.suppress(OSError):
+                print(CLEAR, end="", file=self._out, flush=True)
+
+    def _say(self, line: str) -> None:
+        print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
+
+    def _now(self, running: Sequence[Work], columns: int = 200) -> str:
+        """What happens, as fully as there is room."""
+        left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
+        for said in (_fully, _short):
+            line = " · ".join((f"{self._done}{left}", *map(said, running)))
+            if cell_len(line) <= columns:
+                break
+        return set_cell_size(line, columns).rstrip() if running else ""
+
+    def _ending(self, each: Work) -> str:
+        """How a cell ended, in one line."""
+        if each.problem:
+            return each.problem
+        found = read_cell(self._folder, each.cell)
+        if found.baseline is None:
+            return found.problem
+        sizes = f"{len(found.elements)} → {count(len(found.left), 'model')}"
+        doubt = f"; {'' if found.minimal else 'not minimal: '}{found.trouble}" if found.trouble else ""
+        return f"{sizes}, {count(found.tests, 'test')}, {duration(each.state.working_seconds)}{doubt}"
+
+
+def _fully(each: Work) -> str:
+    return f"{each.cell.label}: {_doing(each)}"
+
+
+def _short(each: Work) -> str:
+    return f"{each.cell.scenario.name}: {_doing(each)}"
+
+
+def _doing(each: Work) -> str:
+    state = each.state
+    if each.check is not None:
+        return "leaving each out once more"
+    if state.baseline is None:
+        return f"{state.tests_done} of {each.cell.scenario.reduction.baseline_runs} baseline runs"
+    return f"{len(state.environment)} of {len(state.elements)} models, {state.tests_done} tests"
+
 
 # How often it is written how long the study took so far, s.
-PERIOD = 10.0
+WRITE_PERIOD = 10.0
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
@@ -66,7 +225,7 @@ def _make(plan: Plan, done: Set[str], folder: Path, jobs: int, worlds: dict[str,
         cells[:] = (*running, *ended)
         progress.look(running, waiting, ended)
         # Now and then: a study that is killed has lost the time since.
-        if time.monotonic() > written + PERIOD:
+        if time.monotonic() > written + WRITE_PERIOD:
             written = time.monotonic()
             write()
 

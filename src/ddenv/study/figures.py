@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.page.blocks import Block, Name, Part, Picture, plain, say
-from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, axes, steps
+from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.results import Found
@@ -51,12 +51,12 @@ def _looks(group: Group) -> tuple[list[Row], list[Row]]:
     if len(rows) <= len(WIDTHS):
         return rows, []
     first = [row for row in rows if theirs(row.found[0].cell) is not None]
-    best = sorted((row for row in rows if row not in first), key=lambda row: row.tests)
+    best = sorted((row for row in rows if row not in first), key=lambda row: row.tests or 0.0)
     named = [*first, *best][: len(WIDTHS)]
     return named, [row for row in rows if row not in named]
 
 
-def _lines(row: Row, at, look: str, width: float | None = None) -> Iterator[str]:
+def _lines(row: Row, at: At, look: str, width: float | None = None) -> Iterator[str]:
     wide = "" if width is None else f' stroke-width="{width:g}"'
     for each in row.minimal:
         corners = [at(*corner) for corner in steps(each.sizes)]

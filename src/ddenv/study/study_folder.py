@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.lock import held
@@ -77,11 +78,15 @@ def sittings(folder: Path) -> tuple[Sitting, ...]:
         raise UserError(f"{path}: makes no sense; delete it (the runs beside it are not touched)") from None
 
 
-def _sitting(data: dict) -> Sitting:
-    numbers = {key: float(data[key]) for key in ("begun", "seconds")}
-    whole = {key: int(data[key]) for key in ("jobs", "tests")}
-    words = {key: str(data[key]) for key in ("versions", "machine")}
-    return Sitting(**numbers, **whole, **words)
+def _sitting(data: dict[str, Any]) -> Sitting:
+    return Sitting(
+        begun=float(data["begun"]),
+        seconds=float(data["seconds"]),
+        jobs=int(data["jobs"]),
+        tests=int(data["tests"]),
+        versions=str(data["versions"]),
+        machine=str(data["machine"]),
+    )
 
 
 def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:

@@ -11,13 +11,12 @@ from statistics import mean
 from ddenv.page.blocks import Paragraph, Report, duration, percent, say, thousands
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
-from ddenv.study.best import best
 from ddenv.study.how_made import making
 from ddenv.study.plan import Plan
 from ddenv.study.results import Found, read_cell
 from ddenv.study.rows import groups, least_of, least_to_find, least_to_show, theirs
 from ddenv.study.study_folder import Sitting, run_path
-from ddenv.study.tables import section
+from ddenv.study.tables import best, section
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
@@ -136,7 +135,7 @@ def table(folder: Path, found: Sequence[Found]) -> str:
 def _row(folder: Path, each: Found) -> tuple[object, ...]:
     cell, base, check, paper = each.cell, each.baseline, each.check, theirs(each.cell)
     used = dict(zip(("partitioning", "prioritization"), cell.method.parts, strict=True))
-    of_check = ("", "", "", "")
+    of_check: tuple[object, ...] = ("", "", "", "")
     if check is not None:
         without = check.runs * len(check.without), sum(check.without.values())
         of_check = (check.runs, check.shown, *without)

@@ -18,9 +18,8 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
-from ddenv.study.check import read_check, start_check, write_check
 from ddenv.study.plan import Cell
-from ddenv.study.results import difference
+from ddenv.study.results import difference, read_check, start_check, write_check
 from ddenv.study.study_folder import check_path, run_path
 
 POLL = 0.2
@@ -41,8 +40,8 @@ class Work:
     workers: int
     file: RunFile
     state: RunState = field(default_factory=RunState)
-    engine: subprocess.Popen | None = None
-    check: tuple[subprocess.Popen, IO[str]] | None = None
+    engine: subprocess.Popen[bytes] | None = None
+    check: tuple[subprocess.Popen[bytes], IO[str]] | None = None
     problem: str = ""
     made_before: int = 0
     known: int = 0
@@ -75,7 +74,9 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
     `look(running, waiting, ended)` is called several times a second. On KeyboardInterrupt the engines are stopped, and it
     is raised again. Raises UserError where a run file cannot be made; the engines are stopped then, too.
     """
-    waiting, running, ended = list(cells), [], []
+    waiting = list(cells)
+    running: list[Work] = []
+    ended: list[Work] = []
     # What is ignored stays so: a study under nohup outlives its terminal.
     asked = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN]
     before = [(each, signal.signal(each, _interrupt)) for each in asked]
@@ -100,8 +101,8 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
             look(running, waiting, ended)
         for each in running:
             each.file.close()
-        for each, handler in before:
-            signal.signal(each, handler)
+        for number, handler in before:
+            signal.signal(number, handler)
 
 
 def _interrupt(*_: object) -> None:
@@ -131,7 +132,7 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
 def _has_ended(folder: Path, each: Work) -> bool:
     """Takes in what is new of a cell, and goes on to its check when its reduction has ended."""
     if each.check is not None:
-        return _check_has_ended(folder, each)
+        return _check_has_ended(folder, each, *each.check)
     # Asked before the events are read: what is written in between is not missed. An engine that a killed study has left may have
     # begun just before ours, which then gave up.
     at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
@@ -149,8 +150,7 @@ def _has_ended(folder: Path, each: Work) -> bool:
     return False
 
 
-def _check_has_ended(folder: Path, each: Work) -> bool:
-    program, told = each.check
+def _check_has_ended(folder: Path, each: Work, program: subprocess.Popen[bytes], told: IO[str]) -> bool:
     if program.poll() is None:
         return False
     try:
