@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from ddenv.cli.wrapping import wrapped
 from ddenv.errors import printable
-from ddenv.schemas import Kind, explanation, names
+
+if TYPE_CHECKING:
+    from ddenv.schemas import Kind
 
 KINDS: tuple[Kind, ...] = ("partitioning", "prioritization", "algorithm")
 TITLES: dict[Kind, str] = {
@@ -21,12 +24,16 @@ TITLES: dict[Kind, str] = {
 
 
 def report() -> dict[str, dict[str, str]]:
-    """What `--json` prints: of each kind, the explanations by name."""
+    """The object that `--json` prints: the explanations of each kind by name."""
+    from ddenv.schemas import explanation, names
+
     return {f"{kind}s": {name: explanation(kind, name) for name in names(kind)} for kind in KINDS}
 
 
 def lines(columns: int | None = None) -> list[str]:
     """A paragraph for each, no line wider than `columns`; each is one line if that is None."""
+    from ddenv.schemas import explanation, names
+
     said: list[str] = []
     for kind in KINDS:
         said += ["", *wrapped(TITLES[kind], columns)] if said else wrapped(TITLES[kind], columns)
