@@ -78,7 +78,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         journal.record("engine_failed", reason=str(error))
         raise
     except Exception as error:
-        # A mistake of ours: the traceback goes to the log, and whoever watches is told.
+        # A mistake of ours: the traceback goes to the log, and views show the reason.
         journal.record(
             "engine_failed", reason=f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
         )

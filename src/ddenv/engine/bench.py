@@ -192,7 +192,7 @@ class Bench:
         self._journal.record("test_finished", motions, test=test, **data | noticed)
 
     def _counted(self) -> tuple[Failure, ...]:
-        """f, and what the user took for as good."""
+        """f, and the other failures that the user accepted."""
         state = self._journal.state
         if self._failed != state.failures:
             spec = FailureSpec.model_validate(state.scenario["failure"])

@@ -25,7 +25,7 @@ class Confirmation:
         self._tried = tried
         self._runs = range(1 + iterations)
         self._enough = enough
-        # Without so many of `tried` f does not show.
+        # This many of `tried`, from the first on, are known to be needed.
         self._sure = 0
 
     def wanted(self) -> Wanted:

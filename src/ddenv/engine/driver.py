@@ -44,13 +44,13 @@ class Driver:
         self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
         self._pinned: Keep = frozenset()
-        # How many candidates of the round have their verdict, and were without f; as of so many refusals.
+        # How many candidates of the round were judged as dissimilar, and how many refusals there were then.
         self._judged = 0
         self._refusals = 0
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
-        # Unknown names are told before a robot has run.
+        # Unknown names are refused before a robot runs.
         self._begin(self._reduction, self._journal.state.elements)
         reason = self._baseline()
         if reason:
@@ -261,7 +261,7 @@ class Driver:
         return standing(open_ones, similar, self._reduction.iterations, refused, first=self._judged, enough=ENOUGH)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
-        """Tells verdicts in the order of candidates: what was run ahead of time is told when its turn has come."""
+        """Records verdicts in the order of candidates: what was run ahead of time has to wait for its turn."""
         for verdict in verdicts:
             if not verdict:
                 return

@@ -22,7 +22,7 @@ def trajectory_of(rows: np.ndarray) -> np.ndarray:
 
 
 def traits_of(model: Model) -> Traits:
-    """What the learner is told of a model: of several surfaces the most slippery one counts."""
+    """What the learner knows about a model. Of several surfaces the most slippery one counts."""
     box = model_bounds(model)
     size = 0.0 if box is None else float((box[1] - box[0]).max())
     friction = min((collision.mu for collision in model.collisions), default=1.0)

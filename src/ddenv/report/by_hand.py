@@ -9,9 +9,9 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.state import Node, RunState, Trial
 from ddenv.words import count
 
-# Of more decisions, trials or nodes, the first and the last ones are told.
+# Longer tables of decisions, trials or nodes show only the first and the last rows.
 MOST = 120
-# A path without branches is told in one line, with so many steps at most.
+# The maximum number of steps in the line about a history without branches.
 MOST_STEPS = 40
 HOW = {"start": "", "reduced": "", "adopted": "adopted by hand", "accepted": "another failure, accepted by hand"}
 

@@ -99,9 +99,9 @@ LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
 CORNERS = 32
 # At least so much of the world is drawn along each axis, of a close-up, and how many times larger that has to be, m.
 LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
-# So many names are told, and so many of the models drawn last are not hidden by them.
+# The maximum number of labels, their length, and how many of the models drawn last they must not hide.
 MOST_LABELS, LONGEST_LABEL, MOST_AVOIDED = 24, 26, 1000
-# A way is drawn with so many points at most.
+# The maximum number of points on a path.
 MOST_POINTS = 500
 # With more polygons in all, each model is drawn as one outline around it.
 MOST_POLYGONS = 20_000

@@ -14,7 +14,7 @@ from ddenv.world.model import is_ground
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
-# A table of more models is not read by anyone; so many names of others are told.
+# Nobody reads a table of more models than this; and the maximum number of names listed for others.
 MOST_MODELS, MOST_NAMES = 200, 12
 
 

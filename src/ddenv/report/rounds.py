@@ -12,7 +12,7 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.state import Candidate, Round, RunState
 from ddenv.words import count
 
-# A longer table keeps so many rounds, first of all those that reduced; the others are summed up.
+# The maximum number of rounds in the table, first of all those that reduced; the others are summed up.
 MOST_ROUNDS = 60
 
 

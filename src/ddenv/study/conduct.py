@@ -90,12 +90,12 @@ LOOK_PERIOD = 2.0
 CLEAR = "\r\x1b[K"
 # Logs and pipes get a line on what happens now so often, s.
 QUIET = 60.0
-# Less than this is not told of what is left, s.
+# A shorter time left is not shown, s.
 LEAST = 5.0
 
 
 class Progress:
-    """Tells of the study `plan` in `folder`, of which so many cells were `done` before; `jobs` workers make it."""
+    """Shows how far the study `plan` in `folder` is. `done` cells were finished before; `jobs` workers run tests."""
 
     def __init__(self, plan: Plan, folder: Path, done: int, worlds: dict[str, Size], jobs: int, out: TextIO) -> None:
         self._in_all, self._before = len(plan.cells), done

@@ -88,7 +88,7 @@ def _line_end(row: Row) -> str:
     return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}"
 
 
-# So many worlds of a scenario are drawn, and so many of their models named.
+# The maximum number of worlds drawn for a scenario, and of models named for each.
 MOST_WORLDS, MOST_NAMES = 4, 12
 
 

@@ -93,7 +93,7 @@ def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
 
 
 def _computed(found: Sequence[Found]) -> list[Block]:
-    """Several versions in one study are told: their tests may differ."""
+    """Names the versions: tests of several versions may differ."""
     drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
     told = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
     taken = sum(each.taken for each in found)

@@ -80,7 +80,7 @@ def file_name(scenario: Scenario) -> str:
 
 @dataclass(frozen=True)
 class Plan:
-    """A whole study: `scenarios` as they are in their files, `methods` in the order of the tables, so many `seeds` each."""
+    """A whole study: `scenarios` as in their files, `methods` in the order of the tables, and how many `seeds` of each."""
 
     scenarios: tuple[Scenario, ...]
     methods: tuple[Method, ...]

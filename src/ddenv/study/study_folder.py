@@ -29,7 +29,7 @@ LONGEST_NAME = 120
 
 @dataclass(frozen=True, slots=True)
 class Sitting:
-    """One time that the study was worked on. `begun` is Unix time, s; it took `seconds` so far, and made so many `tests`."""
+    """One time that the study was worked on. `begun` is Unix time, s; `seconds` and `tests` are what it took so far."""
 
     begun: float
     seconds: float

@@ -1,4 +1,4 @@
-"""Makes the cells of a study: so many at the same time, each by an engine of its own, and goes on with what is there."""
+"""Runs the cells of a study, several at the same time, each with its own engine; goes on with run files that exist."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ddenv.study.results import difference, read_check, start_check, write_check
 from ddenv.study.study_folder import check_path, run_path
 
 POLL = 0.2
-# More workers than this mostly run ahead of one reduction in vain.
+# More workers than this mostly make tests that one reduction does not need.
 PER_CELL = 2
 
 
