@@ -23,6 +23,7 @@ from unittest.mock import patch
 from textual.pilot import Pilot
 from textual.widgets import Select
 
+from ddenv.guiding.selections import nearest_other
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
@@ -31,7 +32,6 @@ from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.guiding import nearest_other
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.world.load import SDF, find_scenario, load_scenario
 

@@ -271,7 +271,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("unpin", {"models": [0]}, "not pinned"),
         ("try", {"models": list(range(6))}, "as it is"),
         ("try", {"models": [True]}, "no such models"),
-        ("adopt", {"trial": 1}, "no such trial"),
+        ("adopt", {"trial": 1}, "no such try"),
         ("accept_other", {"test": 1}, "did not end in another failure"),
         ("accept_other", {"test": -1}, "no such test"),
         ("undo", {}, "no reduction"),

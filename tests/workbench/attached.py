@@ -25,14 +25,14 @@ class Session:
         for key in keys:
             await self.pilot.press(key)
         await self.pilot.pause()
-        await eventually(lambda: not (self.app.is_running and self.screen.sending))
+        await eventually(lambda: not (self.app.is_running and self.screen.asking.sending))
 
     async def look(self):
         """Lets the screen see what was written, without waiting for its clock."""
         self.screen.poll._looked = self.screen.poll._posed = -1e9
-        self.screen._look()
+        self.screen.following.look()
         while self.screen.poll.catching_up:
-            self.screen._look()
+            self.screen.following.look()
         await self.pilot.pause()
         assert not self.screen.snapshot.error or "nonsense" in self.screen.snapshot.error
 

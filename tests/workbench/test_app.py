@@ -54,7 +54,7 @@ async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs)
         await pilot.pause()
         shortcuts = commands(pilot.app.screen)
         assert all(shortcut.words for shortcut in shortcuts)
-        assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.veto", "app.leave"}
+        assert {shortcut.id for shortcut in shortcuts} >= {"run.pause", "run.pin", "app.leave"}
         await offers(pilot, "choose the colours", "choose the colours")
         await offers(pilot, "box_1", "go to [bold]box_1[/] on the map\n")
 

@@ -8,15 +8,17 @@ import pytest
 from attached import Attached, starts
 from textual.widgets import Input, Select
 
-from ddenv.errors import UserError
+from ddenv.guiding.commands import data_of
+from ddenv.guiding.offers import Pointed, offer
+from ddenv.guiding.situation import Situation
 from ddenv.runfile.fold import fold
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.shortcuts import commands
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run import guiding
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels
-from ddenv.workbench.run.poll import Poll, Snapshot
-from ddenv.workbench.run.run_keys import footer_words
+from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.widgets.question import Question
 
 
@@ -98,7 +100,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
             ("try", {"models": [0, 4]}),
             ("try", {"models": [1, 2, 3]}),
         ]
-        assert "try 4: 2 models, without crate_01, crate_02 and 1 more" in session.said()
+        assert "try 4: 2 models, only crate_00, crate_04" in session.said()
         world.clear_selection()
         await session.press("2", "w")
         await session.press("tab", "down", "tab", "enter")
@@ -147,10 +149,9 @@ async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
     fake_run.guided(run).hold()
     async with Attached(run) as session:
         await session.press("c", "ctrl+s")
-        assert "nothing was changed" in session.said()
-        await session.press("c")
         dialog = session.app.screen
         assert isinstance(dialog, Change)
+        assert "that is how it is set already" in session.dialog()
         dialog.query_one("#budget", Input).value = "3"
         await session.press("ctrl+s")
         assert "budget: 15 tests are made already" in session.dialog()
@@ -195,28 +196,52 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
 @pytest.mark.parametrize(
     ("make", "shown"),
     [
-        (fake_run.waiting, {"pause", "accept", "reject", "veto", "try without", "try only"}),
+        (fake_run.waiting, {"pause", "accept", "reject", "try without", "try only"}),
         (fake_run.mid_round, {"pause", "step", "veto", "try without", "try only", "undo"}),
         (fake_run.finished, {"try without", "try only", "undo"}),
     ],
 )
-def test_the_footer_offers_what_can_be_done_now(run, make, shown):
-    make(run)
-    words = footer_words(Snapshot(fold(run.file.events()), engine="alive"), None, follows=True)
-    assert {each for each in words.values() if each} == shown
+async def test_the_footer_offers_what_can_be_done_now(run, make, shown):
+    make(run).hold()
+    async with Attached(run, (200, 60)) as session:
+        footer = {key.words for key in session.screen.query_one(KeyFooter).entries}
+        assert footer - {"pin", "history", "settings", "export", "help", "quit", *MORE} == shown
+
+
+MORE = {"find", "layers", "copy", "scene", "runs"}
+
+
+async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
+    fake_run.mid_round(run).hold()
+    async with Attached(run) as session:
+        screen = session.screen
+
+        def enabled():
+            return {each.binding.id for each in screen.active_bindings.values() if each.enabled}
+
+        def offered():
+            return {each.id for each in commands(screen)}
+
+        assert not {"run.accept", "run.reject", "run.resume"} & enabled()
+        assert not {"run.accept", "run.reject", "run.resume"} & offered()
+        await session.press("x", "r")
+        assert "nothing waits for reject" in session.said()
+        assert session.asked() == []
+        run.similar(1)
+        run.write("waiting", candidate=1)
+        await session.look()
+        assert {"run.accept", "run.reject"} <= enabled() & offered()
+        assert not {"run.step", "run.step_round"} & offered()
 
 
 def test_a_in_the_footer_says_what_it_would_take(run):
     fake_run.guided(run)
-    run.judge_trial(3, "similar", [15])
+    run.finish(17, "similar", 0.1, failure="stuck")
+    run.judge_trial(3, "similar", [17])
     run.write("unpinned", models=[0])
-    now = Snapshot(fold(run.file.events()), engine="alive")
-    adopted, vain, similar = now.state.trials
-    assert [footer_words(now, row, False)["run.accept"] for row in (adopted, vain, similar)] == [
-        "",
-        "take as f",
-        "adopt",
-    ]
+    now = Situation(state_of(run))
+    words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
+    assert words == ["", "take as f", "adopt"]
 
 
 async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
@@ -265,7 +290,7 @@ async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
     async with Attached(run) as session:
         run.let_go()
         run.path.unlink()
-        session.screen._look()
+        session.screen.following.look()
         await session.pilot.pause()
         assert "was deleted while it was open" in " ".join(session.text("#happening").split())
         await session.press("v", "u")
@@ -277,26 +302,29 @@ async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
 # Without a screen: what keys mean for a run.
 
 
-def refusal(make, *arguments):
-    with pytest.raises(UserError) as error:
-        make(*arguments)
-    return str(error.value)
+def why_not(action, state, row=None, models=()):
+    return offer(action, Situation(state), Pointed(row, models=tuple(models))).why_not
+
+
+def meant(action, state, row=None, models=()):
+    command = offer(action, Situation(state), Pointed(row, models=tuple(models))).command
+    return command.kind, data_of(command)
 
 
 def test_what_a_means_for_a_try(run):
     fake_run.guided(run)
     state = state_of(run)
     adopted, vain, under_way = state.trials
-    assert "is the environment already" in refusal(guiding.accept, state, adopted)
-    assert guiding.accept(state, vain).kind == "accept_other"
-    assert "try 3 is not judged yet" in refusal(guiding.accept, state, under_way)
+    assert "is the environment already" in why_not("accept", state, adopted)
+    assert meant("accept", state, vain)[0] == "accept_other"
+    assert "try 3 is not judged yet" in why_not("accept", state, under_way)
+    run.finish(*under_way.tests, "similar", 0.1, failure="stuck")
     run.judge_trial(3, "similar", list(under_way.tests))
     state = state_of(run)
-    assert "without crate_00, which is pinned" in refusal(guiding.accept, state, state.trials[2])
+    assert "without crate_00, which is pinned" in why_not("accept", state, state.trials[2])
     run.write("unpinned", models=[0])
     state = state_of(run)
-    ask = guiding.accept(state, state.trials[2])
-    assert (ask.kind, ask.data, ask.question) == ("adopt", {"trial": 3}, "")
+    assert meant("accept", state, state.trials[2]) == ("adopt", {"trial": 3})
 
 
 def test_the_nearest_other_failure_is_the_one_to_accept(run):
@@ -304,35 +332,46 @@ def test_the_nearest_other_failure_is_the_one_to_accept(run):
     run.start_round(2)
     tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
     state = state_of(run)
-    assert guiding.accept(state, state.round.candidates[0]).data == {"test": tests[1]}
+    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1]})
+
+
+def test_what_the_cursor_only_follows_is_not_accepted(run):
+    run.created().baseline()
+    run.start_round(2)
+    run.test(0, "other", 2.0, 0, "tipped over")
+    state = state_of(run)
+    followed = Pointed(state.round.candidates[0], follows=True)
+    assert "nothing waits" in offer("accept", Situation(state), followed).why_not
+    run.write("paused")
+    assert offer("accept", Situation(state_of(run)), followed).words == "take as f"
 
 
 def test_models_that_cannot_be_pinned_or_tried(run):
     fake_run.guided(run)
     state = state_of(run)
-    assert "floor is protected" in refusal(guiding.pin, state, ["floor"])
-    assert "crate_09 is removed already" in refusal(guiding.pin, state, ["crate_09"])
-    assert "nothing to leave out" in refusal(guiding.try_without, state, ["crate_09"])
-    assert "that is no change" in refusal(guiding.try_only, state, state.environment)
-    assert guiding.try_only(state, ["crate_09", "crate_01"]).data == {"models": [1, 9]}
-    assert guiding.try_without(state, state.environment).data == {"models": []}
+    assert "floor is protected" in why_not("pin", state, models=["floor"])
+    assert "crate_09 is removed already" in why_not("pin", state, models=["crate_09"])
+    assert "nothing is left out" in why_not("without", state, models=["crate_09"])
+    assert "nothing is left out" in why_not("only", state, models=state.environment)
+    assert meant("only", state, models=["crate_09", "crate_01"]) == ("try", {"models": [1, 9]})
+    assert meant("without", state, models=state.environment) == ("try", {"models": []})
 
 
 def test_before_f_is_known_nothing_is_tried_or_undone(run):
     run.created()
     state = state_of(run)
-    assert "the baseline comes first" in refusal(guiding.try_only, state, ["crate_01"])
-    assert "no reduction to take back" in refusal(guiding.undo, state)
-    assert guiding.pin(state, ["crate_01"]).data == {"models": [1]}
-    assert "no candidates yet" in refusal(guiding.veto, state, None)
+    assert "the baseline comes first" in why_not("only", state, models=["crate_01"])
+    assert "no reduction to take back" in why_not("undo", state)
+    assert meant("pin", state, models=["crate_01"]) == ("pin", {"models": [1]})
+    assert "no candidates yet" in why_not("veto", state)
 
 
 def test_a_round_that_is_over_cannot_be_vetoed(run):
     state = state_of(fake_run.confirming(run))
-    assert refusal(guiding.veto, state, None) == "the rounds are over"
+    assert why_not("veto", state) == "the rounds are over"
     run.write("finished", minimal=True, reason="no candidate showed f")
     state = state_of(run)
-    assert refusal(guiding.veto, state, state.round.candidates[0]) == "this round is over"
+    assert why_not("veto", state, state.round.candidates[0]) == "this round is over"
 
 
 # Holds a run file open as an engine does, in a process of its own.

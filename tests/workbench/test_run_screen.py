@@ -19,10 +19,8 @@ from ddenv.workbench.history.history_screen import History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
-from ddenv.workbench.run.choose import ChooseModels
-from ddenv.workbench.run.copying import Copy
+from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, ssh_line
-from ddenv.workbench.run.layers import Layers
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import SchemaSelect
@@ -149,9 +147,9 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
         await session.pilot.click("#pane-chart")
         assert session.screen.query_one("#chart").is_on_screen
         await session.press("v")
-        assert "2 shows it" in session.said()
+        assert "2 shows the table" in session.said()
         footer = [key.words for key in session.screen.query_one(KeyFooter).entries]
-        assert footer == ["pause", "step", "veto", "pin", "try without", "undo", "history", "help", "quit"]
+        assert footer == ["pause", "step", "pin", "try without", "undo", "history", "export", "help", "quit"]
         await session.pilot.resize_terminal(200, 60)
         await session.pilot.pause()
         more = ("#models", "#decisions", *panes)

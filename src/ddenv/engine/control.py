@@ -1,18 +1,30 @@
-"""What the user asked of a running engine: pause, steps, vetoes, accepts. It reads the run file's commands."""
+"""Obeys what the user asks of a running engine: each command becomes an event, or the reason why it cannot."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from ddenv.engine.journal import Journal
-from ddenv.engine.steering import STEERING, Steering
+from ddenv.engine.judging import failure_of, rejudged
+from ddenv.errors import UserError
+from ddenv.guiding.commands import Command, parse, refusal
+from ddenv.guiding.course import Change, GoBack, Undo
+from ddenv.guiding.pace import AcceptMode, Pause, Resume, Step, Stop
+from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
+from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.situation import Situation, label_of, names_of, numbers_of
+from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.store import Event
+from ddenv.world.scenario import FailureSpec
 
 # Several decisions in a row make one new search of it, s.
 SETTLE = 0.5
+# What was meant for an engine that is gone must not hold the next one.
+OF_THE_MOMENT = (Stop, Pause, Step, AcceptMode)
 
 
 class Stopped(Exception):
@@ -26,9 +38,8 @@ class Steered(Exception):
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `credit` is how many tests may still start before a pause, None for any number. A command that makes no sense any more
-    (a veto of a judged candidate, an accept of nothing) is refused with the reason. `terminated` is set by a signal,
-    `since` is when this engine was asked to start (Unix time, s).
+    `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `since` is
+    when this engine was asked to start (Unix time, s).
     """
 
     def __init__(self, journal: Journal, terminated: threading.Event, since: float = math.inf) -> None:
@@ -39,15 +50,14 @@ class Control:
         self._pause_after_round = False
         self._searches = False
         self._last = -math.inf
-        self._steering = Steering(journal)
-        self._forget_old_stops(since)
+        self._catch_up(since)
 
-    def _forget_old_stops(self, since: float) -> None:
-        """What was meant for the ways of an engine that is gone must not hold this one; what it was told of candidates counts."""
+    def _catch_up(self, since: float) -> None:
+        """Obeys what was asked for before this engine was."""
         for command in self._journal.file.commands(self._journal.state.last_command):
             if command.time >= since:
                 return
-            if command.kind in ("stop", "pause", "step", "accept_mode"):
+            if command.kind in [each.kind for each in OF_THE_MOMENT]:
                 self._handled(command)
             else:
                 self._obey(command)
@@ -59,7 +69,7 @@ class Control:
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
-            if command.kind == "accept":
+            if command.kind == Accept.kind:
                 # The reduction is made before anything else is decided.
                 return
 
@@ -100,50 +110,51 @@ class Control:
         if self._pause_after_round:
             self._pause()
 
-    def _obey(self, command: Event) -> None:
+    def _obey(self, event: Event) -> None:
         """Once, whenever the engine is killed: the event that it becomes says which command it was."""
-        self._journal.command = command.id
+        self._journal.command = event.id
         try:
-            if why := self._try(command):
+            if why := self._why_not(event):
                 self._journal.record("command_refused", why=why)
         finally:
             # A stop leaves by an exception, and must not be met again.
             self._journal.command = None
-            if self._journal.state.last_command < command.id:
-                self._handled(command)
+            if self._journal.state.last_command < event.id:
+                self._handled(event)
 
-    def _try(self, command: Event) -> str:
-        if command.kind in STEERING:
-            why = STEERING[command.kind](self._steering, command.data)
-            if command.kind == "go_back" and not why and not self._paused:
-                self._pause()
-            return why
-        obey = getattr(self, f"_obey_{command.kind}", None)
-        return f"there is no command '{command.kind[:40]}'" if obey is None else obey(command.data) or ""
+    def _why_not(self, event: Event) -> str:
+        """Obeys a command, or returns why it is not possible now."""
+        try:
+            command = parse(event.kind, event.data)
+        except UserError as error:
+            return str(error)
+        journal = self._journal
+        now = Situation(journal.state, search_due=journal.steered, models_of=journal.keep_of_test)
+        why = refusal(command, now)
+        if not why:
+            _OBEYED[type(command)](self, command)
+        return why
 
-    def _handled(self, command: Event) -> None:
-        self._journal.record("command_handled", command=command.id)
+    def _handled(self, event: Event) -> None:
+        self._journal.record("command_handled", command=event.id)
 
-    def _obey_pause(self, _: dict[str, Any]) -> None:
+    # How fast.
+
+    def _obey_pause(self, _: Pause) -> None:
         if not self._paused:
             self._pause()
 
-    def _obey_resume(self, _: dict[str, Any]) -> None:
+    def _obey_resume(self, _: Resume) -> None:
         self._run(credit=None, pause_after_round=False)
 
-    def _obey_step(self, data: dict[str, Any]) -> None:
-        if data.get("unit") == "round":
-            self._run(credit=None, pause_after_round=True)
-        else:
-            self._run(credit=1, pause_after_round=False)
+    def _obey_step(self, step: Step) -> None:
+        whole_round = step.unit == "round"
+        self._run(credit=None if whole_round else 1, pause_after_round=whole_round)
 
-    def _obey_accept_mode(self, data: dict[str, Any]) -> str:
-        if data.get("mode") not in ("automatic", "ask"):
-            return "the accept mode is automatic or ask"
-        self._journal.record("accept_mode", mode=data["mode"])
-        return ""
+    def _obey_accept_mode(self, asked: AcceptMode) -> None:
+        self._journal.record("accept_mode", mode=asked.mode)
 
-    def _obey_stop(self, _: dict[str, Any]) -> None:
+    def _obey_stop(self, _: Stop) -> None:
         raise Stopped("stopped by the user")
 
     def _run(self, credit: int | None, pause_after_round: bool) -> None:
@@ -155,3 +166,97 @@ class Control:
     def _pause(self) -> None:
         self._paused, self._credit, self._pause_after_round = True, None, False
         self._journal.record("paused")
+
+    # Candidates.
+
+    def _decide(self, asked: Accept | Reject) -> None:
+        self._journal.record("decided", round=asked.round, candidate=asked.candidate, decision=asked.kind)
+
+    def _veto(self, asked: Veto) -> None:
+        self._journal.record("vetoed", round=asked.round, candidate=asked.candidate, verdict="vetoed")
+
+    def _unveto(self, asked: Unveto) -> None:
+        self._journal.record("unvetoed", round=asked.round, candidate=asked.candidate)
+
+    # Models.
+
+    def _pin(self, asked: Pin) -> None:
+        self._journal.record("pinned", models=self._numbers(asked.new(self._journal.state)))
+
+    def _unpin(self, asked: Unpin) -> None:
+        self._journal.record("unpinned", models=self._numbers(asked.pinned(self._journal.state)))
+
+    def _try(self, asked: Try) -> None:
+        state = self._journal.state
+        models = numbers_of(state, names_of(state, asked.models, empty=True) or ())
+        self._journal.record("trial_started", trial=len(state.trials) + 1, models=list(models))
+
+    def _adopt(self, asked: Adopt) -> None:
+        trial = self._journal.state.trials[asked.trial - 1]
+        environment = self._numbers(trial.models)
+        self._journal.record("adopted", trial=asked.trial, environment=environment, evidence_test=trial.tests[-1])
+
+    def _accept_other(self, asked: AcceptOther) -> None:
+        journal, state = self._journal, self._journal.state
+        test, keep = state.tests[asked.test - 1], journal.keep_of_test(asked.test)
+        journal.record(
+            "accepted_other",
+            test=test.id,
+            what=f"test {test.id}" if test.phase == "hand" else label_of(state, test),
+            trial=test.trial,
+            environment=self._numbers(name for name in state.environment if name in keep),
+            **self._judged((*state.failures, test.id)),
+        )
+
+    # The way back, and other settings.
+
+    def _undo(self, _: Undo) -> None:
+        here = self._journal.state.here
+        if here is not None and here.parent is not None:
+            self._go(here.parent, rejected=here.number)
+
+    def _go_back(self, asked: GoBack) -> None:
+        self._go(asked.node, rejected=None)
+        if not self._paused:
+            self._pause()
+
+    def _change(self, asked: Change) -> None:
+        self._journal.record("changed", settings=asked.new(self._journal.state))
+
+    def _go(self, node: int, rejected: int | None) -> None:
+        state = self._journal.state
+        failures = failures_at(state, node)
+        judged = {} if failures == state.failures else self._judged(failures)
+        self._journal.record("went_back", node=node, rejected=rejected, **judged)
+
+    def _judged(self, failures: tuple[int, ...]) -> dict[str, Any]:
+        """What all tests are where the ends of `failures` count as f."""
+        file, state = self._journal.file, self._journal.state
+        spec = FailureSpec.model_validate(state.scenario["failure"])
+        return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
+
+    def _numbers(self, models: Iterable[str]) -> list[int]:
+        """In the order of `models`."""
+        number = {name: index for index, name in enumerate(self._journal.state.elements)}
+        return [number[name] for name in models]
+
+
+_OBEYED: dict[type[Command], Callable[[Control, Any], None]] = {
+    Pause: Control._obey_pause,
+    Resume: Control._obey_resume,
+    Step: Control._obey_step,
+    AcceptMode: Control._obey_accept_mode,
+    Stop: Control._obey_stop,
+    Accept: Control._decide,
+    Reject: Control._decide,
+    Veto: Control._veto,
+    Unveto: Control._unveto,
+    Pin: Control._pin,
+    Unpin: Control._unpin,
+    Try: Control._try,
+    Adopt: Control._adopt,
+    AcceptOther: Control._accept_other,
+    Undo: Control._undo,
+    GoBack: Control._go_back,
+    Change: Control._change,
+}

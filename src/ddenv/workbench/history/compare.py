@@ -13,12 +13,12 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from ddenv.guiding.course import place
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Node, RunState
 from ddenv.workbench.history import branches
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run import guiding
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.wording import count, plain
@@ -84,7 +84,7 @@ class Compare(ModalScreen[None]):
 
     def _facts(self, name: str, node: Node) -> Text:
         words = branches.words(node, self._state.node)
-        text = Text(f"{name}  {guiding.place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
+        text = Text(f"{name}  {place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
         after = f"\nafter {count(node.tests, 'test')}"
         return text.append(after + (f"; {words}" if words else ""), "not bold dim")
 

@@ -14,16 +14,17 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.errors import UserError
+from ddenv.guiding.commands import refusal
+from ddenv.guiding.course import GoBack, place
+from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Decision, Node
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
-from ddenv.workbench.run import guiding
 from ddenv.workbench.run.log import decision_line
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.words import first_of
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
@@ -72,10 +73,10 @@ class History(Screen[int | None]):
         Binding("escape,h,q", "close", "close", id="history.close", tooltip="back to the run", key_display="esc"),
     ]
 
-    def __init__(self, look: Callable[[], Snapshot], place: Place, *, may_go: bool = True) -> None:
-        """`look` returns the run as it is now. Without `may_go` it is only shown."""
+    def __init__(self, look: Callable[[], Situation], place: Place) -> None:
+        """`look` returns the run as it is now."""
         super().__init__()
-        self._look_at, self._place, self._may_go = look, place, may_go
+        self._look_at, self._place = look, place
         self._tree: tuple[Node, ...] = ()
         self._here = -1
         self._rows: list[branches.Row] = []
@@ -177,7 +178,7 @@ class History(Screen[int | None]):
             return
         names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
-        text = Text(f"{guiding.place(node)}: {how}", "bold", no_wrap=True)
+        text = Text(f"{place(node)}: {how}", "bold", no_wrap=True)
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
         text.append(f"\n{names or 'no models'}", "not bold dim")
         self.query_one("#about", Static).update(text)
@@ -188,14 +189,11 @@ class History(Screen[int | None]):
         node = self.under_cursor
         if node is None:
             return
-        if not self._may_go:
-            self._refuse("watching only: open the run without --watch to go on from here")
+        now, command = self._look_at(), GoBack(node.number)
+        if why := refusal(command, now):
+            self._refuse(why)
             return
-        try:
-            question = guiding.go_back(self._look_at().state, node.number).question
-        except UserError as error:
-            self._refuse(str(error))
-            return
+        question = command.words(now.state).question
 
         def answered(yes: bool | None) -> None:
             if yes:

@@ -1,4 +1,4 @@
-"""The rows of the table beside the map, in words: trials and candidates, or the baseline's runs, or the full runs at the end."""
+"""The rows of the table beside the map, in words: tries and candidates, or the baseline's runs, or the full runs at the end."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from itertools import takewhile
 
 from ddenv.map.names import shortened
 from ddenv.runfile.settings import settings
-from ddenv.runfile.state import Candidate, Test, Trial
+from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain
 
-# Of a model's name so many columns, behind a sign and a space.
+# The columns of a model's name, behind a sign and a space.
 NAME = 8
-# So many judged trials stay in the table, the latest.
+# The latest judged tries that stay in the table.
 TRIALS = 3
 SIGNS = ("similar", "other", "pass", "error", "timeout", "failed")
 
@@ -52,7 +52,7 @@ OF_CANDIDATES = ("distance", "evidence")
 class Listed:
     """What the table lists: `of` names it, `trials` stand above the `rest`."""
 
-    of: tuple = ()
+    of: tuple[object, ...] = ()
     trials: Sequence[Trial] = ()
     rest: Sequence[Candidate | Test] = ()
 
@@ -82,13 +82,30 @@ def listed(snapshot: Snapshot) -> Listed:
     trials = tuple(trial for trial in here if not trial.verdict or trial.number in judged)
     if state.round is not None:
         return Listed(("round", state.node, state.round.number), trials, state.round.candidates)
-    return Listed(("baseline",), trials, tuple(takewhile(lambda test: test.phase == "baseline", state.tests)))
+    runs = tuple(takewhile(lambda test: test.phase == "baseline", state.tests))
+    return Listed(("baseline",), trials, runs)
+
+
+def round_title(state: RunState) -> tuple[str, str]:
+    """What is listed, and how far that is."""
+    if state.confirming and not state.ended:
+        return "Full runs of what is left", f"{sum(test.is_finished for test in state.confirm_tests)} made"
+    if state.round is None:
+        return "Baseline: the whole world", ""
+    candidates = state.round.candidates
+    vetoed = sum(each.verdict == "vetoed" for each in candidates)
+    judged = sum(bool(each.verdict) for each in candidates) - vetoed
+    over = ", over" if state.round.done and not state.ended else ""
+    return (
+        f"Round {state.round.number}{over}",
+        f"{judged} of {len(candidates)} judged{f', {vetoed} vetoed' if vetoed else ''}",
+    )
 
 
 def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, ...]:
     """The columns that have room in so many cells, each with its width; `narrow` leaves out all that can be."""
     first = listing.rest[0] if listing.rest else None
-    unused = () if isinstance(first, Candidate) else OF_CANDIDATES
+    unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:
         unused = ("distance",)
     columns = [each for each in COLUMNS if each.name not in unused and not (narrow and each.spare)]
@@ -114,12 +131,12 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
     distances = [test.distance for test in done if test.distance is not None]
     seconds = sum(test.wall_seconds for test in done)
-    candidate = isinstance(item, Candidate)
+    candidate = item if isinstance(item, Candidate) else None
     return {
-        "#": str(item.index + 1) if candidate else "",
+        "#": str(candidate.index + 1) if candidate else "",
         "candidate": item.label,
         "models": str(item.size),
-        "distance": metres(item.distance) if candidate else "",
+        "distance": metres(candidate.distance) if candidate else "",
         "tests": f"{len(done)}/{1 + settings(snapshot.state).iterations}" if done or running else "",
         "evidence": _evidence(done),
         "to f": metres(min(distances)) if distances else "",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual import on
@@ -13,19 +13,22 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Select, Static
 
 from ddenv.errors import UserError
+from ddenv.guiding import course
+from ddenv.guiding.offers import change
+from ddenv.guiding.situation import Situation
 from ddenv.runfile.settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
-from ddenv.settings import SETTINGS, Setting
+from ddenv.settings import Value
 from ddenv.workbench.run.methods import KINDS, note, paragraph
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.wording import plain
 
 # Beside the pair and the algorithm, which have lists.
-NUMBERS = tuple(one for one in SETTINGS.values() if one.may_change and one.shown != "method")
+NUMBERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")
 
 
-class Change(ModalScreen[dict[str, Any] | None]):
-    """The settings as they stand here, None if that was left. They hold from the next round on."""
+class Change(ModalScreen[course.Change | None]):
+    """The command for the settings as they stand here, None if that was cancelled. They hold from the next round on."""
 
     CSS_PATH = "run_dialogs.tcss"
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (34, "-tall")]
@@ -36,6 +39,7 @@ class Change(ModalScreen[dict[str, Any] | None]):
 
     def __init__(self, state: RunState) -> None:
         super().__init__()
+        self._state = state
         options = settings(state)
         partitioning, _, prioritization = options.pair.partition("/")
         self._now: dict[Kind, str] = {
@@ -45,7 +49,6 @@ class Change(ModalScreen[dict[str, Any] | None]):
         }
         now = {one.name: getattr(options, one.name) for one in NUMBERS}
         self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
-        self._done = state.tests_done
 
     def compose(self) -> ComposeResult:
         with Vertical(classes="dialog") as dialog:
@@ -84,39 +87,30 @@ class Change(ModalScreen[dict[str, Any] | None]):
             words = note(kind, algorithm) or paragraph(kind, name)
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
 
-    def asked(self) -> dict[str, Any]:
-        """All settings as they stand in the dialog. Raises UserError."""
+    def _command(self) -> course.Change:
+        """For all settings as they stand in the dialog. Raises UserError, which begins with the field that is wrong."""
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
-        return {
+        asked: dict[str, Value] = {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",
             "algorithm": kinds["algorithm"],
-            **{one.name: self._number(one) for one in NUMBERS},
+            **{one.name: course.number(one.name, self.query_one(f"#{one.name}", Input).value) for one in NUMBERS},
         }
-
-    def _number(self, one: Setting) -> int | None:
-        text = self.query_one(f"#{one.name}", Input).value.strip()
-        if not text and one.none:
-            return None
-        try:
-            number = int(text)
-        except ValueError:
-            raise UserError(f"{one.name}: expected a whole number, found '{text[:20]}'") from None
-        if not one.allows(number):
-            raise UserError(f"{one.name}: expected {one.range}, found {number}")
-        if one.name == "budget" and number <= self._done:
-            raise UserError(f"budget: {count(self._done, 'test')} are made already; give more, or leave it empty")
-        return number
+        command = change(self._state, asked)
+        if why := command.refusal(Situation(self._state)):
+            raise UserError(why)
+        return command
 
     @on(Input.Submitted)
     def action_apply(self) -> None:
         try:
-            asked = self.asked()
+            command = self._command()
         except UserError as error:
             self.query_one("#wrong", Static).update(Text(str(error)))
-            # The message begins with the field that is wrong.
-            self.query_one(f"#{str(error).partition(':')[0]}", Input).focus()
+            field = str(error).partition(":")[0]
+            if any(field == one.name for one in NUMBERS):
+                self.query_one(f"#{field}", Input).focus()
             return
-        self.dismiss(asked)
+        self.dismiss(command)
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         if event.button.id == "apply":

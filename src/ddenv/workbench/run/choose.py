@@ -1,4 +1,4 @@
-"""Choosing models by their names: one, or several."""
+"""Lists to choose from: models by their names, the layers of the map, texts to copy."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.map.names import shortened
-from ddenv.workbench.wording import count
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.wording import count, plain, shorten
 
-# So many names are listed at once; typing brings others.
-LISTED = 100
-WIDTH = 58
+# The most names that are listed at once, and the columns of each; typing brings others.
+LISTED, WIDTH = 100, 58
 
 
 class ChooseModels(ModalScreen[tuple[str, ...] | None]):
@@ -30,7 +30,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
         Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
         Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
-        Binding("tab", "toggle", show=False, id="choose.toggle", tooltip="choose this one too, or not"),
+        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this one too, or not"),
     ]
 
     def __init__(self, title: str, names: Sequence[str], *, several: bool, pinned: Iterable[str] = ()) -> None:
@@ -94,7 +94,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         else:
             options.action_cursor_up()
 
-    def action_toggle(self) -> None:
+    def action_mark(self) -> None:
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._several and place is not None:
@@ -126,3 +126,86 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     def action_cancel(self) -> None:
         self.dismiss(None)
+
+
+MEANINGS = {
+    "partitions": "the parts of this round, by letter and colour",
+    "removed": "where removed models stood",
+    "pinned": "which models are pinned",
+    "sensed": "in which order the robot sensed the models",
+    "path": "the robot's path on the last similar run",
+    "original": "the robot's path in f itself",
+    "failure": "where the robot ended in f",
+}
+
+
+class Layers(ModalScreen[None]):
+    """A list of the map's layers with a mark at those that are shown."""
+
+    CSS_PATH = "run_dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("space", "switch", "show or hide", id="layers.toggle", tooltip="show this layer or hide it"),
+        Binding("escape,l,q", "dismiss", "close", id="layers.close", tooltip="back to the map"),
+    ]
+
+    def __init__(self, world: WorldMap, names: tuple[str, ...]) -> None:
+        super().__init__()
+        self._world, self._names = world, names
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "What the map shows"
+            dialog.border_subtitle = "space or click shows or hides   escape closes"
+            yield OptionList(*(Option(self._prompt(name)) for name in self._names), compact=True, markup=False)
+
+    def _prompt(self, name: str) -> Text:
+        mark = "[x]" if name in self._world.shown_layers else "[ ]"
+        return Text(f"{mark} {name:<11} ", no_wrap=True).append(MEANINGS.get(name, ""), "dim")
+
+    def action_switch(self) -> None:
+        place = self.query_one(OptionList).highlighted
+        if place is not None:
+            self._toggle(place)
+
+    @on(OptionList.OptionSelected)
+    def _selected(self, event: OptionList.OptionSelected) -> None:
+        self._toggle(event.option_index)
+
+    def _toggle(self, place: int) -> None:
+        name = self._names[place]
+        self._world.toggle_layer(name)
+        self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
+
+
+class Copy(ModalScreen[None]):
+    """A list of texts, of which enter or a click copies one."""
+
+    CSS_PATH = "run_dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("escape,y,q", "dismiss", "close", id="copy.close", tooltip="copy nothing"),
+    ]
+
+    def __init__(self, texts: Sequence[tuple[str, str]]) -> None:
+        """`texts` are (what it is, the text itself)."""
+        super().__init__()
+        self._texts = tuple(texts)
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog") as dialog:
+            dialog.border_title = "Copy"
+            dialog.border_subtitle = "enter or click copies   escape closes"
+            yield OptionList(*(Option(_prompt(*each)) for each in self._texts), compact=True, markup=False)
+
+    @on(OptionList.OptionSelected)
+    def _chosen(self, event: OptionList.OptionSelected) -> None:
+        what, text = self._texts[event.option_index]
+        self.app.copy_to_clipboard(text)
+        self.notify(f"{what} copied, if the terminal allows it", timeout=3, markup=False)
+        self.dismiss(None)
+
+
+def _prompt(what: str, text: str) -> Text:
+    lines = text.splitlines()
+    more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
+    shown = shorten(plain(lines[0]), 40) if lines else ""
+    return Text(f"{what:<24} ", no_wrap=True).append(f"{shown}{more}", "dim")

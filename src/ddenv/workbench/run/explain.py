@@ -69,7 +69,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
-        return "waiting", _waiting(state, state.round, options)
+        return "waiting", _waiting(state, state.round.candidates[state.waiting_candidate], options)
     return _with_pause(state, _testing(snapshot, state.round, options))
 
 
@@ -161,8 +161,7 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     return (first, then) if then else (first,)
 
 
-def _waiting(state: RunState, current: Round, options: Settings) -> tuple[str, ...]:
-    candidate = current.candidates[state.waiting_candidate]
+def _waiting(state: RunState, candidate: Candidate, options: Settings) -> tuple[str, ...]:
     before, after = len(state.environment), candidate.size
     return (
         f"{candidate.label} shows f: {_ended(state, candidate, options)}",
@@ -181,7 +180,7 @@ def _ended(state: RunState, candidate: Candidate, options: Settings) -> str:
 def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening:
     state = snapshot.state
     if current.winner is not None:
-        return _reduced(state, current, options)
+        return _reduced(state, current.candidates[current.winner], options)
     candidate = snapshot.focus or next((each for each in current.candidates if not each.verdict), None)
     if candidate is None:
         return "nothing", _nothing_found(state, current, options)
@@ -259,9 +258,8 @@ def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
     return (first, f"Now run {running[0].run + 1} of {what}.")
 
 
-def _reduced(state: RunState, current: Round, options: Settings) -> Happening:
-    candidate = current.candidates[current.winner]
-    before, after = len(current.environment), candidate.size
+def _reduced(state: RunState, candidate: Candidate, options: Settings) -> Happening:
+    before, after = len(candidate.split.environment), candidate.size
     gone = "the others take no part in f" if before - after > 1 else "the other one takes no part in f"
     return "reduced", (
         f"{candidate.label} shows f: {_ended(state, candidate, options)}",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ddenv.guiding.situation import named
 from ddenv.runfile.settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
-from ddenv.workbench.run.guiding import named
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import count, plain
 

@@ -25,7 +25,7 @@ class Happening(Widget):
         self._explanation = Explanation(None, ())
         self._snapshot: Snapshot | None = None
         self.trouble = ""
-        self._matter: tuple = ()
+        self._matter: tuple[object, ...] = ()
         self._told = -math.inf
         self._first = 0
         self._lines = Text("")
@@ -74,7 +74,7 @@ class Happening(Widget):
         return Text("\n").join(sentences)
 
 
-def _matter(snapshot: Snapshot) -> tuple:
+def _matter(snapshot: Snapshot) -> tuple[object, ...]:
     """What is told at once when it changes."""
     state = snapshot.state
     number = None if state.round is None else (state.round.number, state.round.done)

@@ -38,7 +38,8 @@ class Listing:
         """The line of a step in the round `current`."""
         if self.sweep is not None and step not in ("baseline", "returned") and is_sweep(current):
             return self.sweep
-        return getattr(self, step)
+        line: int = getattr(self, step)
+        return line
 
 
 def is_sweep(current: Round | None) -> bool:

@@ -46,7 +46,7 @@ class Chart(Widget):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._course = Course()
-        self._shown: tuple = ()
+        self._shown: tuple[object, ...] = ()
         self._text = Text("")
 
     def show(self, snapshot: Snapshot) -> None:

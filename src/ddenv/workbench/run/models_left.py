@@ -1,4 +1,4 @@
-"""The models that are left: in which part each is, how far from f, and when the robot first sensed it."""
+"""The models that are left: the part each is in, how far it is from f, and when the robot first sensed it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,44 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Vertical
+from textual.widgets import Static
 
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState, partition_letter
+from ddenv.workbench.widgets.lines import Lines
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
 # Columns behind the name: part, distance, first sensed.
 REST = 3 + 9 + 9
+
+
+class ModelsLeft(Vertical):
+    """The list of models, made only while it is in sight."""
+
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id, classes="panel")
+        self.border_title = "Models left"
+        self._made_of: tuple[object, ...] = ()
+
+    def compose(self) -> ComposeResult:
+        yield Static("", id="models-heading", markup=False)
+        yield Lines(line, nothing="none", id="models")
+
+    def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
+        """The run as it is now; `prints` are where its models stand."""
+        split = None if state.round is None or state.round.done else state.round.split
+        made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
+        lines = self.query_one("#models", Lines)
+        same = bool(self._made_of) and all(a is b for a, b in zip(made_of, self._made_of, strict=True))
+        if same or not lines.size.width:
+            return
+        self._made_of = made_of
+        self.query_one("#models-heading", Static).update(heading(lines.size.width))
+        lines.show(rows(state, prints))
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,8 @@ class Observed(RunFile):
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
         self.path, self._strictly = path, strictly
         self._origin = _place(path)
+        self._version = 0
+        self._place = self._origin
         self._open(self._origin)
         self._check()
 
@@ -47,7 +49,7 @@ class Observed(RunFile):
             self._db.close()
             self._open(place)
             return True
-        version = self._all("PRAGMA data_version")[0][0]
+        version = int(self._all("PRAGMA data_version")[0][0])
         changed, self._version = version != self._version, version
         return changed
 
@@ -81,7 +83,7 @@ class Observed(RunFile):
             raise UserError(f"{self.path}: cannot be read: {error}") from None
         self._place = place
 
-    def _all(self, query: str, values: tuple = ()) -> list[tuple]:
+    def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         try:
             return self._db.execute(query, values).fetchall()
         except sqlite3.OperationalError as error:

@@ -1,20 +1,17 @@
-"""Looks at a run file again and again, and says when something changed; sends commands beside the screen."""
+"""Looks at a run file again and again, and says when something changed."""
 
 from __future__ import annotations
 
-import asyncio
-import contextvars
 import math
 import time
 from array import array
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.guiding.situation import EngineIs
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
@@ -48,11 +45,11 @@ class Snapshot:
 
     state: RunState = field(default_factory=RunState)
     live: tuple[Live, ...] = ()
-    engine: str = "absent"
-    evidence: array | None = None
+    engine: EngineIs = "absent"
+    evidence: array[float] | None = None
     spent: int = 0
     error: str = ""
-    original: array | None = None
+    original: array[float] | None = None
     gone: bool = False
     behind: bool = False
 
@@ -87,7 +84,7 @@ class Snapshot:
         if self.state.waiting_candidate is not None:
             return current.candidates[self.state.waiting_candidate]
         for test in self.running:
-            if test.phase == "round" and test.round == current.number:
+            if test.phase == "round" and test.round == current.number and test.candidate is not None:
                 return current.candidates[test.candidate]
         return None
 
@@ -97,9 +94,9 @@ class Snapshot:
 
 
 class Poll:
-    """One open run file, which is only ever read; commands are sent beside it.
+    """One open run file, which is only ever read.
 
-    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing can be sent. `told` is
+    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written. `told` is
     called with each event's kind, and the states before and after it; again with the same ones where a look was cut short.
     """
 
@@ -122,9 +119,13 @@ class Poll:
         self._looked = -math.inf
         self._alive = False
         self._posed = -math.inf
-        self._evidence: tuple[int | None, array | None] = (None, None)
-        self._original: tuple[int | None, array | None] = (None, None)
-        self._sender: ThreadPoolExecutor | None = None
+        self._evidence: tuple[int | None, array[float] | None] = (None, None)
+        self._original: tuple[int | None, array[float] | None] = (None, None)
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What the last look saw."""
+        return self._snapshot or Snapshot()
 
     @property
     def catching_up(self) -> bool:
@@ -132,9 +133,7 @@ class Poll:
         return self._catching_up
 
     def close(self) -> None:
-        """What was sent is still written."""
-        if self._sender is not None:
-            self._sender.shutdown(wait=False)
+        """Closes the file; the last one to do so folds its log back."""
         if self.watch:
             self.file.close()
             return
@@ -158,26 +157,6 @@ class Poll:
             return None
         self._snapshot = snapshot
         return snapshot
-
-    def send(self, kind: str, data: dict[str, Any], done: Callable[[int, str], None]) -> None:
-        """Asks the engine for something, without waiting for the file; commands arrive in the order they were sent.
-
-        `done` is then called on the screen's thread with the command's id and "", or with 0 and why it was not sent.
-        """
-        if self._sender is None:
-            self._sender = ThreadPoolExecutor(1, "send")
-        self._sender.submit(self._send, kind, data, done, asyncio.get_running_loop(), contextvars.copy_context())
-
-    def _send(self, kind: str, data: dict[str, Any], done: Callable, loop: Any, context: contextvars.Context) -> None:
-        id, error = 0, "this run is only watched: open it without --watch to guide it"
-        if not self.watch:
-            try:
-                id, error = self.file.send(kind, **data), ""
-            except UserError as trouble:
-                error = str(trouble)
-        # The screen may be gone by now.
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(done, id, error, context=context)
 
     def _read(self) -> Snapshot:
         """Of a damaged file as much as makes sense is shown, with what is wrong. Raises Busy."""
@@ -223,7 +202,7 @@ class Poll:
             return state, str(error), False
         return state, "", more
 
-    def _engine(self) -> str:
+    def _engine(self) -> EngineIs:
         moment = time.monotonic()
         if moment - self._looked >= LOCK_PERIOD:
             alive = engine_is_alive(self.path)
@@ -251,19 +230,19 @@ class Poll:
         except (TypeError, ValueError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
-    def _motion(self, state: RunState) -> array | None:
+    def _motion(self, state: RunState) -> array[float] | None:
         test = state.evidence_test
         if test != self._evidence[0]:
             self._evidence = (test, None if test is None else self.file.motion(test))
         return self._evidence[1]
 
-    def _first_motion(self, state: RunState) -> array | None:
+    def _first_motion(self, state: RunState) -> array[float] | None:
         test = None if state.baseline is None else state.baseline.failure_test
         if test != self._original[0]:
             self._original = (test, None if test is None else self.file.motion(test))
         return self._original[1]
 
-    def _spent(self, state: RunState, engine: str) -> int:
+    def _spent(self, state: RunState, engine: EngineIs) -> int:
         if state.started_at is None:
             return int(state.working_seconds)
         until = now() if engine == "alive" else state.updated_at

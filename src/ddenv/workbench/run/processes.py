@@ -20,7 +20,7 @@ TAIL = 4000
 class Engine:
     """The engine of one run, if this workbench started it. It is never ended from here: it outlives the screen."""
 
-    def __init__(self, run: Path, process: subprocess.Popen | None = None) -> None:
+    def __init__(self, run: Path, process: subprocess.Popen[bytes] | None = None) -> None:
         self.run = run
         self._process = process
         self._worked = False
@@ -64,7 +64,7 @@ class Scene:
         self.run = run
         self.url = ""
         self.trouble = ""
-        self._process: subprocess.Popen | None = None
+        self._process: subprocess.Popen[str] | None = None
 
     @property
     def on(self) -> bool:
@@ -107,7 +107,7 @@ class Scene:
             _close(process)
 
 
-def _end(process: subprocess.Popen) -> None:
+def _end(process: subprocess.Popen[str]) -> None:
     try:
         process.wait(timeout=2.0)
     except subprocess.TimeoutExpired:
@@ -116,7 +116,7 @@ def _end(process: subprocess.Popen) -> None:
     _close(process)
 
 
-def _close(process: subprocess.Popen) -> None:
+def _close(process: subprocess.Popen[str]) -> None:
     if process.stdout is not None:
         process.stdout.close()
 

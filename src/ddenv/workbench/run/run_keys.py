@@ -1,56 +1,72 @@
-"""The keys of the run screen, and which of them the footer has room for."""
+"""The keys of the run screen, and which of them the footer has room for.
+
+A key that guides the run has the action `guide`, with its name in `ddenv.guiding.offers.ACTIONS`.
+"""
 
 from __future__ import annotations
 
-from textual.binding import Binding
-
-from ddenv.errors import UserError
-from ddenv.runfile.state import Candidate, Trial
-from ddenv.workbench.run import guiding
-from ddenv.workbench.run.poll import Snapshot
+from textual.binding import Binding, BindingType
 
 
 def _hidden(key: str, action: str, words: str, id: str, tooltip: str, display: str | None = None) -> Binding:
     return Binding(key, action, words, id=id, tooltip=tooltip, show=False, key_display=display)
 
 
-KEYS = [
+_KEYS = [
     Binding(
         "space",
-        "pause",
+        "guide('pause')",
         "pause",
         id="run.pause",
         tooltip="pause: no new test is started; again to go on; starts the engine where none works",
     ),
-    Binding("s", "step('test')", "step", id="run.step", tooltip="run one test, then pause"),
+    Binding("s", "guide('step')", "step", id="run.step", tooltip="run one test, then pause"),
     Binding(
         "a",
-        "accept",
+        "guide('accept')",
         "accept",
         id="run.accept",
         tooltip="accept the reduction that waits; or adopt the try under the cursor that shows f; or take another failure of the "
         "candidate or try under the cursor for as good as f",
     ),
     Binding(
-        "x", "reject", "reject", id="run.reject", tooltip="reject the reduction that waits, and go on with the round"
+        "x",
+        "guide('reject')",
+        "reject",
+        id="run.reject",
+        tooltip="reject the reduction that waits, and go on with the round",
     ),
     Binding(
-        "v", "veto", "veto", id="run.veto", tooltip="leave out the candidate under the cursor; again takes that back"
+        "v",
+        "guide('veto')",
+        "veto",
+        id="run.veto",
+        tooltip="leave out the candidate under the cursor; again takes that back",
     ),
     Binding(
-        "p", "pin", "pin", id="run.pin", tooltip="pin the selected models, so that they always stay; again unpins them"
+        "p",
+        "guide('pin')",
+        "pin",
+        id="run.pin",
+        tooltip="pin the selected models, so that they always stay; again unpins them",
     ),
     Binding(
         "w",
-        "without",
+        "guide('without')",
         "try without",
         id="run.without",
         tooltip="try by hand: test the environment without the selected models; asks for their names if none is selected",
     ),
     Binding(
-        "o", "only", "try only", id="run.only", tooltip="try by hand: test the selected models alone, or those you name"
+        "o",
+        "guide('only')",
+        "try only",
+        id="run.only",
+        tooltip="try by hand: test the selected models alone, or those you name",
     ),
-    Binding("u", "undo", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"),
+    Binding(
+        "u", "guide('undo')", "undo", id="run.undo", tooltip="undo: take back the last reduction; it is not made again"
+    ),
     Binding(
         "h",
         "history",
@@ -59,7 +75,11 @@ KEYS = [
         tooltip="history: the tree of reductions; go back to any, branch from there, compare two",
     ),
     Binding(
-        "c", "change", "settings", id="run.change", tooltip="change pair, algorithm, iterations or budget from here on"
+        "c",
+        "guide('change')",
+        "settings",
+        id="run.change",
+        tooltip="change pair, algorithm, iterations or budget from here on",
     ),
     Binding(
         "E",
@@ -70,8 +90,8 @@ KEYS = [
     ),
     Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
     Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks what becomes of the engine"),
-    _hidden("S", "step('round')", "round", "run.round", "run to the end of the round, then pause"),
-    _hidden("t", "mode", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
+    _hidden("S", "guide('step_round')", "round", "run.round", "run to the end of the round, then pause"),
+    _hidden("t", "guide('mode')", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
     _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
     _hidden("l", "layers", "layers", "run.layers", "choose what the map shows"),
     _hidden("y", "copy", "copy", "run.copy", "copy the names of the models left, or the command to come back"),
@@ -87,17 +107,21 @@ KEYS = [
     _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
     _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
     _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
-    _hidden("r", "resume", "resume", "run.resume", "start the engine again"),
+    _hidden("r", "guide('resume')", "resume", "run.resume", "start the engine again"),
     _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
     _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
 ]
+KEYS: list[BindingType] = [*_KEYS]
+# The names of the actions that guide the run, and their bindings by these names.
+GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
+GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
 # In the order of the screen, and in the order in which they are given room: on wide screens there is some for more.
 MORE = ("run.find", "run.layers", "run.copy", "run.scene", "run.runs")
 SHOWN = tuple(
     id
-    for binding in KEYS
+    for binding in _KEYS
     if binding.show
-    for id in ((*MORE, binding.id) if binding.id == "run.help" else (binding.id,))
+    for id in ((*MORE, "run.help") if binding.id == "run.help" else (binding.id or "",))
 )
 FIRST = (
     "run.help",
@@ -116,53 +140,5 @@ FIRST = (
     "run.only",
     *MORE,
 )
-# What is left in the footer for who only looks.
+# The footer of a screen that only watches.
 LOOKING = ("run.history", "run.export", "run.find", "run.copy", "run.layers", "run.help", "run.quit")
-
-
-Row = Candidate | Trial | None
-ACCEPT = {"accept": "accept", "adopt": "adopt", "accept_other": "take as f"}
-
-
-def footer_words(snapshot: Snapshot, row: Row, follows: bool) -> dict[str, str]:
-    """The words for the keys by id, "" for a key that is not shown. `row` is under the cursor, which `follows` the run."""
-    state = snapshot.state
-    known, waits = state.baseline is not None, state.waiting_candidate is not None
-    here = state.here
-    return {
-        "run.pause": _pause(snapshot),
-        "run.step": "step" if snapshot.engine == "alive" and not waits and snapshot.status != "finished" else "",
-        "run.accept": _accept(snapshot, row, follows),
-        "run.reject": "reject" if waits else "",
-        "run.veto": _veto(snapshot, row),
-        "run.without": "try without" if known else "",
-        "run.only": "try only" if known else "",
-        "run.undo": "undo" if here is not None and here.parent is not None else "",
-    }
-
-
-def _pause(snapshot: Snapshot) -> str:
-    if snapshot.status == "finished":
-        return ""
-    if snapshot.engine == "absent":
-        return "start"
-    return "resume" if snapshot.state.paused else "pause"
-
-
-def _accept(snapshot: Snapshot, row: Row, follows: bool) -> str:
-    """While the cursor follows the run, other failures come and go: they are offered where somebody looks at them."""
-    state = snapshot.state
-    if state.waiting_candidate is None and follows and not (isinstance(row, Trial) or state.paused):
-        return ""
-    try:
-        return ACCEPT[guiding.accept(state, row).kind]
-    except UserError:
-        return ""
-
-
-def _veto(snapshot: Snapshot, row: Row) -> str:
-    current = snapshot.state.round
-    over = current is not None and current.done and snapshot.state.paused
-    if current is None or over or snapshot.status == "finished":
-        return ""
-    return "take back" if isinstance(row, Candidate) and row.verdict in ("vetoed", "rejected") else "veto"

@@ -1,0 +1,115 @@
+"""All commands, how they stand in the run file's `command` table, and what holds for each of them.
+
+A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3}`. Models are numbers into the run's elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any, get_args
+
+from ddenv.errors import UserError
+from ddenv.guiding.course import CHANGEABLE, Change, GoBack, Undo
+from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step, Stop
+from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
+from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.situation import NO_MODELS, Situation
+from ddenv.runfile.state import RunState
+
+Command = (
+    Pause
+    | Resume
+    | Step
+    | AcceptMode
+    | Stop
+    | Accept
+    | Reject
+    | Veto
+    | Unveto
+    | Pin
+    | Unpin
+    | Try
+    | Adopt
+    | AcceptOther
+    | Undo
+    | GoBack
+    | Change
+)
+KINDS: dict[str, Callable[..., Command]] = {each.kind: each for each in get_args(Command)}
+FIELDS: dict[str, list[str]] = {each.kind: [field.name for field in fields(each)] for each in get_args(Command)}
+# These go on from somewhere else: where no engine works, one is started for them.
+GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
+
+
+def refusal(command: Command | StartEngine, now: Situation) -> str:
+    """Why a command is not possible now, in one line, or ""."""
+    return now.barred or command.refusal(now)
+
+
+def starts_engine(command: Command, state: RunState) -> bool:
+    """Whether an engine is started for a command where none works: a finished search begins again with other pins, too."""
+    return isinstance(command, GOES_ON) or (isinstance(command, Pin | Unpin) and state.status == "finished")
+
+
+def said(command: Command, now: Situation) -> str:
+    """What is said when a command is sent, or ""."""
+    words = command.words(now.state).said
+    if not words or now.engine != "absent":
+        return words
+    starts = starts_engine(command, now.state)
+    return (
+        f"{words}; an engine is started for it" if starts else f"{words}; kept until an engine works, space starts one"
+    )
+
+
+def data_of(command: Command) -> dict[str, Any]:
+    """The fields of a command as JSON."""
+    values = ((name, getattr(command, name)) for name in FIELDS[command.kind])
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values}
+
+
+def parse(kind: str, data: Mapping[str, Any]) -> Command:
+    """A command from a run file. Raises UserError where there is none of this kind, or its data makes no sense."""
+    if kind not in KINDS:
+        raise UserError(f"there is no command '{kind[:40]}'")
+    return KINDS[kind](**{name: _READ[name](name, data.get(name)) for name in FIELDS[kind]})
+
+
+def _number(name: str, value: Any) -> int:
+    if type(value) is not int:
+        raise UserError(f"there is no such {name}: expected its number, found {str(value)[:20]!r}")
+    return value
+
+
+def _models(_: str, value: Any) -> tuple[int, ...]:
+    if not isinstance(value, list) or not all(type(number) is int for number in value):
+        raise UserError(f"{NO_MODELS}: expected their numbers")
+    return tuple(value)
+
+
+def _unit(_: str, value: Any) -> str:
+    return "round" if value == "round" else "test"
+
+
+def _mode(_: str, value: Any) -> str:
+    if value not in ("automatic", "ask"):
+        raise UserError("the accept mode is automatic or ask")
+    return str(value)
+
+
+def _settings(_: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise UserError(f"only {', '.join(CHANGEABLE)} can be changed on the way")
+    # What another program wrote may hold a number as text.
+    numbers = {name for name, one in CHANGEABLE.items() if one.kind is int}
+    return {str(key): int(each) if key in numbers and str(each).isdecimal() else each for key, each in value.items()}
+
+
+_READ: dict[str, Callable[[str, Any], Any]] = {
+    **dict.fromkeys(("round", "candidate", "trial", "test", "node"), _number),
+    "models": _models,
+    "unit": _unit,
+    "mode": _mode,
+    "settings": _settings,
+}

@@ -1,0 +1,126 @@
+"""Where a run goes on from, and how: undo, back to another environment, other settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ddenv.errors import UserError, printable
+from ddenv.guiding.situation import NO_FAILURE, Situation, Words
+from ddenv.runfile.settings import settings
+from ddenv.runfile.state import Node, RunState
+from ddenv.schemas import check, split_pair
+from ddenv.settings import SETTINGS, Value
+from ddenv.words import count
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Take back the last reduction, with what was accepted by it; the same is not made again."""
+
+    kind: ClassVar[str] = "undo"
+    offer: ClassVar[str] = "undo"
+
+    def refusal(self, now: Situation) -> str:
+        here = now.state.here
+        if here is None or here.parent is None:
+            return "there is no reduction to take back"
+        return "the last undo is still on its way" if now.pending == "undo" else ""
+
+    def words(self, state: RunState) -> Words:
+        here = state.here
+        if here is None or here.parent is None:
+            return Words("undo")
+        before, after = len(here.environment), len(state.nodes[here.parent].environment)
+        return Words("undo", f"{here.what} is taken back: {before} → {count(after, 'model')}; it is not made again")
+
+
+@dataclass(frozen=True, slots=True)
+class GoBack:
+    """Make the environment of a node the current one again; the run pauses there."""
+
+    kind: ClassVar[str] = "go_back"
+    offer: ClassVar[str] = ""
+    node: int
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if not 0 <= self.node < len(state.nodes):
+            return "there is no such place in the history"
+        if state.baseline is None:
+            return NO_FAILURE
+        return "the run is there already" if self.node == state.node else ""
+
+    def words(self, state: RunState) -> Words:
+        there = place(state.nodes[self.node])
+        question = (
+            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o), then space goes on. "
+            "What was found since then stays in the history, and you can come back to it. No test is made twice."
+        )
+        return Words("go back", f"back to {there}; the run pauses there", question)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
+
+    kind: ClassVar[str] = "change"
+    offer: ClassVar[str] = ""
+    settings: Mapping[str, Value]
+
+    def refusal(self, now: Situation) -> str:
+        if not set(self.settings) <= set(CHANGEABLE):
+            return f"only {', '.join(CHANGEABLE)} can be changed on the way"
+        try:
+            for name, value in self.settings.items():
+                _check(name, value)
+        except UserError as error:
+            return str(error)
+        new = self.new(now.state)
+        budget, done = new.get("budget"), now.state.tests_done
+        if isinstance(budget, int) and budget <= done:
+            return f"budget: {count(done, 'test')} are made already; give more, or leave it empty"
+        return "" if new else "that is how it is set already"
+
+    def words(self, state: RunState) -> Words:
+        new = self.new(state).items()
+        words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
+        return Words("change settings", f"from the next round on: {words}")
+
+    def new(self, state: RunState) -> dict[str, Value]:
+        """The settings that are not so already."""
+        now = settings(state)
+        return {key: value for key, value in self.settings.items() if getattr(now, key) != value}
+
+
+def place(node: Node) -> str:
+    """A node in words."""
+    models = count(len(node.environment), "model")
+    what = printable(" ".join(node.what.split()))
+    return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {what})"
+
+
+# The settings that may change on the way: all others are part of what a test is, or of how f was fixed.
+CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
+
+
+def number(name: str, text: str) -> int | None:
+    """What was typed for a number; None for no limit. Raises UserError."""
+    if not text.strip() and CHANGEABLE[name].none:
+        return None
+    try:
+        return int(text.strip())
+    except ValueError:
+        raise UserError(f"{name}: expected a whole number, found '{text[:20]}'") from None
+
+
+def _check(name: str, value: Any) -> None:
+    """Raises UserError for a value that the setting cannot have."""
+    one = CHANGEABLE[name]
+    if not one.allows(value):
+        expected = one.range if one.kind is int else "a name"
+        raise UserError(f"{name}: expected {expected}, found {printable(str(value)[:20])}")
+    if name == "pair":
+        split_pair(str(value))
+    elif name == "algorithm":
+        check("algorithm", str(value))

@@ -1,0 +1,164 @@
+"""What a key means now: the command that it sends, or why it does nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+from ddenv.errors import UserError
+from ddenv.guiding.commands import Command, refusal
+from ddenv.guiding.course import Change, Undo
+from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step
+from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
+from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
+from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
+from ddenv.map.names import shortened
+from ddenv.runfile.state import RunState, Trial
+from ddenv.settings import Value
+
+
+@dataclass(frozen=True, slots=True)
+class Pointed:
+    """What the user points at: the `row` under the cursor, which may only follow the run (`follows`), and selected `models`."""
+
+    row: Row | None = None
+    follows: bool = False
+    models: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What an action comes to: `command` is None where something is asked for first, or where it is not possible.
+
+    `words` are for the footer, "" where the action's usual ones fit. `why_not` is why it is not possible now, or "".
+    """
+
+    command: Command | StartEngine | None = None
+    words: str = ""
+    why_not: str = ""
+
+
+Meaning = Callable[[Situation, Pointed], Command | StartEngine | None]
+
+
+def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
+    """What an action of `ACTIONS` comes to now."""
+    if now.barred:
+        return Offer(why_not=now.barred)
+    try:
+        command = ACTIONS[action](now, pointed)
+    except UserError as error:
+        return Offer(why_not=str(error))
+    if command is None:
+        return Offer()
+    why_not = refusal(command, now)
+    return Offer(why_not=why_not) if why_not else Offer(command, command.offer)
+
+
+def _pause(now: Situation, _: Pointed) -> Command | StartEngine:
+    if now.engine == "absent":
+        return StartEngine()
+    return Resume() if now.state.paused else Pause()
+
+
+def _mode(now: Situation, _: Pointed) -> Command:
+    return AcceptMode("automatic" if now.state.accept_mode == "ask" else "ask")
+
+
+def _accept(now: Situation, pointed: Pointed) -> Command:
+    """Accept what waits, or else what is under the cursor."""
+    state, row = now.state, pointed.row
+    if state.round is not None and state.waiting_candidate is not None:
+        return Accept(state.round.number, state.waiting_candidate)
+    # What the cursor only follows comes and goes.
+    if row is None or (pointed.follows and not isinstance(row, Trial) and not state.paused):
+        raise UserError("nothing waits for accept")
+    if row.verdict == "similar":
+        if isinstance(row, Trial):
+            return Adopt(row.number)
+        raise UserError(f"{row.label} is accepted already; nothing waits for accept")
+    test = nearest_other(state, row)
+    if test is None:
+        why = f"is {row.verdict}" if row.verdict else "is not judged yet"
+        raise UserError(f"nothing waits for accept; {row.label} {why}, and shows no other failure to count as f")
+    return AcceptOther(test.id)
+
+
+def _reject(now: Situation, _: Pointed) -> Command:
+    state = now.state
+    if state.round is None or state.waiting_candidate is None:
+        raise UserError("nothing waits for reject")
+    return Reject(state.round.number, state.waiting_candidate)
+
+
+def _veto(now: Situation, pointed: Pointed) -> Command:
+    state, row = now.state, pointed.row
+    if isinstance(row, Trial):
+        raise UserError(f"{row.label} is your own selection; only candidates of the round can be vetoed")
+    if state.round is None:
+        raise UserError("there are no candidates yet")
+    if row is None:
+        raise UserError(
+            round_over(state) if state.round.done else "no candidate is under the cursor: 2 shows the table"
+        )
+    make = Unveto if row.verdict in ("vetoed", "rejected") else Veto
+    return make(state.round.number, row.index)
+
+
+def _pin(now: Situation, pointed: Pointed) -> Command | None:
+    if not _any(now.state, pointed.models):
+        return None
+    state, models = now.state, pointed.models
+    if all(name in state.pinned for name in models):
+        return Unpin(numbers_of(state, models))
+    return Pin(numbers_of(state, (name for name in models if name not in state.pinned)))
+
+
+def _without(now: Situation, pointed: Pointed) -> Command | None:
+    if now.state.baseline is None:
+        raise UserError(NO_FAILURE)
+    if not _any(now.state, pointed.models):
+        return None
+    out = frozenset(pointed.models)
+    return Try(numbers_of(now.state, (name for name in now.state.environment if name not in out)))
+
+
+def _only(now: Situation, pointed: Pointed) -> Command | None:
+    if now.state.baseline is None:
+        raise UserError(NO_FAILURE)
+    return Try(numbers_of(now.state, frozenset(pointed.models))) if _any(now.state, pointed.models) else None
+
+
+def _any(state: RunState, models: Collection[str]) -> bool:
+    """Whether models are selected; else the user is asked for some. Raises UserError for models that cannot be."""
+    elements = frozenset(state.elements)
+    fixed = next((name for name in models if name not in elements), None)
+    if fixed is not None:
+        raise UserError(f"{shortened(fixed, LONGEST)} is protected: it always stays")
+    if not models and not state.environment:
+        raise UserError("there are no models to choose from")
+    return bool(models)
+
+
+# By the names of the run screen's actions. All else that it does changes nothing in the run.
+ACTIONS: dict[str, Meaning] = {
+    "pause": _pause,
+    "resume": lambda now, pointed: StartEngine(),
+    "step": lambda now, pointed: Step("test"),
+    "step_round": lambda now, pointed: Step("round"),
+    "mode": _mode,
+    "accept": _accept,
+    "reject": _reject,
+    "veto": _veto,
+    "pin": _pin,
+    "without": _without,
+    "only": _only,
+    "undo": lambda now, pointed: Undo(),
+    # The settings are asked for in a dialog.
+    "change": lambda now, pointed: None,
+}
+
+
+def change(state: RunState, asked: Mapping[str, Value]) -> Change:
+    """The command for settings as they stand in a dialog: only what is new in them."""
+    return Change(Change(asked).new(state))

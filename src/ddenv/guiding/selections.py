@@ -1,0 +1,188 @@
+"""Models chosen by hand: pin and unpin them, try a selection, and take what it showed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ddenv.errors import printable
+from ddenv.guiding.situation import (
+    LONGEST,
+    NO_FAILURE,
+    NO_MODELS,
+    Row,
+    Situation,
+    Words,
+    is_or_are,
+    label_of,
+    lacks_pinned,
+    named,
+    names_of,
+    row_of,
+)
+from ddenv.map.names import shortened
+from ddenv.runfile.events import deed
+from ddenv.runfile.state import RunState, Test, Trial
+from ddenv.words import count
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
+
+    kind: ClassVar[str] = "pin"
+    offer: ClassVar[str] = "pin"
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        state, names = now.state, names_of(now.state, self.models)
+        if names is None:
+            return NO_MODELS
+        kept = frozenset(state.environment)
+        gone = next((name for name in names if name not in kept), None)
+        if gone is not None:
+            return f"{shortened(gone, LONGEST)} is removed already: go back (h) to where it was there, and pin it then"
+        return "" if self.new(state) else "pinned already"
+
+    def words(self, state: RunState) -> Words:
+        new = self.new(state)
+        stays = "stays" if len(new) == 1 else "stay"
+        return Words("pin", f"{named(new)} {is_or_are(new)} pinned, and always {stays} from the next round on")
+
+    def new(self, state: RunState) -> tuple[str, ...]:
+        """The models that are not pinned yet."""
+        return tuple(name for name in names_of(state, self.models) or () if name not in state.pinned)
+
+
+@dataclass(frozen=True, slots=True)
+class Unpin:
+    """Let pinned models be removed again."""
+
+    kind: ClassVar[str] = "unpin"
+    offer: ClassVar[str] = "unpin"
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        return "" if self.pinned(now.state) else "not pinned"
+
+    def words(self, state: RunState) -> Words:
+        pinned = self.pinned(state)
+        return Words("unpin", f"{named(pinned)} {is_or_are(pinned)} unpinned")
+
+    def pinned(self, state: RunState) -> tuple[str, ...]:
+        """The models that are pinned."""
+        return tuple(name for name in names_of(state, self.models) or () if name in state.pinned)
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """Test a selection: `models` are the ones that are kept."""
+
+    kind: ClassVar[str] = "try"
+    offer: ClassVar[str] = ""
+    models: tuple[int, ...]
+
+    def refusal(self, now: Situation) -> str:
+        state, names = now.state, names_of(now.state, self.models, empty=True)
+        if names is None:
+            return NO_MODELS
+        if state.baseline is None:
+            return NO_FAILURE
+        keep = frozenset(names)
+        if keep == frozenset(state.environment):
+            return "that is the environment as it is: nothing is left out"
+        under_way = (trial for trial in state.trials if not trial.verdict)
+        return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
+
+    def words(self, state: RunState) -> Words:
+        names = names_of(state, self.models, empty=True) or ()
+        keep = frozenset(names)
+        without = [name for name in state.environment if name not in keep]
+        is_part = keep < frozenset(state.environment)
+        what = f"without {named(without)}" if is_part and len(without) <= len(names) else f"only {named(names)}"
+        what = f"{count(len(names), 'model')}, {what}" if names else "none of the models"
+        return Words("try", f"try {len(state.trials) + 1}: {what}")
+
+
+@dataclass(frozen=True, slots=True)
+class Adopt:
+    """Make a try that showed f the environment."""
+
+    kind: ClassVar[str] = "adopt"
+    offer: ClassVar[str] = "adopt"
+    trial: int
+
+    def refusal(self, now: Situation) -> str:
+        state, trial = now.state, self.meant(now.state)
+        if trial is None:
+            return "there is no such try"
+        # What counted as f then may not count here.
+        if trial.verdict != "similar" or state.tests[trial.tests[-1] - 1].outcome != "similar":
+            return f"{trial.label} did not show f"
+        if trial.models == state.environment:
+            return f"{trial.label} is the environment already"
+        lacking = lacks_pinned(state, trial.models)
+        return f"{trial.label} {lacking}" if lacking else ""
+
+    def words(self, state: RunState) -> Words:
+        trial = self.meant(state)
+        size = 0 if trial is None else trial.size
+        return Words("adopt", f"try {self.trial} is adopted: E becomes its {count(size, 'model')}")
+
+    def meant(self, state: RunState) -> Trial | None:
+        """The try, None if there is none of this number."""
+        return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptOther:
+    """Count another failure as f from here on; the models of its test become the environment."""
+
+    kind: ClassVar[str] = "accept_other"
+    offer: ClassVar[str] = "take as f"
+    test: int
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if state.baseline is None:
+            return NO_FAILURE
+        if not 0 < self.test <= len(state.tests):
+            return "there is no such test"
+        test = state.tests[self.test - 1]
+        if test.outcome != "other" or test.phase not in ("round", "hand") or test.end_pose is None:
+            return f"test {test.id} did not end in another failure"
+        models, label = now.tested_models(test), label_of(state, test)
+        if models is None or not frozenset(models) < frozenset(state.environment):
+            return f"{label} is no part of the environment as it is now"
+        lacking = lacks_pinned(state, models)
+        return f"{label} {lacking}" if lacking else ""
+
+    def words(self, state: RunState) -> Words:
+        test = state.tests[self.test - 1]
+        said = f"the other failure of {label_of(state, test)} counts as f, too"
+        return Words("take another failure as f", said, _question(state, test))
+
+
+def nearest_other(state: RunState, row: Row) -> Test | None:
+    """The test of a candidate or try that ended in another failure, the one whose end is nearest to f's."""
+    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
+    others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
+    return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
+
+
+def _question(state: RunState, test: Test) -> str:
+    """What happened in the test, beside f."""
+    row = row_of(state, test)
+    models = "" if row is None else f" ({count(row.size, 'model')})"
+    near = test.distance is not None and math.isfinite(test.distance)
+    apart = f", {test.distance:.2f} m from f's end" if near else ""
+    f = "" if state.baseline is None else f"\nIn f it {deed(state.failure)} at {_position(state.baseline.position)}."
+    return (
+        f"In {printable(label_of(state, test))}{models} the robot {deed(test.failure)} at {_position(test.end_pose)}{apart}.{f}"
+        "\n\nCount this failure as f, too? Then these models become the environment. u takes it back."
+    )
+
+
+def _position(pose: tuple[float, ...] | None) -> str:
+    return "an unknown place" if pose is None else "({:.2f}, {:.2f}, {:.2f}) m".format(*pose[:3])

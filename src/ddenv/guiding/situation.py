@@ -1,0 +1,111 @@
+"""What the rules look at, and what all commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from ddenv.map.names import shortened
+from ddenv.runfile.state import Candidate, RunState, Test, Trial
+from ddenv.words import first_of
+
+EngineIs = Literal["alive", "starting", "absent"]
+Row = Candidate | Trial
+
+# This many models are named in a line, each in this many columns.
+NAMED, LONGEST = 2, 32
+
+FINISHED = "the run is finished; u, h, c, p, w and o go on from there"
+NO_FAILURE = "f is not known yet: the baseline comes first"
+NO_MODELS = "no such models"
+ROUND_OVER = "this round is over"
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """A run, and what else decides whether a command is possible.
+
+    `barred` is why this viewer can ask for nothing at all, or "". `pending` is the kind of the viewer's last command while the
+    engine has not obeyed it, or "". With `search_due` the search that was on is over. `models_of` returns the models that were
+    there in a test, None where that is not known; without it, what the state says.
+    """
+
+    state: RunState
+    engine: EngineIs = "alive"
+    barred: str = ""
+    pending: str = ""
+    search_due: bool = False
+    models_of: Callable[[int], Collection[str] | None] | None = None
+
+    def needs_engine(self) -> str:
+        """Why no engine can answer now, or ""."""
+        if self.engine == "starting":
+            return "the engine is still starting"
+        if self.state.status == "finished":
+            return FINISHED
+        return "no engine is running; space starts one" if self.engine == "absent" else ""
+
+    def tested_models(self, test: Test) -> Collection[str] | None:
+        """The models that were there in a test; None where that is not known."""
+        if self.models_of is not None:
+            return self.models_of(test.id)
+        row = row_of(self.state, test)
+        return None if row is None else row.models
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """A command in words: `brief` while it waits for its answer, `said` when it is sent, `question` before that, or ""."""
+
+    brief: str
+    said: str = ""
+    question: str = ""
+
+
+def row_of(state: RunState, test: Test) -> Row | None:
+    """The candidate of the current round, or the try, that a test was made for or counts for."""
+    if test.trial is not None:
+        return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
+    current = state.round
+    if current is None:
+        return None
+    if test.round == current.number and test.candidate is not None:
+        return current.candidates[test.candidate]
+    # The verdict may rest on tests of earlier rounds.
+    return next((each for each in current.candidates if each.known and test.id in each.tests), None)
+
+
+def label_of(state: RunState, test: Test) -> str:
+    """What a test was made for, in words."""
+    row = row_of(state, test)
+    return row.label if row is not None else f"a candidate of round {test.round}"
+
+
+def names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
+    """The names of numbered models, each once; None where there are no such models, or none at all unless `empty`."""
+    if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
+        return None
+    return tuple(state.elements[number] for number in dict.fromkeys(numbers))
+
+
+def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
+    """The numbers of models, in the order of the world."""
+    number = {name: index for index, name in enumerate(state.elements)}
+    return tuple(sorted(number[name] for name in names))
+
+
+def lacks_pinned(state: RunState, models: Iterable[str]) -> str:
+    """Why a selection cannot become the environment, as the end of a sentence; or ""."""
+    pinned = state.pinned.difference(models)
+    lacking = [name for name in state.environment if name in pinned]
+    return f"is without {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+
+
+def named(names: Iterable[str]) -> str:
+    """The first names of some models, fit for a line."""
+    return first_of([shortened(name, LONGEST) for name in names], NAMED)
+
+
+def is_or_are(names: Collection[str]) -> str:
+    return "is" if len(names) == 1 else "are"

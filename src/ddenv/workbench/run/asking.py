@@ -1,0 +1,198 @@
+"""From the run screen to the engine: commands are sent beside the screen, and an engine is started where one is needed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cached_property
+from typing import Any
+
+from textual.screen import Screen
+
+from ddenv.errors import UserError
+from ddenv.guiding.commands import Command, data_of, refusal, said, starts_engine
+from ddenv.guiding.pace import StartEngine
+from ddenv.guiding.situation import Situation
+from ddenv.runfile.state import Trial
+from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.run.processes import Engine
+from ddenv.workbench.wording import attach_name, count, duration, plain
+
+# An engine answers within a moment; after this time it hangs, or its machine does, s.
+PATIENCE = 5
+
+
+class Asking:
+    """Sends commands for `screen`, and knows which of them the engine has not obeyed yet."""
+
+    def __init__(self, screen: Screen[Any], poll: Poll, engine: Engine, changed: Callable[[], None]) -> None:
+        """`changed` is called when another command waits for its answer."""
+        self._screen, self._poll, self._engine, self._changed = screen, poll, engine, changed
+        # The last command, with its id, 0 while it is being sent.
+        self._last: tuple[int, Command | None] = (0, None)
+        self._asked_at = 0.0
+        self.sending = 0
+        # The words of the commands of this screen, by their ids.
+        self._mine: dict[int, str] = {}
+        # The id of the last command that the run goes on from, 0 if an engine was started for it.
+        self._due = 0
+        self._sender: ThreadPoolExecutor | None = None
+
+    def close(self) -> None:
+        """What was sent is still written."""
+        if self._sender is not None:
+            self._sender.shutdown(wait=False)
+
+    # What is possible.
+
+    @property
+    def situation(self) -> Situation:
+        """What the rules look at."""
+        snapshot, last = self._poll.snapshot, self._last[1]
+        pending = last.kind if last is not None and self.waiting_for() else ""
+        return Situation(snapshot.state, snapshot.engine, self.barred, pending)
+
+    @property
+    def barred(self) -> str:
+        """Why this screen can ask for nothing, or ""."""
+        snapshot = self._poll.snapshot
+        if self._poll.watch:
+            return self._watching
+        if snapshot.gone:
+            return "the run file is gone: nothing can be asked for; q leaves"
+        return "this run file cannot be read" if snapshot.error else ""
+
+    @cached_property
+    def _watching(self) -> str:
+        return f"watching only: 'ddenv open {attach_name(self._poll.path)}' without --watch guides it"
+
+    def waiting_for(self) -> str:
+        """What was asked for and is not done yet, in words."""
+        (id, command), snapshot = self._last, self._poll.snapshot
+        if command is None:
+            return ""
+        words = command.words(snapshot.state).brief
+        if self.sending:
+            return words
+        if snapshot.state.last_command >= id or snapshot.engine != "alive":
+            return ""
+        late = int(time.monotonic() - self._asked_at)
+        return words if late < PATIENCE else f"{words}: no answer for {duration(late)}"
+
+    # What is said.
+
+    def refuse(self, why: str) -> None:
+        """Says why something does not happen."""
+        self._screen.notify(plain(why), severity="warning", timeout=4, markup=False)
+
+    def say(self, what: str) -> None:
+        self._screen.notify(plain(what), timeout=4, markup=False)
+
+    def tell_refusal(self, before: Snapshot) -> None:
+        """Says why the engine did not do what this screen asked for."""
+        id, why = self._poll.snapshot.state.refusal
+        if (id, why) != before.state.refusal and id in self._mine:
+            self.refuse(f"{self._mine[id]}: not done, {why}")
+
+    def tell_tries(self, before: Snapshot) -> None:
+        """Says how the user's own selections were judged since `before`."""
+        now = self._poll.snapshot.state.trials
+        if before.state.trials == now:
+            return
+        judged = {trial.number for trial in before.state.trials if trial.verdict}
+        for trial in now:
+            if trial.verdict and trial.number not in judged:
+                self.say(_judged(trial, self._poll.watch))
+
+    # Sending.
+
+    def ask(self, command: Command | StartEngine, *, sure: bool = False) -> None:
+        """Sends a command, after its question unless the user is `sure`, or says why it is not possible."""
+        now = self.situation
+        if why := refusal(command, now):
+            self.refuse(why)
+        elif isinstance(command, StartEngine):
+            self._start_engine()
+        elif sure or not (question := command.words(now.state).question):
+            self.send(command)
+        else:
+            from ddenv.workbench.widgets.question import Question
+
+            self._screen.app.push_screen(Question(question), lambda yes: self.send(command) if yes else None)
+
+    def send(self, command: Command, then: Callable[[], None] | None = None) -> None:
+        """Asks the engine for something, without waiting for the file; `then` comes once it is written.
+
+        Where no engine works, the next one obeys it. One is started for it if the run goes on from there.
+        """
+        now = self.situation
+        if words := said(command, now):
+            self.say(words)
+        self.sending += 1
+        self._last, self._asked_at = (0, command), time.monotonic()
+        self._changed()
+
+        def sent(id: int, error: str) -> None:
+            self.sending -= 1
+            if error:
+                self._screen.notify(error, severity="error", markup=False)
+            else:
+                self._mine[id] = command.words(now.state).brief
+                self._last = id, command
+                if starts_engine(command, self._poll.snapshot.state):
+                    self._due = id
+                    self.go_on()
+                if then is not None:
+                    then()
+            if self._screen.is_attached:
+                self._changed()
+
+        if self._sender is None:
+            # One thread: commands arrive in the order they were sent.
+            self._sender = ThreadPoolExecutor(1, "send")
+        self._sender.submit(self._write, command, sent, asyncio.get_running_loop(), contextvars.copy_context())
+
+    def _write(
+        self,
+        command: Command,
+        sent: Callable[[int, str], None],
+        loop: asyncio.AbstractEventLoop,
+        context: contextvars.Context,
+    ) -> None:
+        id, error = 0, ""
+        try:
+            id = self._poll.file.send(command.kind, **data_of(command))
+        except UserError as trouble:
+            error = str(trouble)
+        # The screen may be gone by now.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(sent, id, error, context=context)
+
+    # The engine.
+
+    def go_on(self) -> None:
+        """Starts an engine for what was asked for where none works, or where the last one ended without having read it."""
+        snapshot = self._poll.snapshot
+        if self._due > snapshot.state.last_command and snapshot.engine == "absent" and not snapshot.error:
+            self._due = 0
+            self._start_engine()
+
+    def _start_engine(self) -> None:
+        state = self._poll.snapshot.state
+        try:
+            self._engine.start(state.jobs or os.cpu_count() or 1, state.accept_mode)
+        except UserError as error:
+            self._screen.notify(str(error), severity="error", markup=False)
+
+
+def _judged(trial: Trial, watch: bool) -> str:
+    if trial.verdict == "similar":
+        then = "" if watch else ": a on its row adopts it"
+        return f"{trial.label} shows f with {count(trial.size, 'model')}{then}"
+    known = ", known from before" if trial.known and trial.known == len(trial.tests) else ""
+    return f"{trial.label} does not show f in {count(len(trial.tests), 'test')}{known}"

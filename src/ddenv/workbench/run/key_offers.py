@@ -1,0 +1,78 @@
+"""What the keys that guide the run mean now: what they do, what the footer says, and why one does nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import partial
+
+from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.opening import Opening
+from ddenv.workbench.run.poll import Poll
+from ddenv.workbench.run.run_keys import GUIDING
+from ddenv.workbench.help.footer import KeyFooter
+
+# These ask for models where none are selected.
+TITLES = {
+    "pin": "Pin (or unpin) models: they always stay",
+    "without": "Try without these models",
+    "only": "Try only these models",
+}
+
+
+class KeyOffers:
+    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in `table` and `world`."""
+
+    def __init__(self, poll: Poll, table: Candidates, world: WorldMap, asking: Asking, opening: Opening) -> None:
+        self._poll, self._table, self._world, self._asking, self._opening = poll, table, world, asking, opening
+
+    def offer(self, name: str) -> Offer:
+        """What a key comes to now."""
+        return offer(name, self._asking.situation, self.pointed)
+
+    @property
+    def pointed(self) -> Pointed:
+        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
+        names, elements = self._selection(), self._poll.snapshot.state.elements
+        known = tuple(name for name in elements if name in names) if names else ()
+        models = (*known, *sorted(names.difference(known)))
+        row = self._table.under_cursor if self._table.is_attached and self._table.is_on_screen else None
+        return Pointed(row, self._table.following, models)
+
+    def _selection(self) -> frozenset[str]:
+        """The models that were selected by hand, or the one that the crosshair is on."""
+        if self._world.selection:
+            return frozenset(self._world.selection)
+        name = self._world.model_at_cursor if self._world.has_focus else None
+        return frozenset() if name is None else frozenset((name,))
+
+    def show(self, footer: KeyFooter) -> None:
+        """The footer offers what is possible."""
+        now, pointed = self._asking.situation, self.pointed
+        for name, binding in GUIDING.items():
+            offered = offer(name, now, pointed)
+            footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
+
+    def refuse(self, name: str) -> None:
+        """Says why a key does nothing."""
+        self._asking.refuse(self.offer(name).why_not)
+
+    def use(self, name: str) -> None:
+        """Does what a key means now; where models must be selected and none are, it asks for them."""
+        command = self.offer(name).command
+        if command is not None:
+            self._asking.ask(command)
+        elif name == "change":
+            self._opening.change()
+        elif name in TITLES:
+            environment = self._poll.snapshot.state.environment
+            self._opening.choose(TITLES[name], environment, True, partial(self._chosen, name))
+
+    def _chosen(self, name: str, models: Collection[str]) -> None:
+        now = offer(name, self._asking.situation, Pointed(models=tuple(models)))
+        if now.command is None:
+            self._asking.refuse(now.why_not)
+        else:
+            self._asking.ask(now.command)

@@ -1,0 +1,131 @@
+"""What opens beside the run screen: dialogs, the history, the export, the 3-D scene; and the way out of the workbench."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from rich.text import Text
+from textual.screen import Screen
+
+from ddenv.guiding.course import GoBack
+from ddenv.guiding.pace import Stop
+from ddenv.runfile.settings import settings
+from ddenv.workbench.background import is_open
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
+from ddenv.workbench.map.place import LAYERS
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.poll import Poll
+from ddenv.workbench.run.processes import Scene
+from ddenv.workbench.wording import attach_name
+
+
+class Opening:
+    """Opens dialogs above `screen`, and does what they come to."""
+
+    def __init__(self, screen: Screen[Any], poll: Poll, asking: Asking, world: WorldMap, scene: Scene) -> None:
+        self._screen, self._poll, self._asking, self._world, self._scene = screen, poll, asking, world, scene
+
+    def choose(self, title: str, names: Sequence[str], several: bool, then: Callable[[tuple[str, ...]], None]) -> None:
+        """Asks for models by their names."""
+        from ddenv.workbench.run.choose import ChooseModels
+
+        if not names:
+            self._asking.refuse("there are no models to choose from")
+            return
+        dialog = ChooseModels(title, names, several=several, pinned=self._poll.snapshot.state.pinned)
+        self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
+
+    def change(self) -> None:
+        """Asks for other settings."""
+        from ddenv.workbench.run.change import Change
+
+        ask = self._asking.ask
+        dialog = Change(self._poll.snapshot.state)
+        self._screen.app.push_screen(dialog, lambda command: None if command is None else ask(command))
+
+    def history(self) -> None:
+        """The tree of reductions, and the way back to one of them."""
+        from ddenv.workbench.history.history_screen import History
+
+        history = History(lambda: self._asking.situation, self._world.place)
+        ask = self._asking.ask
+        # The question was asked there.
+        self._screen.app.push_screen(history, lambda node: None if node is None else ask(GoBack(node), sure=True))
+
+    def layers(self, then: Callable[[], None]) -> None:
+        """What the map shows; `then` comes when that is chosen."""
+        from ddenv.workbench.run.choose import Layers
+
+        self._screen.app.push_screen(Layers(self._world, LAYERS), lambda _: then())
+
+    def copy(self, selected: Sequence[str]) -> None:
+        """What can be copied: names, and the commands that come back to this run."""
+        from ddenv.workbench.run.choose import Copy
+
+        path = self._poll.path
+        texts = [("names of the models left", "\n".join(self._poll.snapshot.state.environment))]
+        if selected:
+            texts.append(("names selected", "\n".join(selected)))
+        name = attach_name(path)
+        texts += [("to come back", f"ddenv open {name}"), ("to go on without it", f"ddenv resume {name}")]
+        texts += [("where the run file is", str(path))]
+        self._screen.app.push_screen(Copy(texts))
+
+    def export(self) -> None:
+        from ddenv.workbench.export.export_dialog import ExportScreen
+
+        self._screen.app.push_screen(ExportScreen(self._poll.path))
+
+    def method(self) -> None:
+        """How the run is reduced."""
+        options = settings(self._poll.snapshot.state)
+        self._screen.app.push_screen(Method(options.algorithm, options.pair))
+
+    def scene(self) -> None:
+        """The address of the 3-D scene, which is started if it is not on."""
+        dialog = SceneDialog(self._scene)
+        if not self._scene.on:
+            self._scene.start()
+            self._screen.run_worker(partial(self._await_scene, dialog), group="scene", thread=True)
+        self._screen.app.push_screen(dialog)
+
+    def _await_scene(self, dialog: SceneDialog) -> None:
+        self._scene.wait()
+        self._screen.app.call_from_thread(self._scene_answered, dialog)
+
+    def _scene_answered(self, dialog: SceneDialog) -> None:
+        if is_open(dialog):
+            dialog.refresh_address()
+        elif self._scene.trouble:
+            self._screen.notify(self._scene.trouble, severity="error", markup=False)
+
+    # Out of the workbench.
+
+    def detach(self) -> None:
+        """Leaves the workbench and says how to come back."""
+        works = "The engine works on" if self._poll.snapshot.engine != "absent" else "No engine is running"
+        again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
+        self._exit(f"{works}. Attach again with: ddenv open {again}")
+
+    def quit(self) -> None:
+        """Leaves at once where there is no engine; else asks what becomes of it."""
+        snapshot = self._poll.snapshot
+        if snapshot.engine == "absent" or snapshot.gone:
+            self._screen.app.exit(0)
+        elif self._poll.watch:
+            self.detach()
+        else:
+            self._screen.app.push_screen(Quit(), self._quit)
+
+    def _quit(self, answer: str | None) -> None:
+        if answer == "leave":
+            self.detach()
+        elif answer == "stop":
+            resume = f"ddenv resume {attach_name(self._poll.path)}"
+            self._asking.send(Stop(), then=lambda: self._exit(f"The engine stops. Go on later with: {resume}"))
+
+    def _exit(self, words: str) -> None:
+        self._screen.app.exit(0, message=Text(words))

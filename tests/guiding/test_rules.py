@@ -1,0 +1,182 @@
+"""The rules of what may be decided: the engine obeys what they allow, and refuses the rest in the same words."""
+
+import tempfile
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.engine.control import Control, Stopped
+from ddenv.engine.journal import Journal
+from ddenv.errors import UserError
+from ddenv.guiding.commands import KINDS, data_of, parse, refusal
+from ddenv.guiding.offers import ACTIONS, Pointed, offer
+from ddenv.guiding.pace import StartEngine
+from ddenv.guiding.situation import Situation
+from ddenv.runfile.store import RunFile
+from ddenv.workbench.run.key_offers import KeyOffers
+from ddenv.workbench.run.run_keys import GUIDING
+from tests.engine.fake import ELEMENTS, drive, new_run
+from tests.engine.test_driver import Killed, _kill, flaky
+from tests.engine.test_steering import COMMANDS, Disturbed, at_once
+
+__all__ = ["at_once"]
+
+# As they stand in run files.
+WRITTEN = [
+    ("pause", {}),
+    ("resume", {}),
+    ("step", {"unit": "test"}),
+    ("step", {"unit": "round"}),
+    ("accept", {"round": 1, "candidate": 0}),
+    ("reject", {"round": 1, "candidate": 0}),
+    ("accept_mode", {"mode": "ask"}),
+    ("veto", {"round": 2, "candidate": 3}),
+    ("unveto", {"round": 2, "candidate": 3}),
+    ("pin", {"models": [1, 2]}),
+    ("unpin", {"models": [1]}),
+    ("try", {"models": []}),
+    ("adopt", {"trial": 1}),
+    ("accept_other", {"test": 7}),
+    ("undo", {}),
+    ("go_back", {"node": 0}),
+    ("change", {"settings": {"budget": None, "iterations": 2}}),
+    ("stop", {}),
+]
+ANY = st.one_of(
+    COMMANDS,
+    st.sampled_from([each for each in WRITTEN if each[0] != "stop"]),
+    st.tuples(
+        st.sampled_from(["accept", "reject"]),
+        st.fixed_dictionaries({"round": st.integers(1, 3), "candidate": st.integers(0, 2)}),
+    ),
+)
+
+
+def test_each_command_is_written_as_it_is_read():
+    assert {kind for kind, _ in WRITTEN} == set(KINDS)
+    for kind, data in WRITTEN:
+        command = parse(kind, data)
+        assert (command.kind, data_of(command)) == (kind, data)
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        ("dance", {}),
+        ("veto", {"round": 1}),
+        ("veto", {"round": True, "candidate": 0}),
+        ("pin", {"models": "wall"}),
+        ("try", {"models": [True]}),
+        ("accept_mode", {"mode": "no"}),
+        ("change", {"settings": []}),
+    ],
+)
+def test_data_that_makes_no_sense_is_no_command(kind, data):
+    with pytest.raises(UserError):
+        parse(kind, data)
+
+
+def begun(folder, salt, plan, moment, mode):
+    """The file of a run that was guided by `plan` until its engine was killed after so many events."""
+    path, plan = new_run(Path(folder)), sorted(plan, key=lambda one: one[0])
+    pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, plan, salt)
+    try:
+        drive(path, pool, accept_mode=mode, prepare=lambda file: _kill(file, moment))
+    except Killed:
+        pass
+    finally:
+        pool.viewer.close()
+    return path
+
+
+RUNS = {
+    "salt": st.integers(0, 3),
+    "plan": st.lists(st.tuples(st.integers(0, 20), COMMANDS), max_size=4),
+    "moment": st.integers(3, 90),
+}
+
+
+@given(**RUNS, mode=st.sampled_from(["automatic"]), asked=st.lists(ANY, min_size=1, max_size=6))
+def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_words(salt, plan, moment, mode, asked):
+    with tempfile.TemporaryDirectory() as folder:
+        path = begun(folder, salt, plan, moment, mode)
+        with RunFile(path) as file:
+            file.own()
+            journal = Journal(file)
+            control = Control(journal, threading.Event())
+            for kind, data in asked:
+                before = journal.state
+                now = Situation(before, search_due=journal.steered, models_of=journal.keep_of_test)
+                why = refusal(parse(kind, data), now)
+                command = file.send(kind, **data)
+                control.poll()
+                after = journal.state
+                assert after.last_command == command
+                if why:
+                    assert after.refusal == (command, why)
+                    assert after.decisions == before.decisions
+                else:
+                    assert after.refusal == before.refusal
+                    decided = kind not in ("pause", "resume", "step", "accept_mode")
+                    assert len(after.decisions) == len(before.decisions) + decided
+
+
+@given(**RUNS, models=st.sets(st.sampled_from(ELEMENTS), max_size=3), follows=st.booleans(), row=st.integers(0, 9))
+def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, follows, row):
+    with tempfile.TemporaryDirectory() as folder:
+        path = begun(folder, salt, plan, moment, "automatic")
+        with RunFile(path) as file:
+            file.own()
+            state = Journal(file).state
+            rows = [*(state.round.candidates if state.round else ()), *state.trials, None]
+            pointed = Pointed(rows[row % len(rows)], follows, tuple(name for name in ELEMENTS if name in models))
+            for action in ACTIONS:
+                offered = offer(action, Situation(state), pointed)
+                if offered.command is None or isinstance(offered.command, StartEngine):
+                    continue
+                assert not offered.why_not
+                journal = Journal(file)
+                if offer(action, Situation(journal.state, search_due=journal.steered), pointed) != offered:
+                    continue
+                command = file.send(offered.command.kind, **data_of(offered.command))
+                Control(journal, threading.Event()).poll()
+                assert journal.state.refusal[0] != command
+
+
+@given(
+    **RUNS,
+    models=st.sets(st.sampled_from(ELEMENTS), max_size=3),
+    engine=st.sampled_from(["alive", "starting", "absent"]),
+    barred=st.sampled_from(["", "watching only"]),
+)
+def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engine, barred):
+    with tempfile.TemporaryDirectory() as folder:
+        with RunFile(begun(folder, salt, plan, moment, "automatic")) as file:
+            state = Journal(file).state
+        now = Situation(state, engine, barred)
+        table = SimpleNamespace(under_cursor=None, following=True, is_attached=True, is_on_screen=True)
+        world, poll = SimpleNamespace(selection=models, has_focus=False), SimpleNamespace(snapshot=SimpleNamespace(state=state))
+        keys, said = KeyOffers(poll, table, world, SimpleNamespace(situation=now), None), {}
+        keys.show(SimpleNamespace(say=said.__setitem__))
+        for action, binding in GUIDING.items():
+            offered = keys.offer(action)
+            assert bool(said[binding.id]) == (not offered.why_not)
+            if offered.command is not None:
+                assert refusal(offered.command, now) == ""
+            assert not barred or offered.why_not == barred
+
+
+def test_a_stop_is_obeyed_once(tmp_path):
+    path = new_run(tmp_path)
+    with RunFile(path) as file:
+        file.own()
+        journal = Journal(file)
+        control = Control(journal, threading.Event())
+        command = file.send("stop")
+        with pytest.raises(Stopped):
+            control.poll()
+        assert journal.state.last_command == command
