@@ -22,6 +22,7 @@ from ddenv.workbench.run.run_keys import GUIDING
 from tests.engine.fake import ELEMENTS, drive, new_run
 from tests.engine.test_driver import Killed, _kill, flaky
 from tests.engine.test_steering import COMMANDS, Disturbed, at_once
+from tests.tiers import examples
 
 __all__ = ["at_once"]
 
@@ -100,6 +101,7 @@ RUNS = {
 }
 
 
+@examples(0.3)
 @given(**RUNS, mode=st.sampled_from(["automatic"]), asked=st.lists(ANY, min_size=1, max_size=6))
 def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_words(salt, plan, moment, mode, asked):
     with tempfile.TemporaryDirectory() as folder:
@@ -125,6 +127,7 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
                     assert len(after.decisions) == len(before.decisions) + decided
 
 
+@examples(0.3)
 @given(**RUNS, models=st.sets(st.sampled_from(ELEMENTS), max_size=3), follows=st.booleans(), row=st.integers(0, 9))
 def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, follows, row):
     with tempfile.TemporaryDirectory() as folder:
@@ -147,6 +150,7 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
                 assert journal.state.refusal[0] != command
 
 
+@examples(0.3)
 @given(
     **RUNS,
     models=st.sets(st.sampled_from(ELEMENTS), max_size=3),
