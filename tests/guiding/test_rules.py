@@ -163,7 +163,10 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
             state = Journal(file).state
         now = Situation(state, engine, barred)
         table = SimpleNamespace(under_cursor=None, following=True, is_attached=True, is_on_screen=True)
-        world, poll = SimpleNamespace(selection=models, has_focus=False), SimpleNamespace(snapshot=SimpleNamespace(state=state))
+        world, poll = (
+            SimpleNamespace(selection=models, has_focus=False),
+            SimpleNamespace(snapshot=SimpleNamespace(state=state)),
+        )
         keys, said = KeyOffers(poll, table, world, SimpleNamespace(situation=now), None), {}
         keys.show(SimpleNamespace(say=said.__setitem__))
         for action, binding in GUIDING.items():

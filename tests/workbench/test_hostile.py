@@ -91,7 +91,7 @@ async def test_no_name_steers_the_terminal(runs, size):
     fake_run.guided(run)
     run.hold()
     async with Attached(run, size) as session:
-        session.screen._mine = {1: "veto"}
+        session.screen.asking._mine = {1: "veto"}
         run.write("command_refused", command=1, why="no \x1b]0;title\x07\u202e")
         await session.look()
         assert "not done" in session.said()
@@ -276,9 +276,9 @@ async def test_an_engine_that_hangs_is_told(run, monkeypatch):
     run.hold()
     async with Attached(run) as session:
         await session.press("space")
-        assert "no answer" not in session.screen.waiting_for()
+        assert "no answer" not in session.screen.asking.waiting_for()
         monkeypatch.setattr("ddenv.workbench.run.asking.PATIENCE", 0)
-        assert session.screen.waiting_for().startswith("pause: no answer for")
+        assert session.screen.asking.waiting_for().startswith("pause: no answer for")
 
 
 @pytest.mark.parametrize("text", ["~nobody-of-this-name/x", "x" * 5000, "a\0b", "\ud800"])

@@ -2,12 +2,15 @@
 
 import os
 import sqlite3
+import threading
 
 import fake_run
 import pytest
+from attached import Attached
 
 from ddenv import __version__
 from ddenv.errors import UserError
+from ddenv.guiding.pace import Pause, Resume, Stop
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run import poll as polling
 from ddenv.workbench.run.observed import Busy, Observed
@@ -170,23 +173,24 @@ def test_a_busy_file_keeps_what_was_read(run, poll, monkeypatch):
     assert look(poll).state.paused
 
 
-async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run, poll):
-    answers = []
-    for kind in ("pause", "resume", "stop"):
-        poll.send(kind, {}, lambda id, error: answers.append((id, error)))
-    await eventually(lambda: len(answers) == 3)
-    assert answers == [(1, ""), (2, ""), (3, "")]
-    assert [command.kind for command in run.file.commands()] == ["pause", "resume", "stop"]
+async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run):
+    fake_run.mid_round(run)
+    async with Attached(run) as session:
+        answers = []
+        for command in (Pause(), Resume(), Stop()):
+            session.screen.asking.send(command, then=lambda: answers.append(threading.current_thread()))
+        await eventually(lambda: len(answers) == 3)
+        assert set(answers) == {threading.current_thread()}
+        assert [kind for kind, _ in session.asked()] == ["pause", "resume", "stop"]
 
 
 async def test_a_watched_run_is_sent_nothing(run):
-    watching = Poll(run.path, watch=True)
-    answers = []
-    watching.send("stop", {}, lambda id, error: answers.append((id, error)))
-    await eventually(lambda: answers)
-    assert answers[0][0] == 0 and "--watch" in answers[0][1]
-    assert run.file.commands() == []
-    watching.close()
+    fake_run.mid_round(run)
+    async with Attached(run, watch=True) as session:
+        session.screen.asking.send(Stop())
+        await session.pilot.pause()
+        assert "--watch" in session.said()
+        assert session.commands() == []
 
 
 def test_an_engine_of_another_version_is_told(run, poll):

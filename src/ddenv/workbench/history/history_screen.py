@@ -24,7 +24,6 @@ from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.run.log import decision_line
-from ddenv.words import first_of
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten

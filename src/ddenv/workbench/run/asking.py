@@ -130,6 +130,9 @@ class Asking:
 
         Where no engine works, the next one obeys it. One is started for it if the run goes on from there.
         """
+        if self._poll.watch:
+            self.refuse(self.barred)
+            return
         now = self.situation
         if words := said(command, now):
             self.say(words)

@@ -6,13 +6,13 @@ from collections.abc import Collection
 from functools import partial
 
 from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_keys import GUIDING
-from ddenv.workbench.help.footer import KeyFooter
 
 # These ask for models where none are selected.
 TITLES = {

@@ -13,10 +13,10 @@ from ddenv.guiding.course import GoBack
 from ddenv.guiding.pace import Stop
 from ddenv.runfile.settings import settings
 from ddenv.workbench.background import is_open
-from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.processes import Scene
 from ddenv.workbench.wording import attach_name
