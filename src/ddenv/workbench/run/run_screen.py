@@ -64,6 +64,7 @@ class RunScreen(Screen[None]):
         Raises UserError for a file that is no run file.
         """
         super().__init__()
+        self.run = run
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, told=self._log.add)
         self._table, self._map, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
@@ -133,7 +134,7 @@ class RunScreen(Screen[None]):
     @work(thread=True, group="world", exclusive=True)
     def _read_world(self) -> None:
         try:
-            place, notice = place_of_run(self.poll.path), ""
+            place, notice = place_of_run(self.run), ""
         except UserError as error:
             place, notice = Place(), str(error)
         tell(self, self._placed, place, notice)
