@@ -14,6 +14,7 @@ from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
 from ddenv.words import count
 
+
 @dataclass(frozen=True, slots=True)
 class Undo:
     """Take back the last reduction, with what was accepted by it; the same is not made again."""
