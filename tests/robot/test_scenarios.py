@@ -82,7 +82,7 @@ def whole(name: str, seed: int) -> RunResult:
     return part(name).template.run(part(name).everything, seed)
 
 
-@of_each(*MINIMAL)
+@of_each("rubble", "friction")
 def test_the_file_is_what_its_script_writes(name, script):
     assert script(name)[name]().encode() == part(name).world.text
 

@@ -11,6 +11,7 @@ from ddenv.world.load import SDF
 from ddenv.world.read import parse_world, read_world
 from ddenv.world.write import convert, write_converted
 from tests.conftest import DATA
+from tests.tiers import slow
 from tests.world.sdf.test_joints import LINKS, joint
 
 
@@ -41,7 +42,10 @@ def assert_same_in_drake(world, path):
         assert len(plant.GetJointIndices(instance)) >= len(model.joints)
 
 
-@pytest.mark.parametrize("path", [DATA / "wall.sdf", SDF / "worlds" / "ditch.sdf"], ids=lambda path: path.stem)
+OWN = [DATA / "wall.sdf", SDF / "worlds" / "ditch.sdf"]
+
+
+@pytest.mark.parametrize("path", slow(pytest.mark.rates, OWN, but=OWN[:1]), ids=lambda path: path.stem)
 def test_our_own_worlds(path, tmp_path):
     world = read_world(path)
     assert write_converted(world, tmp_path / "clean.sdf") == [tmp_path / "clean.sdf"]
