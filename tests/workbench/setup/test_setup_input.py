@@ -7,6 +7,7 @@ from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
 from tests.tiers import slow
+from tests.waiting import eventually
 from tests.workbench.setup.setup_session import Opened
 
 GROUND_ONLY = '<sdf version="1.9"><world name="w">{}</world></sdf>'
@@ -92,7 +93,7 @@ async def test_names_that_cannot_be_files_are_told(scenarios, started):
 async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, size):
     async with Opened(size) as session:
         assert session.told("small") == f"ddenv needs 64 x 18; this terminal has {size[0]} x {size[1]}"
-        assert session.screen.query_one("#small").region.size == size
+        await eventually(lambda: session.screen.query_one("#small").region.size == size)
         await session.pilot.resize_terminal(120, 36)
         await session.pilot.pause()
         assert not session.screen.query_one("#small").display
