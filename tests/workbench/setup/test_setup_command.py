@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from ddenv.cli.app import app as command_line
+from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.command_line import command, source_of
 from tests.workbench.setup.setup_session import Opened
@@ -36,17 +37,16 @@ def asked_by(scenarios, monkeypatch):
     return asked_by
 
 
-# Another value for each option; texts as they are typed.
-OTHER = {
-    "iterations": "7",
-    "budget": "90",
-    "timeout": "12.5",
-    "epsilon": "0.125",
-    "seed": "4",
-    "baseline_runs": "6",
-    "early_stop": "on",
-    "similarity": "trajectory",
-    "as_printed": "on",
+def another(one):
+    """A value that is not the default, as it is typed."""
+    if one.kind is bool:
+        return "off" if one.default else "on"
+    if one.choices:
+        return next(choice for choice in one.choices if choice != one.default)
+    return "90" if one.default is None else str(one.default + (4 if one.kind is int else 0.125))
+
+
+PLACES = {
     "spawn_x": "-5.5",
     "spawn_y": "-0.25",
     "spawn_z": "0.3",
@@ -54,6 +54,7 @@ OTHER = {
     "goal_x": "-6.125",
     "goal_y": "2",
 }
+OTHER = PLACES | {one.name: another(one) for one in OPTIONS if one.shown != "method"}
 
 
 def test_every_setting_has_an_option(scenarios, asked_by):
