@@ -149,6 +149,7 @@ def plugin(tmp_path):
     return python
 
 
+@pytest.mark.programs
 def test_another_packages_schema_is_listed_explained_and_used(plugin):
     done = plugin(
         "import ddenv; from ddenv import schemas\n"

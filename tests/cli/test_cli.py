@@ -70,6 +70,7 @@ def test_the_same_seed_gives_the_same_end_to_the_last_bit():
     assert one["seed"] == 5
 
 
+@pytest.mark.programs
 def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
     _, summary = reduced
     done = ddenv("export", summary["run_file"], "--sdf", tmp_path / "m.sdf", "--scenario", tmp_path / "m.yaml")

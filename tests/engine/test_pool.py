@@ -84,6 +84,7 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
     assert (test, after.outcome) == (2, "failed")
 
 
+@pytest.mark.programs
 def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works():
     pool = Pool(*parts(wall_timeout=0.001), 1)
     try:

@@ -84,6 +84,7 @@ BEST = {"growth": "steady", "skip": "implied"}
         ("splitting", NEAR, {}),
     ],
 )
+@pytest.mark.rates
 def test_the_interval_holds_what_is_left_at_the_start_and_in_most_rounds(algorithm, pair, options):
     at_start, later = [], []
     for seed in range(3):

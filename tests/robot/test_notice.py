@@ -65,6 +65,7 @@ def test_what_is_touched_at_the_start_and_at_the_end_counts(world_of, husky, sce
     assert run(short, "wall").simulated_seconds == end
 
 
+@pytest.mark.rates
 def test_the_tiles_of_the_ditch_are_touched_in_driving_order(ditch, ditch_world):
     result = ditch.run(frozenset(ditch_world.elements()), seed=0)
     names = ["asphalt_near", "rough_tile_10", "rough_tile_11", "rough_tile_20", "asphalt_far"]

@@ -45,6 +45,7 @@ async def test_help_begins_with_the_focused_pane_and_shows_the_users_own_keys(ru
         assert not isinstance(pilot.app.screen, Help)
 
 
+@pytest.mark.screens
 async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs):
     names = [f"[bold]box_{number}[/]" for number in range(3)]
     run = fake_run.FakeRun(runs / "m.ddenv", world=fake_run.world_text(names))

@@ -82,6 +82,7 @@ def steering(app):
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]))
+@pytest.mark.screens
 async def test_no_name_steers_the_terminal(runs, size):
     data = fake_run.scenario(name="evil \x1b]0;title\x07 [bold]\u202e")
     data["description"] = "\x1b[31m\u202e\n[red]"
@@ -337,6 +338,7 @@ def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encodin
 
 
 @pytest.mark.parametrize("key", slow(pytest.mark.screens, ["o", "y", "l", "h"], but=["h"]))
+@pytest.mark.screens
 async def test_dialogs_survive_terminals_without_room(run, key):
     fake_run.guided(run)
     async with Attached(run) as session:

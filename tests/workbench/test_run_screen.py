@@ -72,6 +72,7 @@ async def test_the_baseline_is_listed_run_by_run(run):
         assert "there are no candidates yet" in session.said()
 
 
+@pytest.mark.screens
 async def test_keys_that_only_look(run):
     fake_run.guided(run).hold()
     async with Attached(run) as session:
@@ -128,6 +129,7 @@ async def test_the_log_tells_what_happened_and_goes_on(run):
         assert log.render_line(0).text.startswith("22:13:20")
 
 
+@pytest.mark.screens
 async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(run):
     fake_run.guided(run).hold()
     seen = {

@@ -77,6 +77,7 @@ def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_
         assert bits(smaller.run(parts[number], seed=2)) == expected[number]
 
 
+@pytest.mark.rates
 def test_what_a_pile_does_is_worked_out_once_for_all_plants(cubes, husky, scenario, built, monkeypatch):
     rehearsed = []
     simulate = Rehearsals._simulate

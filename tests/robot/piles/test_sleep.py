@@ -197,6 +197,7 @@ def test_what_falls_out_of_the_world_is_left_alone(add, world_of, husky, scenari
     assert (rows[-10:, 1:] == rows[-1, 1:]).all()
 
 
+@pytest.mark.rates
 def test_a_run_leaves_no_trace_in_the_next(template):
     tower = [cube(f"storey_{number}", 2.0, 0.0, 0.15 + 0.3 * number) for number in range(2)]
     models = (*tower, cube("far", 3.0, 3.0, 0.5), flap("flap", 1.0, -3.0))

@@ -153,6 +153,7 @@ async def test_what_cannot_be_done_says_why(several):
     assert several.path.exists()
 
 
+@pytest.mark.screens
 async def test_d_deletes_after_a_question(several, runs):
     (runs / "done.ddenv.log").touch()
     async with Listed(several) as listed:

@@ -83,6 +83,7 @@ def test_a_limit_can_be_taken_back(scenarios, asked_by):
     assert scenario == asked
 
 
+@pytest.mark.screens
 async def test_what_is_shown_starts_what_start_starts(scenarios, asked_by, started):
     async with Opened() as session:
         assert session.told("command") == "$ ddenv run crates"

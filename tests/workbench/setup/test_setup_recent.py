@@ -49,6 +49,7 @@ def labels(session):
     return [str(files.get_option_at_index(index).prompt) for index in range(files.option_count)]
 
 
+@pytest.mark.screens
 async def test_an_opened_world_is_offered_the_next_time(scenarios, tmp_path):
     folder = tmp_path / "fields"
     folder.mkdir()

@@ -215,6 +215,7 @@ def run(text: str, seed: str = "0") -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.programs
 def test_same_bytes_in_every_process(tmp_path):
     points = np.random.default_rng(1).normal(size=(600, 3))
     vertices = "\n".join(f"v {x} {y} {z}" for x, y, z in points)
