@@ -9,7 +9,7 @@ import yaml
 from docs import settings_table
 from pydantic import ValidationError
 
-from ddenv.cli.app import app
+from ddenv.cli.command_line import app
 from ddenv.errors import UserError
 from ddenv.report.run_data import Record
 from ddenv.settings import CHANGEABLE, OPTIONS, PRINTED, SETTINGS, Failure, Reduction, Simulation, put, read
@@ -167,7 +167,7 @@ EARLIER = {
 
 @pytest.mark.parametrize("changed", [{}, {"growth": "steady", "complement_order": "far-first"}], ids=str)
 def test_an_earlier_run_keeps_its_settings(changed):
-    from ddenv.runfile.settings import Settings
+    from ddenv.runfile.run_settings import Settings
 
     data = load_scenario(DATA / "wall.yaml").model_dump(mode="json") | {"reduction": EARLIER | changed}
     resumed = Scenario.model_validate_json(json.dumps(data))

@@ -246,7 +246,7 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
 
 
 def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
-    from ddenv.cli.app import app
+    from ddenv.cli.command_line import app
     from ddenv.runs.creation import read_parts
     from ddenv.runs.scenarios import with_options
 

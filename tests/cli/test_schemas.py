@@ -61,7 +61,7 @@ def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_pa
 @pytest.mark.parametrize("words", [[], ["--json"]], ids=["lines", "json"])
 def test_the_command_prints_them_without_what_is_slow(words):
     code = (
-        "import sys\nfrom ddenv.cli.app import app\n"
+        "import sys\nfrom ddenv.cli.command_line import app\n"
         f"app(['schemas', *{words}], standalone_mode=False)\n"
         "print([name for name in ('sklearn', 'numpy', 'pydrake', 'scipy') if name in sys.modules], file=sys.stderr)"
     )

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ddenv.cli.app import app
+from ddenv.cli.command_line import app
 from ddenv.schemas import names
 from ddenv.world.scenario import (
     Controller,

@@ -1,5 +1,5 @@
 """The command line: parses, calls, prints."""
 
-from ddenv.cli.app import main
+from ddenv.cli.command_line import main
 
 __all__ = ["main"]

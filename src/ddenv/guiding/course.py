@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from ddenv.errors import UserError, printable
 from ddenv.guiding.situation import NO_FAILURE, Situation, Words
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ddenv.map import arrays as np
+from ddenv.map import lazy_numpy as np
 from ddenv.map.paint import PLAIN, RGB, Canvas, blend, packed, readable
 from ddenv.map.raster import EMPTY, View, label_cells, masks, owners
 

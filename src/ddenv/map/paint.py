@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import overload
 
-from ddenv.map import arrays as np
+from ddenv.map import lazy_numpy as np
 
 RGB = tuple[int, int, int]
 # Eight hues, as distinct as possible for colour-blind readers; partitions beyond H repeat the hues, but not the letters.

@@ -24,9 +24,9 @@ from ddenv.page.markdown import markdown, pictures
 from ddenv.report.by_hand import guiding
 from ddenv.report.outcomes import sureness
 from ddenv.report.repeat import repeat, settings
-from ddenv.report.result import result
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
+from ddenv.report.what_is_left import what_is_left
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.state import Baseline, RunState
 from ddenv.version import __version__
@@ -37,7 +37,7 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    sections = (result(record), way(record), guiding(record), sureness(record), settings(record), repeat(record))
+    sections = (what_is_left(record), way(record), guiding(record), sureness(record), settings(record), repeat(record))
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),

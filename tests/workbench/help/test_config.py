@@ -10,7 +10,7 @@ from rich.style import Style
 from textual.app import App
 from textual.color import Color
 
-from ddenv.cli.app import app as command_line
+from ddenv.cli.command_line import app as command_line
 from ddenv.errors import UserError
 from ddenv.workbench.app import Config
 from ddenv.workbench.help.catalogue import actions, checked

@@ -6,7 +6,7 @@ import fake_run
 import pytest
 import yaml
 
-from ddenv.cli.app import app as command_line
+from ddenv.cli.command_line import app as command_line
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.command_line import command, source_of

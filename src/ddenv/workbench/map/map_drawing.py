@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from ddenv.map import arrays as np
+from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack

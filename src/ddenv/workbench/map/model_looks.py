@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from ddenv.map import arrays as np
+from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Signs
 from ddenv.map.paint import RGB, Canvas
 from ddenv.map.raster import EMPTY

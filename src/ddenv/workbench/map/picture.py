@@ -11,7 +11,7 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from ddenv.map import arrays as np
+from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.paint import NUMBERED, Canvas, readable
 from ddenv.map.raster import Outlines, Spans, View, arrow, braille, heading, owners, spans

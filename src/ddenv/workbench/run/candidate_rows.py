@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 from ddenv.map.names import shortened
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain

@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.guiding import course
 from ddenv.guiding.offers import change
 from ddenv.guiding.situation import Situation
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Value

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.settings import Settings, settings
+from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.workbench.run.explain_decisions import (
     arrival,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ddenv.guiding.situation import named
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import count, plain

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ddenv.runfile.settings import Settings
+from ddenv.runfile.run_settings import Settings
 from ddenv.runfile.state import Round
 from ddenv.schemas import BOTH, Kind, explanation, names, uses
 from ddenv.workbench.wording import count, plain

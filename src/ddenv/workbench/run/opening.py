@@ -11,7 +11,7 @@ from textual.screen import Screen
 
 from ddenv.guiding.course import GoBack
 from ddenv.guiding.pace import Stop
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap

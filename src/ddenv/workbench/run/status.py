@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
 from ddenv.version import __version__

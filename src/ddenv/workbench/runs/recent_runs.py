@@ -10,7 +10,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive, engine_lock
-from ddenv.runfile.settings import settings
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.wording import STATUS

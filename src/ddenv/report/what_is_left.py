@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MOST_MODELS, MOST_NAMES = 200, 12
 
 
-def result(record: Record) -> Section:
+def what_is_left(record: Record) -> Section:
     """The section on what is left."""
     state = record.state
     title = "The minimal environment" if state.minimal else "What is left so far"
@@ -29,7 +29,7 @@ def result(record: Record) -> Section:
     from ddenv.map.footprints import plan
 
     drawn = plan(record.world, CORNERS)
-    blocks: list[Block] = [Picture("map", picture(record, drawn), _told(state))]
+    blocks: list[Block] = [Picture("map", picture(record, drawn), _alternative(state))]
     if near := close_up(record, drawn):
         blocks += [
             say("Where the robot failed, closer:"),
@@ -41,7 +41,7 @@ def result(record: Record) -> Section:
     return Section(title, tuple(blocks))
 
 
-def _told(state: RunState) -> str:
+def _alternative(state: RunState) -> str:
     if state.baseline is None:
         return "The world from above."
     return (
