@@ -54,7 +54,7 @@ def test_those_of_other_packages_are_listed_and_cannot_steer_the_terminal(tmp_pa
     schemas.explanation.cache_clear()
     told = "\n".join(lines())
     assert "  halves\n    Two \N{REPLACEMENT CHARACTER}[31mhalves." in told
-    assert "  gone\n    (nothing is said of it)" in told
+    assert "  gone\n    (no explanation)" in told
     assert report()["partitionings"]["halves"].startswith("Two")
 
 

@@ -50,7 +50,7 @@ def test_while_one_waits_an_earlier_one_is_wanted_after_all(tmp_path, refused):
         # One that does not wait any more is not taken.
         yield "accept", {"round": 1, "candidate": 1}
         state = yield from until(lambda state: state.waiting_candidate == 0)
-        assert "no such reduction" in state.refusal[1]
+        assert "no longer waits" in state.refusal[1]
         assert state.round.candidates[0].verdict == "similar"
         yield "accept_mode", {"mode": "automatic"}
 
@@ -72,7 +72,7 @@ def test_what_waits_is_not_accepted_once_the_search_has_to_begin_anew(tmp_path):
         state = yield from until(lambda state: state.pinned)
         assert (state.status, state.waiting_candidate) == ("paused", None)
         yield "accept", waits
-        yield from until(lambda state: "no such reduction" in state.refusal[1])
+        yield from until(lambda state: "no longer waits" in state.refusal[1])
         yield "accept_mode", {"mode": "automatic"}
         yield "resume", {}
 

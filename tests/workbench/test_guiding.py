@@ -49,7 +49,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "accept: ask" in session.text("#status")
         await session.press("t", "a", "x")
         assert session.asked() == [("accept_mode", {"mode": "automatic"})]
-        assert "nothing waits for accept" in session.said()
+        assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
         assert "without B is vetoed" in session.said()
@@ -62,7 +62,7 @@ async def test_pausing_stepping_and_vetoing(run):
         assert session.asked() == [("undo", {})]
         await session.press("u")
         assert session.asked() == []
-        assert "still on its way" in session.said()
+        assert "the last undo is not done yet" in session.said()
         run.write("command_refused", command=session.run.file.commands()[-1].id, why="there is nothing to take back")
         await session.look()
         assert "undo: not done, there is nothing to take back" in session.said()
@@ -107,7 +107,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         assert session.asked() == [("try", {"models": [2, 3, 4]})]
         await session.press("w", *"nothing", "enter")
         assert isinstance(session.app.screen, ChooseModels)
-        assert "no model is called so" in session.dialog()
+        assert "no name contains this" in session.dialog()
         await session.press("escape")
         trial = run.try_out(run.elements[2:5])
         test = run.start_hand(trial)
@@ -151,10 +151,10 @@ async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
         await session.press("c", "ctrl+s")
         dialog = session.app.screen
         assert isinstance(dialog, Change)
-        assert "that is how it is set already" in session.dialog()
+        assert "these are the settings already" in session.dialog()
         dialog.query_one("#budget", Input).value = "3"
         await session.press("ctrl+s")
-        assert "budget: 15 tests are made already" in session.dialog()
+        assert "budget: 15 tests were made already" in session.dialog()
         dialog.query_one("#budget", Input).value = "200"
         dialog.query_one("#iterations", Input).value = "x"
         await session.press("ctrl+s")
@@ -174,7 +174,7 @@ async def test_a_run_without_an_engine_is_guided_too(run, monkeypatch):
         await session.press("1")
         session.screen.query_one(WorldMap).select(["crate_02"])
         await session.press("p")
-        assert "kept until an engine works, space starts one" in session.said()
+        assert "it waits for an engine, space starts one" in session.said()
         assert not started
         await session.press("u")
         assert "an engine is started for it" in session.said()
@@ -225,7 +225,7 @@ async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
         assert not {"run.accept", "run.reject", "run.resume"} & enabled()
         assert not {"run.accept", "run.reject", "run.resume"} & offered()
         await session.press("x", "r")
-        assert "nothing waits for reject" in session.said()
+        assert "there is nothing to reject" in session.said()
         assert session.asked() == []
         run.similar(1)
         run.write("waiting", candidate=1)
@@ -241,7 +241,7 @@ def test_a_in_the_footer_says_what_it_would_take(run):
     run.write("unpinned", models=[0])
     now = Situation(state_of(run))
     words = [offer("accept", now, Pointed(row)).words for row in now.state.trials]
-    assert words == ["", "take as f", "adopt"]
+    assert words == ["", "count as f", "adopt"]
 
 
 async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch):
@@ -321,7 +321,7 @@ def test_what_a_means_for_a_try(run):
     run.finish(*under_way.tests, "similar", 0.1, failure="stuck")
     run.judge_trial(3, "similar", list(under_way.tests))
     state = state_of(run)
-    assert "without crate_00, which is pinned" in why_not("accept", state, state.trials[2])
+    assert "lacks crate_00, which is pinned" in why_not("accept", state, state.trials[2])
     run.write("unpinned", models=[0])
     state = state_of(run)
     assert meant("accept", state, state.trials[2]) == ("adopt", {"trial": 3})
@@ -341,9 +341,9 @@ def test_what_the_cursor_only_follows_is_not_accepted(run):
     run.test(0, "other", 2.0, 0, "tipped over")
     state = state_of(run)
     followed = Pointed(state.round.candidates[0], follows=True)
-    assert "nothing waits" in offer("accept", Situation(state), followed).why_not
+    assert "nothing to accept" in offer("accept", Situation(state), followed).why_not
     run.write("paused")
-    assert offer("accept", Situation(state_of(run)), followed).words == "take as f"
+    assert offer("accept", Situation(state_of(run)), followed).words == "count as f"
 
 
 def test_models_that_cannot_be_pinned_or_tried(run):

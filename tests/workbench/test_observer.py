@@ -74,7 +74,7 @@ def test_a_deleted_file_is_told_and_never_made_again(run, poll):
     assert after.gone and after.state is before.state
     assert "deleted" in after.error and after.status == "lost"
     assert look(poll) is None
-    with pytest.raises(UserError, match="not there"):
+    with pytest.raises(UserError, match="is gone"):
         poll.file.send("pause")
     poll.close()
     assert not list(run.path.parent.glob("crates-1*"))

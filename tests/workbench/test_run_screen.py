@@ -185,7 +185,7 @@ async def test_e_explains_the_method_of_the_run(runs):
         ):
             assert f"{kind} {name}" in words
             assert explanation(kind, name) in words
-        assert words.count("Not used: splitting does not look at the partitioning.") == 1
+        assert words.count("Not used by splitting.") == 1
         assert static.size.height > len(words) // 80
         await session.press("e")
         assert session.app.screen is session.screen
@@ -226,7 +226,7 @@ async def test_leaving_tells_how_to_come_back(run, key):
     fake_run.mid_round(run).hold()
     async with Attached(run) as session:
         await session.press(key)
-        assert session.app._exit_renderables[0].plain == "The engine works on. Attach again with: ddenv open crates-1"
+        assert session.app._exit_renderables[0].plain == "The engine goes on. Attach again with: ddenv open crates-1"
         assert session.commands() == []
 
 

@@ -44,7 +44,7 @@ def lines(columns: int | None = None) -> list[str]:
 
 def _paragraph(name: str, words: str, columns: int | None) -> list[str]:
     """The name, and below it the words."""
-    return [*wrapped(name, columns, "  "), *wrapped(words or "(nothing is said of it)", columns, "    ")]
+    return [*wrapped(name, columns, "  "), *wrapped(words or "(no explanation)", columns, "    ")]
 
 
 @click.command("schemas")

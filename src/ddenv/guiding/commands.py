@@ -1,4 +1,4 @@
-"""All commands, how they stand in the run file's `command` table, and what holds for each of them.
+"""All commands, their form in the run file's table `command`, and the rules that all of them share.
 
 A command is its kind with its fields as JSON: `veto {"round": 2, "candidate": 3}`. Models are numbers into the run's elements.
 """
@@ -10,7 +10,7 @@ from dataclasses import fields
 from typing import Any, get_args
 
 from ddenv.errors import UserError
-from ddenv.guiding.course import CHANGEABLE, Change, GoBack, Undo
+from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
 from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step, Stop
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
@@ -38,7 +38,7 @@ Command = (
 )
 KINDS: dict[str, Callable[..., Command]] = {each.kind: each for each in get_args(Command)}
 FIELDS: dict[str, list[str]] = {each.kind: [field.name for field in fields(each)] for each in get_args(Command)}
-# These go on from somewhere else: where no engine works, one is started for them.
+# The run goes on from these: an engine is started for them if none is running.
 GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
 
 
@@ -48,19 +48,17 @@ def refusal(command: Command | StartEngine, now: Situation) -> str:
 
 
 def starts_engine(command: Command, state: RunState) -> bool:
-    """Whether an engine is started for a command where none works: a finished search begins again with other pins, too."""
+    """Whether an engine is started for a command if none is running. Other pins restart a finished search."""
     return isinstance(command, GOES_ON) or (isinstance(command, Pin | Unpin) and state.status == "finished")
 
 
 def said(command: Command, now: Situation) -> str:
-    """What is said when a command is sent, or ""."""
+    """What the screen says when a command is sent, or ""."""
     words = command.words(now.state).said
     if not words or now.engine != "absent":
         return words
     starts = starts_engine(command, now.state)
-    return (
-        f"{words}; an engine is started for it" if starts else f"{words}; kept until an engine works, space starts one"
-    )
+    return f"{words}; an engine is started for it" if starts else f"{words}; it waits for an engine, space starts one"
 
 
 def data_of(command: Command) -> dict[str, Any]:
@@ -70,7 +68,7 @@ def data_of(command: Command) -> dict[str, Any]:
 
 
 def parse(kind: str, data: Mapping[str, Any]) -> Command:
-    """A command from a run file. Raises UserError where there is none of this kind, or its data makes no sense."""
+    """A command from a run file. Raises UserError for an unknown kind or invalid data."""
     if kind not in KINDS:
         raise UserError(f"there is no command '{kind[:40]}'")
     return KINDS[kind](**{name: _READ[name](name, data.get(name)) for name in FIELDS[kind]})
@@ -100,8 +98,8 @@ def _mode(_: str, value: Any) -> str:
 
 def _settings(_: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise UserError(f"only {', '.join(CHANGEABLE)} can be changed on the way")
-    # What another program wrote may hold a number as text.
+        raise UserError(ONLY_CHANGEABLE)
+    # Another program may have written a number as text.
     numbers = {name for name, one in CHANGEABLE.items() if one.kind is int}
     return {str(key): int(each) if key in numbers and str(each).isdecimal() else each for key, each in value.items()}
 

@@ -1,4 +1,4 @@
-"""Where a run goes on from, and how: undo, back to another environment, other settings."""
+"""Where a run goes on, and how: undo, go back to another environment, change settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ddenv.words import count
 
 @dataclass(frozen=True, slots=True)
 class Undo:
-    """Take back the last reduction, with what was accepted by it; the same is not made again."""
+    """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
 
     kind: ClassVar[str] = "undo"
     offer: ClassVar[str] = "undo"
@@ -26,7 +26,7 @@ class Undo:
         here = now.state.here
         if here is None or here.parent is None:
             return "there is no reduction to take back"
-        return "the last undo is still on its way" if now.pending == "undo" else ""
+        return "the last undo is not done yet" if now.pending == "undo" else ""
 
     def words(self, state: RunState) -> Words:
         here = state.here
@@ -55,7 +55,7 @@ class GoBack:
     def words(self, state: RunState) -> Words:
         there = place(state.nodes[self.node])
         question = (
-            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o), then space goes on. "
+            f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
             "What was found since then stays in the history, and you can come back to it. No test is made twice."
         )
         return Words("go back", f"back to {there}; the run pauses there", question)
@@ -71,7 +71,7 @@ class Change:
 
     def refusal(self, now: Situation) -> str:
         if not set(self.settings) <= set(CHANGEABLE):
-            return f"only {', '.join(CHANGEABLE)} can be changed on the way"
+            return ONLY_CHANGEABLE
         try:
             for name, value in self.settings.items():
                 _check(name, value)
@@ -80,8 +80,8 @@ class Change:
         new = self.new(now.state)
         budget, done = new.get("budget"), now.state.tests_done
         if isinstance(budget, int) and budget <= done:
-            return f"budget: {count(done, 'test')} are made already; give more, or leave it empty"
-        return "" if new else "that is how it is set already"
+            return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
+        return "" if new else "these are the settings already"
 
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
@@ -89,7 +89,7 @@ class Change:
         return Words("change settings", f"from the next round on: {words}")
 
     def new(self, state: RunState) -> dict[str, Value]:
-        """The settings that are not so already."""
+        """The settings that differ from the current ones."""
         now = settings(state)
         return {key: value for key, value in self.settings.items() if getattr(now, key) != value}
 
@@ -101,12 +101,13 @@ def place(node: Node) -> str:
     return f"the whole world ({models})" if node.parent is None else f"{models} (#{node.number}, {what})"
 
 
-# The settings that may change on the way: all others are part of what a test is, or of how f was fixed.
+# The settings that may change during a run: all others define what a test is, or how f was fixed.
 CHANGEABLE = {one.name: one for one in SETTINGS.values() if one.may_change}
+ONLY_CHANGEABLE = f"only {', '.join(CHANGEABLE)} can be changed during a run"
 
 
 def number(name: str, text: str) -> int | None:
-    """What was typed for a number; None for no limit. Raises UserError."""
+    """The number that was typed; None for no limit. Raises UserError."""
     if not text.strip() and CHANGEABLE[name].none:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What a key means now: the command that it sends, or why it does nothing."""
+"""What a key does now: the command that it sends, or why it does nothing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ddenv.settings import Value
 
 @dataclass(frozen=True, slots=True)
 class Pointed:
-    """What the user points at: the `row` under the cursor, which may only follow the run (`follows`), and selected `models`."""
+    """What the user points at: the `row` under the cursor, which may follow the run (`follows`), and selected `models`."""
 
     row: Row | None = None
     follows: bool = False
@@ -28,9 +28,9 @@ class Pointed:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What an action comes to: `command` is None where something is asked for first, or where it is not possible.
+    """What an action does now: `command` is None if a dialog asks for something first, or if it is not possible.
 
-    `words` are for the footer, "" where the action's usual ones fit. `why_not` is why it is not possible now, or "".
+    `words` are for the footer, "" if the action's usual ones fit. `why_not` is why it is not possible now, or "".
     """
 
     command: Command | StartEngine | None = None
@@ -42,7 +42,7 @@ Meaning = Callable[[Situation, Pointed], Command | StartEngine | None]
 
 
 def offer(action: str, now: Situation, pointed: Pointed) -> Offer:
-    """What an action of `ACTIONS` comes to now."""
+    """What an action of `ACTIONS` does now."""
     if now.barred:
         return Offer(why_not=now.barred)
     try:
@@ -70,24 +70,24 @@ def _accept(now: Situation, pointed: Pointed) -> Command:
     state, row = now.state, pointed.row
     if state.round is not None and state.waiting_candidate is not None:
         return Accept(state.round.number, state.waiting_candidate)
-    # What the cursor only follows comes and goes.
+    # While the cursor follows the run, its row may change before the key is pressed.
     if row is None or (pointed.follows and not isinstance(row, Trial) and not state.paused):
-        raise UserError("nothing waits for accept")
+        raise UserError("there is nothing to accept")
     if row.verdict == "similar":
         if isinstance(row, Trial):
             return Adopt(row.number)
-        raise UserError(f"{row.label} is accepted already; nothing waits for accept")
+        raise UserError(f"{row.label} is accepted already")
     test = nearest_other(state, row)
     if test is None:
         why = f"is {row.verdict}" if row.verdict else "is not judged yet"
-        raise UserError(f"nothing waits for accept; {row.label} {why}, and shows no other failure to count as f")
+        raise UserError(f"there is nothing to accept: {row.label} {why}, and shows no other failure")
     return AcceptOther(test.id)
 
 
 def _reject(now: Situation, _: Pointed) -> Command:
     state = now.state
     if state.round is None or state.waiting_candidate is None:
-        raise UserError("nothing waits for reject")
+        raise UserError("there is nothing to reject")
     return Reject(state.round.number, state.waiting_candidate)
 
 
@@ -130,7 +130,7 @@ def _only(now: Situation, pointed: Pointed) -> Command | None:
 
 
 def _any(state: RunState, models: Collection[str]) -> bool:
-    """Whether models are selected; else the user is asked for some. Raises UserError for models that cannot be."""
+    """Whether models are selected; if not, a dialog asks for some. Raises UserError for models that cannot be selected."""
     elements = frozenset(state.elements)
     fixed = next((name for name in models if name not in elements), None)
     if fixed is not None:
@@ -140,7 +140,7 @@ def _any(state: RunState, models: Collection[str]) -> bool:
     return bool(models)
 
 
-# By the names of the run screen's actions. All else that it does changes nothing in the run.
+# By the names of the run screen's actions. Its other actions change nothing in the run.
 ACTIONS: dict[str, Meaning] = {
     "pause": _pause,
     "resume": lambda now, pointed: StartEngine(),
@@ -154,11 +154,11 @@ ACTIONS: dict[str, Meaning] = {
     "without": _without,
     "only": _only,
     "undo": lambda now, pointed: Undo(),
-    # The settings are asked for in a dialog.
+    # A dialog asks for the settings.
     "change": lambda now, pointed: None,
 }
 
 
 def change(state: RunState, asked: Mapping[str, Value]) -> Change:
-    """The command for settings as they stand in a dialog: only what is new in them."""
+    """The command for the settings in a dialog: only those that are new."""
     return Change(Change(asked).new(state))

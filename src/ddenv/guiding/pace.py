@@ -1,4 +1,4 @@
-"""How fast a run goes on, and whether it asks: pause, resume, step, accept mode, stop, and a new engine."""
+"""The pace of a run, and whether it asks: pause, resume, step, accept mode, stop, start an engine."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class StartEngine:
-    """Start an engine on the run. This is no command: nothing about it is in the run file."""
+    """Start an engine on the run. It is not a command: the run file does not have it."""
 
     offer: ClassVar[str] = "start"
 
@@ -99,4 +99,4 @@ class StartEngine:
         if state.status == "finished":
             return FINISHED
         spent = state.budget is not None and state.tests_done >= state.budget
-        return f"the budget of {state.budget} tests is used up; c gives more" if spent else ""
+        return f"the budget of {state.budget} tests is used up; c raises it" if spent else ""

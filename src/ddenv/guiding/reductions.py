@@ -1,4 +1,4 @@
-"""Candidates of the round: accept or reject the reduction that waits, leave a candidate out, and take that back."""
+"""Candidates of the round: accept or reject the reduction that waits, veto a candidate, take a veto back."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Unveto:
 
 
 def round_over(state: RunState) -> str:
-    """Why no candidate can be left out any more."""
+    """Why candidates can no longer be left out."""
     return "the rounds are over" if state.confirming and not state.ended else ROUND_OVER
 
 
@@ -92,7 +92,7 @@ _Of = Accept | Reject | Veto | Unveto
 
 
 def _candidate(state: RunState, command: _Of) -> Candidate | None:
-    """The candidate that is meant, while its round goes on."""
+    """The command's candidate, while its round goes on."""
     current = state.round
     if current is None or current.done or current.winner is not None or current.number != command.round:
         return None
@@ -107,8 +107,8 @@ def _label(state: RunState, command: _Of) -> str:
 def _not_waiting(now: Situation, command: Accept | Reject) -> str:
     state = now.state
     waits = None
-    # Where a new search is due, what was found before it is not taken any more.
+    # When a new search is due, earlier reductions can no longer be accepted.
     if state.round is not None and state.waiting_candidate is not None and not now.search_due:
         waits = state.round.number, state.waiting_candidate
     same = (command.round, command.candidate) == waits
-    return "" if same else f"there is no such reduction to {command.kind} any more"
+    return "" if same else "that reduction no longer waits"

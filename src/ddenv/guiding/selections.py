@@ -1,4 +1,4 @@
-"""Models chosen by hand: pin and unpin them, try a selection, and take what it showed."""
+"""Models chosen by hand: pin and unpin them, try a selection, adopt it, count its other failure as f."""
 
 from __future__ import annotations
 
@@ -42,7 +42,9 @@ class Pin:
         kept = frozenset(state.environment)
         gone = next((name for name in names if name not in kept), None)
         if gone is not None:
-            return f"{shortened(gone, LONGEST)} is removed already: go back (h) to where it was there, and pin it then"
+            return (
+                f"{shortened(gone, LONGEST)} is removed already: go back (h) to an environment that has it, then pin it"
+            )
         return "" if self.new(state) else "pinned already"
 
     def words(self, state: RunState) -> Words:
@@ -91,7 +93,7 @@ class Try:
             return NO_FAILURE
         keep = frozenset(names)
         if keep == frozenset(state.environment):
-            return "that is the environment as it is: nothing is left out"
+            return "that is the current environment: nothing is left out"
         under_way = (trial for trial in state.trials if not trial.verdict)
         return "that is being tried already" if any(frozenset(each.models) == keep for each in under_way) else ""
 
@@ -117,7 +119,7 @@ class Adopt:
         state, trial = now.state, self.meant(now.state)
         if trial is None:
             return "there is no such try"
-        # What counted as f then may not count here.
+        # What counted as f in the test may no longer count.
         if trial.verdict != "similar" or state.tests[trial.tests[-1] - 1].outcome != "similar":
             return f"{trial.label} did not show f"
         if trial.models == state.environment:
@@ -131,7 +133,7 @@ class Adopt:
         return Words("adopt", f"try {self.trial} is adopted: E becomes its {count(size, 'model')}")
 
     def meant(self, state: RunState) -> Trial | None:
-        """The try, None if there is none of this number."""
+        """The try, None if no try has this number."""
         return state.trials[self.trial - 1] if 0 < self.trial <= len(state.trials) else None
 
 
@@ -140,7 +142,7 @@ class AcceptOther:
     """Count another failure as f from here on; the models of its test become the environment."""
 
     kind: ClassVar[str] = "accept_other"
-    offer: ClassVar[str] = "take as f"
+    offer: ClassVar[str] = "count as f"
     test: int
 
     def refusal(self, now: Situation) -> str:
@@ -154,25 +156,25 @@ class AcceptOther:
             return f"test {test.id} did not end in another failure"
         models, label = now.tested_models(test), label_of(state, test)
         if models is None or not frozenset(models) < frozenset(state.environment):
-            return f"{label} is no part of the environment as it is now"
+            return f"{label} is not part of the current environment"
         lacking = lacks_pinned(state, models)
         return f"{label} {lacking}" if lacking else ""
 
     def words(self, state: RunState) -> Words:
         test = state.tests[self.test - 1]
         said = f"the other failure of {label_of(state, test)} counts as f, too"
-        return Words("take another failure as f", said, _question(state, test))
+        return Words("count another failure as f", said, _question(state, test))
 
 
 def nearest_other(state: RunState, row: Row) -> Test | None:
-    """The test of a candidate or try that ended in another failure, the one whose end is nearest to f's."""
+    """The test of a candidate or try that ended in another failure, nearest to the end of f."""
     tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
     others = [test for test in tests if test.outcome == "other" and test.end_pose is not None]
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
 def _question(state: RunState, test: Test) -> str:
-    """What happened in the test, beside f."""
+    """What happened in the test, compared with f."""
     row = row_of(state, test)
     models = "" if row is None else f" ({count(row.size, 'model')})"
     near = test.distance is not None and math.isfinite(test.distance)

@@ -1,4 +1,4 @@
-"""What the rules look at, and what all commands share."""
+"""What decides whether a command is possible, and what all commands share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ddenv.words import first_of
 EngineIs = Literal["alive", "starting", "absent"]
 Row = Candidate | Trial
 
-# This many models are named in a line, each in this many columns.
+# Maximum number of models that a line names, and maximum width of each name in cells.
 NAMED, LONGEST = 2, 32
 
 FINISHED = "the run is finished; u, h, c, p, w and o go on from there"
@@ -26,9 +26,9 @@ ROUND_OVER = "this round is over"
 class Situation:
     """A run, and what else decides whether a command is possible.
 
-    `barred` is why this viewer can ask for nothing at all, or "". `pending` is the kind of the viewer's last command while the
-    engine has not obeyed it, or "". With `search_due` the search that was on is over. `models_of` returns the models that were
-    there in a test, None where that is not known; without it, what the state says.
+    `barred` is why this viewer cannot guide the run at all, or "". `pending` is the kind of the viewer's last command until the
+    engine obeys it, or "". `search_due` says that the current search is over. `models_of` returns the models of a test, None if
+    they are not known; without it the state answers.
     """
 
     state: RunState
@@ -47,7 +47,7 @@ class Situation:
         return "no engine is running; space starts one" if self.engine == "absent" else ""
 
     def tested_models(self, test: Test) -> Collection[str] | None:
-        """The models that were there in a test; None where that is not known."""
+        """The models of a test; None if they are not known."""
         if self.models_of is not None:
             return self.models_of(test.id)
         row = row_of(self.state, test)
@@ -83,7 +83,7 @@ def label_of(state: RunState, test: Test) -> str:
 
 
 def names_of(state: RunState, numbers: Sequence[int], *, empty: bool = False) -> tuple[str, ...] | None:
-    """The names of numbered models, each once; None where there are no such models, or none at all unless `empty`."""
+    """The names of numbered models, each once; None if there are no such models, or if there are none and not `empty`."""
     if not (numbers or empty) or not all(0 <= number < len(state.elements) for number in numbers):
         return None
     return tuple(state.elements[number] for number in dict.fromkeys(numbers))
@@ -99,11 +99,11 @@ def lacks_pinned(state: RunState, models: Iterable[str]) -> str:
     """Why a selection cannot become the environment, as the end of a sentence; or ""."""
     pinned = state.pinned.difference(models)
     lacking = [name for name in state.environment if name in pinned]
-    return f"is without {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
+    return f"lacks {named(lacking)}, which is pinned: unpin it first (p)" if lacking else ""
 
 
 def named(names: Iterable[str]) -> str:
-    """The first names of some models, fit for a line."""
+    """The first names of some models, short enough for a line."""
     return first_of([shortened(name, LONGEST) for name in names], NAMED)
 
 

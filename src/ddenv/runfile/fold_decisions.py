@@ -65,7 +65,7 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
         "failures": (*state.failures, test.id),
         **changes,
         **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
-        **decision(state, at, "accept_other", f"accepted another failure: {what}, test {test.id}"),
+        **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
     }
 
 
@@ -106,7 +106,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
 def changed(state: RunState, data: Data, at: float) -> Changes:
     settings = dict(data["settings"])
     before = dict(state.scenario["reduction"])
-    words = ", ".join(f"{key} {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
+    words = ", ".join(f"{key} from {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
     scenario = {**state.scenario, "reduction": before | settings}
     # The budget does not affect the search.
     anew = {} if set(settings) == {"budget"} else searched_anew(state)
@@ -163,7 +163,7 @@ def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
-    """The tests whose ends count as f in a node: that of f, and those of failures accepted on the path to it."""
+    """The tests whose failures count as f in a node: that of f, and those accepted on the path to the node."""
     accepted: list[int] = []
     node = state.nodes[number]
     while node.parent is not None:
@@ -182,13 +182,13 @@ def left_round(state: RunState) -> Changes:
 
 
 def waits_no_more(state: RunState) -> Changes:
-    """No candidate waits for accept or reject."""
+    """No reduction waits for the user any more."""
     working = "paused" if state.paused else "running"
     return {"waiting_candidate": None, "status": working if state.status == "waiting" else state.status}
 
 
 def searched_anew(state: RunState) -> Changes:
-    """The current search is over; whether a model can be removed is open again."""
+    """The current search is over; the environment may no longer be minimal."""
     here = state.nodes[state.node]
     nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
     return {**left_round(state), "minimal": False, "nodes": nodes}
@@ -213,7 +213,7 @@ def with_test(state: RunState, id: int, values: Data) -> Changes:
 
 def counts(state: RunState, before: Test | None, after: Test) -> Changes:
     tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
-    # An unknown outcome is a KeyError, so no file can make the tally long.
+    # An unknown outcome is a KeyError, so that a file cannot make the tally long.
     tally[after.outcome] += 1
     if before is not None:
         tally[before.outcome] -= 1

@@ -25,13 +25,13 @@ KINDS = (
     ("scenario", "scenario (YAML)", (".yaml", ".yml")),
     ("report", "report (HTML)", (".html", ".htm", ".md")),
 )
-# The maximum number of existing files to name, of files that a world needs, and of letters of each of these.
+# Maximum number of existing files to name, of files that a world needs to name, and of characters of each of those.
 MOST_NAMED, MOST_NEEDS, LONGEST_NEED = 3, 3, 60
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The files to write, None for what is not wanted. A scenario needs a world."""
+    """The files to write; None for one that is not wanted. A scenario needs a world."""
 
     world: Path | None
     scenario: Path | None
@@ -78,7 +78,7 @@ class ExportScreen(ModalScreen[None]):
                 with Horizontal(classes="row"):
                     yield Tick(title, True, id=f"export-{id}", compact=True, classes="name")
                     yield Input(name, id=f"export-{id}-name", compact=True)
-            with VerticalScroll(id="export-told", can_focus=False):
+            with VerticalScroll(id="export-results", can_focus=False):
                 yield Static("", id="export-words", markup=False)
                 yield Static("", id="export-wrong", classes="wrong", markup=False)
             with Horizontal(id="export-buttons"):
@@ -98,7 +98,7 @@ class ExportScreen(ModalScreen[None]):
 
     @on(Checkbox.Changed)
     def _chosen(self, event: Checkbox.Changed) -> None:
-        """A scenario runs the robot in the world that is written with it."""
+        """Keeps scenario and world together: a scenario needs the world that is written with it."""
         self._forget()
         if event.checkbox.id == "export-scenario" and event.value:
             self.query_one("#export-world", Checkbox).value = True
@@ -129,10 +129,10 @@ class ExportScreen(ModalScreen[None]):
         try:
             wanted = self._wanted()
         except UserError as error:
-            self._tell("", str(error))
+            self._report("", str(error))
             return
         self._busy = True
-        self._tell("writing ...")
+        self._report("writing ...")
         self._write(wanted, self._agreed)
 
     def _wanted(self) -> Wanted:
@@ -178,7 +178,7 @@ class ExportScreen(ModalScreen[None]):
         names = ", ".join(plain(path.name) for path in there[:MOST_NAMED])
         more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
         verb = "exists" if len(there) == 1 else "exist"
-        self._tell("", f"{names}{more} {verb} already. Write again to replace, or give other names.")
+        self._report("", f"{names}{more} {verb} already. Write again to replace, or give other names.")
         self.query_one("#export-write", Button).label = "Replace"
 
     def _done(self, written: list[str], wrong: str) -> None:
@@ -187,9 +187,9 @@ class ExportScreen(ModalScreen[None]):
             return
         self._busy = False
         self._forget()
-        self._tell("\n".join(written), wrong)
+        self._report("\n".join(written), wrong)
 
-    def _tell(self, words: str, wrong: str = "") -> None:
+    def _report(self, words: str, wrong: str = "") -> None:
         """Shows what was done, and what went wrong."""
         self.query_one("#export-words", Static).update(words)
         self.query_one("#export-wrong", Static).update(wrong)
@@ -202,7 +202,7 @@ def suggested(run: Path) -> tuple[str, str, str]:
 
 
 def _home(path: Path) -> Path:
-    """`path` with what `~` stands for. Raises UserError for an unknown user."""
+    """`path` with `~` expanded. Raises UserError for an unknown user."""
     try:
         return path.expanduser()
     except RuntimeError:
@@ -235,7 +235,7 @@ def what_is_left(run: Path) -> str:
     if not pinned:
         return f"{left}, and no single one can be removed."
     if pinned == len(state.environment):
-        return f"{left}, all pinned: whether they are needed was not tried."
+        return f"{left}, all pinned: fewer were not tried."
     return f"{left}; {pinned} pinned, and none of the others can be removed."
 
 

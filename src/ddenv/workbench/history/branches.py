@@ -27,7 +27,7 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
             children[node.parent].append(node.number)
     straight_path = set(path(nodes, here))
     found: list[Row] = []
-    # What is still to be drawn: a branch's first node, what stands before its lines, and its fork.
+    # What is still to be drawn: a branch's first node, what comes before its lines, and its fork.
     todo = [(0, "", "")] if nodes else []
     while todo:
         number, before, fork = todo.pop()
@@ -37,7 +37,7 @@ def rows(nodes: Sequence[Node], here: int) -> list[Row]:
         if straight is not None:
             todo.append((straight, after, ""))
         sides = [child for child in children[number] if child != straight]
-        # The first of them is drawn last: above what was made later.
+        # The first one goes on top of the stack: it is drawn above those made later.
         todo += [(child, after, "├─") for child in reversed(sides)]
     return found
 
@@ -53,7 +53,7 @@ def path(nodes: Sequence[Node], number: int) -> list[int]:
 
 
 def sign(node: Node, here: int) -> str:
-    """What a node is, in one character."""
+    """The sign of a node: current, taken back, minimal or none of these."""
     if node.number == here:
         return HERE
     if node.rejected:

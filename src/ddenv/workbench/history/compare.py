@@ -44,7 +44,7 @@ def compare(first: Node, second: Node) -> Comparison:
 
 
 class Compare(ModalScreen[None]):
-    """Facts, maps where there is room, and the models: those of both, and those of one alone."""
+    """Facts, maps if there is room, and the models: those in both, and those in only one."""
 
     CSS_PATH = "history.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-small"), (110, "-large")]

@@ -23,20 +23,20 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
-from ddenv.workbench.run.log import decision_line
+from ddenv.workbench.run.log import NOTHING_DECIDED, decision_line
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
 
-# The time between two looks at the run, s.
+# Time between two looks at the run, s.
 PERIOD = 0.5
-# Name and width of the tree's columns behind the tree itself; the last is for wide terminals.
+# Name and width of the columns after the tree; the last is for wide terminals.
 COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("", 22), ("method", 36))
 ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
 MARK = "marked"
-# Where the words of a decision begin, behind its time.
+# Where the words of a decision begin, after its time.
 INDENT = 10
 
 
@@ -61,7 +61,7 @@ class History(Screen[int | None]):
             "go",
             "go on from here",
             id="history.go",
-            tooltip="go back to this environment, or on to it: the run pauses there (branch)",
+            tooltip="go on from this environment: the run pauses there (branch)",
             priority=True,
         ),
         Binding("m", "mark", "mark", id="history.mark", tooltip="mark this environment, to compare another with it"),
@@ -89,7 +89,7 @@ class History(Screen[int | None]):
                 yield Tree(id="tree", cursor_type="row", cell_padding=1)
             with Vertical(id="past-decisions", classes="panel") as panel:
                 panel.border_title = "What you decided"
-                yield Lines(_as_it_is, nothing="you decided nothing yet", tail=True, id="decisions")
+                yield Lines(_as_it_is, nothing=NOTHING_DECIDED, tail=True, id="decisions")
         yield Static("", id="about", markup=False)
         shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
         yield KeyFooter(shown, shown)
@@ -111,7 +111,7 @@ class History(Screen[int | None]):
             self._fill(self._here if stays is None else stays)
 
     def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
-        """All of their words: this is where they are read."""
+        """Shows them in full, in lines that fit."""
         lines = self.query_one(Lines)
         made_of = decisions, lines.scrollable_content_region.width
         if made_of != self._decided and made_of[1] > 0:
@@ -132,7 +132,7 @@ class History(Screen[int | None]):
             table.add_row(*self._cells(row)[: len(table.columns)])
         place = next((place for place, row in enumerate(self._rows) if row.node.number == cursor), 0)
         table.move_cursor(row=place)
-        self._tell()
+        self._show_about()
 
     def _cells(self, row: branches.Row) -> tuple[Text, ...]:
         node = row.node
@@ -166,12 +166,12 @@ class History(Screen[int | None]):
             self._fill(at.number)
 
     def on_data_table_row_highlighted(self) -> None:
-        self._tell()
+        self._show_about()
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         event.stop()
 
-    def _tell(self) -> None:
+    def _show_about(self) -> None:
         node = self.under_cursor
         if node is None:
             return
@@ -214,7 +214,7 @@ class History(Screen[int | None]):
         if node is None or self._marked is None:
             self._refuse("mark one environment first (m), then move to another and press c")
         elif node.number == self._marked:
-            self._refuse("this one is marked: move to another to compare it with")
+            self._refuse("this one is marked: move to another one")
         else:
             first = self._tree[self._marked]
             self.app.push_screen(Compare(first, node, self._look_at().state, self._place))
@@ -245,5 +245,5 @@ HOW = {
     "start": "where the run began",
     "reduced": "reduced to what shows f",
     "adopted": "a try by hand that showed f",
-    "accepted": "another failure, accepted in place of f",
+    "accepted": "another failure, accepted as f, too",
 }

@@ -1,4 +1,4 @@
-"""From the run screen to the engine: commands are sent beside the screen, and an engine is started where one is needed."""
+"""Sends the run screen's commands to the engine in the background, and starts an engine if one is needed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine
 from ddenv.workbench.wording import attach_name, count, duration, plain
 
-# An engine answers within a moment; after this time it hangs, or its machine does, s.
+# After this time without an answer the screen says that there is none, s.
 PATIENCE = 5
 
 
@@ -31,7 +31,7 @@ class Asking:
     """Sends commands for `screen`, and knows which of them the engine has not obeyed yet."""
 
     def __init__(self, screen: Screen[Any], poll: Poll, engine: Engine, changed: Callable[[], None]) -> None:
-        """`changed` is called when another command waits for its answer."""
+        """`changed` is called when the command that waits for its answer changes."""
         self._screen, self._poll, self._engine, self._changed = screen, poll, engine, changed
         # The last command, with its id, 0 while it is being sent.
         self._last: tuple[int, Command | None] = (0, None)
@@ -39,12 +39,12 @@ class Asking:
         self.sending = 0
         # The words of the commands of this screen, by their ids.
         self._mine: dict[int, str] = {}
-        # The id of the last command that the run goes on from, 0 if an engine was started for it.
+        # The id of the last command that needs an engine, 0 once one was started for it.
         self._due = 0
         self._sender: ThreadPoolExecutor | None = None
 
     def close(self) -> None:
-        """What was sent is still written."""
+        """Commands that were sent are still written."""
         if self._sender is not None:
             self._sender.shutdown(wait=False)
 
@@ -59,20 +59,20 @@ class Asking:
 
     @property
     def barred(self) -> str:
-        """Why this screen can ask for nothing, or ""."""
+        """Why this screen cannot guide the run, or ""."""
         snapshot = self._poll.snapshot
         if self._poll.watch:
             return self._watching
         if snapshot.gone:
-            return "the run file is gone: nothing can be asked for; q leaves"
+            return "the run file is gone: nobody can guide it any more; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
 
     @cached_property
     def _watching(self) -> str:
-        return f"watching only: 'ddenv open {attach_name(self._poll.path)}' without --watch guides it"
+        return f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' without --watch"
 
     def waiting_for(self) -> str:
-        """What was asked for and is not done yet, in words."""
+        """The command that waits for its answer, in words."""
         (id, command), snapshot = self._last, self._poll.snapshot
         if command is None:
             return ""
@@ -87,20 +87,20 @@ class Asking:
     # What is said.
 
     def refuse(self, why: str) -> None:
-        """Says why something does not happen."""
+        """Shows why something is not possible."""
         self._screen.notify(plain(why), severity="warning", timeout=4, markup=False)
 
     def say(self, what: str) -> None:
         self._screen.notify(plain(what), timeout=4, markup=False)
 
-    def tell_refusal(self, before: Snapshot) -> None:
-        """Says why the engine did not do what this screen asked for."""
+    def show_refusal(self, before: Snapshot) -> None:
+        """Shows why the engine refused a command of this screen."""
         id, why = self._poll.snapshot.state.refusal
         if (id, why) != before.state.refusal and id in self._mine:
             self.refuse(f"{self._mine[id]}: not done, {why}")
 
-    def tell_tries(self, before: Snapshot) -> None:
-        """Says how the user's own selections were judged since `before`."""
+    def show_verdicts(self, before: Snapshot) -> None:
+        """Shows the verdicts of tries since `before`."""
         now = self._poll.snapshot.state.trials
         if before.state.trials == now:
             return
@@ -112,7 +112,7 @@ class Asking:
     # Sending.
 
     def ask(self, command: Command | StartEngine, *, sure: bool = False) -> None:
-        """Sends a command, after its question unless the user is `sure`, or says why it is not possible."""
+        """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
         now = self.situation
         if why := refusal(command, now):
             self.refuse(why)
@@ -126,9 +126,9 @@ class Asking:
             self._screen.app.push_screen(Question(question), lambda yes: self.send(command) if yes else None)
 
     def send(self, command: Command, then: Callable[[], None] | None = None) -> None:
-        """Asks the engine for something, without waiting for the file; `then` comes once it is written.
+        """Sends a command in the background; `then` is called once it is written.
 
-        Where no engine works, the next one obeys it. One is started for it if the run goes on from there.
+        If no engine is running, the next one obeys it; one is started if the command needs it.
         """
         if self._poll.watch:
             self.refuse(self.barred)
@@ -179,7 +179,7 @@ class Asking:
     # The engine.
 
     def go_on(self) -> None:
-        """Starts an engine for what was asked for where none works, or where the last one ended without having read it."""
+        """Starts an engine for the last command if none is running, or if the last one ended without reading it."""
         snapshot = self._poll.snapshot
         if self._due > snapshot.state.last_command and snapshot.engine == "absent" and not snapshot.error:
             self._due = 0

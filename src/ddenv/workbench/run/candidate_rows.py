@@ -12,7 +12,7 @@ from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain
 
-# The columns of a model's name, behind a sign and a space.
+# Maximum width of a model's name, after a sign and a space, in cells.
 NAME = 8
 # The latest judged tries that stay in the table.
 TRIALS = 3
@@ -24,7 +24,7 @@ Words = dict[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """`width` in cells, with the space before it. The greater `spare`, the sooner it is left out; 0 always stays."""
+    """`width` in cells, with the space before it. The greatest `spare` is left out first; 0 always stays."""
 
     name: str
     width: int
@@ -44,7 +44,7 @@ COLUMNS = (
     Column("time", 8, right=True, spare=2),
     Column("verdict", 14),
 )
-# What runs of the whole world and of what is left have no words for.
+# Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
 
 
@@ -73,7 +73,7 @@ class Listed:
 
 
 def listed(snapshot: Snapshot) -> Listed:
-    """What there is to list now."""
+    """What the table lists now."""
     state = snapshot.state
     if state.confirming and not state.ended:
         return Listed(("confirm",), (), state.confirm_tests)
@@ -87,7 +87,7 @@ def listed(snapshot: Snapshot) -> Listed:
 
 
 def round_title(state: RunState) -> tuple[str, str]:
-    """What is listed, and how far that is."""
+    """The table's title, and how much of it is done."""
     if state.confirming and not state.ended:
         return "Full runs of what is left", f"{sum(test.is_finished for test in state.confirm_tests)} made"
     if state.round is None:
@@ -103,7 +103,7 @@ def round_title(state: RunState) -> tuple[str, str]:
 
 
 def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, ...]:
-    """The columns that have room in so many cells, each with its width; `narrow` leaves out all that can be."""
+    """The columns that fit into `width` cells, each with its width; `narrow` leaves out all that can be spared."""
     first = listing.rest[0] if listing.rest else None
     unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:

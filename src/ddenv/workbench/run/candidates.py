@@ -27,7 +27,7 @@ def _binding(keys: str, action: str, name: str, tooltip: str) -> Binding:
 
 
 class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
-    """Only rows in sight are ever made into text, and only lines that changed are drawn again.
+    """Only rows in sight become text, and only lines that changed are drawn again.
 
     The cursor follows the run until it is moved by hand.
     """
@@ -100,7 +100,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         return Text(words(self._snapshot, self._listed, row).get(name, ""))
 
     def set_narrow(self, narrow: bool) -> None:
-        """With little room all columns go that can be spared."""
+        """With little room, drops every column that can be spared."""
         self._narrow = narrow
         self._arrange()
 
@@ -111,7 +111,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
             self.following, self.cursor_row = True, 0
             self.scroll_to(y=0, animate=False, force=True)
         elif shift := len(self._listed.trials) - len(before.trials):
-            # What is looked at stays where it is.
+            # The row that the user looks at stays where it is.
             self.cursor_row += shift
             if self.scroll_offset.y:
                 self.scroll_to(y=self.scroll_offset.y + shift, animate=False, force=True)
@@ -186,7 +186,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._reveal()
 
     def _arrange(self) -> None:
-        """Makes room for the rows and columns."""
+        """Fits the columns and the scroll area."""
         columns = fitting(self._listed, max(0, self.container_size.width - 1), self._narrow)
         if columns != self.columns:
             self.columns = columns
@@ -230,7 +230,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
 
 
 def _aligned(column: Column, text: str) -> str:
-    """As wide as its column, with a space before it but in the first."""
+    """As wide as its column, with a space before it except in the first."""
     if column.right:
         return " " * (column.width - cell_len(text)) + text
     before = "" if column.name in ("#", "verdict") else " "

@@ -28,7 +28,7 @@ NUMBERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "metho
 
 
 class Change(ModalScreen[course.Change | None]):
-    """The command for the settings as they stand here, None if that was cancelled. They hold from the next round on."""
+    """Returns the command that changes the settings, None if it was cancelled."""
 
     CSS_PATH = "run_dialogs.tcss"
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (34, "-tall")]
@@ -73,7 +73,7 @@ class Change(ModalScreen[course.Change | None]):
 
     def _select(self, kind: Kind) -> Select[str]:
         now = self._now[kind]
-        # What another package brought may not be installed here: it can stay as it is.
+        # A schema of another package may not be installed here: it can stay.
         known = (*names(kind), *(() if now in names(kind) else (now,)))
         return Select(
             [(Text(plain(name)), name) for name in known], value=now, allow_blank=False, id=kind, compact=True
@@ -88,7 +88,7 @@ class Change(ModalScreen[course.Change | None]):
             self.query_one(f"#{kind}-meaning", Static).update(Text(words))
 
     def _command(self) -> course.Change:
-        """For all settings as they stand in the dialog. Raises UserError, which begins with the field that is wrong."""
+        """The command for the settings in the dialog. Raises UserError, which begins with the name of the wrong field."""
         kinds = {kind: str(self.query_one(f"#{kind}", Select).value) for kind in KINDS}
         asked: dict[str, Value] = {
             "pair": f"{kinds['partitioning']}/{kinds['prioritization']}",

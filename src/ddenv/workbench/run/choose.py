@@ -18,23 +18,23 @@ from ddenv.map.names import shortened
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.wording import count, plain, shorten
 
-# The most names that are listed at once, and the columns of each; typing brings others.
+# Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
 LISTED, WIDTH = 100, 58
 
 
 class ChooseModels(ModalScreen[tuple[str, ...] | None]):
-    """The names that were chosen, None if that was left. Typing filters them; a part of a name in any case is enough."""
+    """Returns the chosen names, None if it was cancelled. Typing any part of a name filters the list."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("escape", "cancel", "cancel", id="choose.cancel", tooltip="choose nothing"),
         Binding("down", "move(1)", show=False, id="choose.down", tooltip="next name"),
         Binding("up", "move(-1)", show=False, id="choose.up", tooltip="previous name"),
-        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this one too, or not"),
+        Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
     ]
 
     def __init__(self, title: str, names: Sequence[str], *, several: bool, pinned: Iterable[str] = ()) -> None:
-        """`title` says what becomes of them; `pinned` ones are marked with +."""
+        """`title` says what they are for; `pinned` ones are marked with +."""
         super().__init__()
         self._title, self._names, self._several = title, tuple(names), several
         self._pinned = frozenset(pinned)
@@ -57,7 +57,7 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
 
     @on(Input.Changed)
     def _filter(self) -> None:
-        """Lists what is called so. Before any key acts on the list, too: who types fast is ahead of the message that says so."""
+        """Lists the names with the typed part. Each key calls it first: fast typing is ahead of the message `Changed`."""
         part = self.query_one(Input).value.strip().casefold()
         if part != self._part:
             self._part = part
@@ -71,13 +71,13 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         options.add_options([Option(self._prompt(name)) for name in self._listed])
         if self._listed:
             options.highlighted = 0
-        self._tell(len(found))
+        self._show_found(len(found))
 
-    def _tell(self, found: int | None = None) -> None:
+    def _show_found(self, found: int | None = None) -> None:
         words = f"{count(len(self._chosen), 'model')} chosen" if self._several else ""
         if found is not None:
             self._rest = f"{found - len(self._listed)} more: type to see them" if found > len(self._listed) else ""
-            self._rest = self._rest or ("" if found else "no model is called so")
+            self._rest = self._rest or ("" if found else "no name contains this")
         self.query_one("#found", Static).update(Text("   ".join(part for part in (words, self._rest) if part)))
 
     _rest = ""
@@ -104,11 +104,11 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         name = self._listed[place]
         self._chosen ^= {name}
         self.query_one(OptionList).replace_option_prompt_at_index(place, self._prompt(name))
-        self._tell()
+        self._show_found()
 
     @on(Input.Submitted)
     def _entered(self) -> None:
-        """What is chosen, or the one under the cursor."""
+        """Takes the chosen names, or the one under the cursor."""
         self._filter()
         place = self.query_one(OptionList).highlighted
         if self._chosen:
@@ -132,7 +132,7 @@ MEANINGS = {
     "partitions": "the parts of this round, by letter and colour",
     "removed": "where removed models stood",
     "pinned": "which models are pinned",
-    "sensed": "in which order the robot sensed the models",
+    "sensed": "the order in which the robot sensed the models",
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",
@@ -140,7 +140,7 @@ MEANINGS = {
 
 
 class Layers(ModalScreen[None]):
-    """A list of the map's layers with a mark at those that are shown."""
+    """A list of the map's layers; those that are shown are marked."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
@@ -178,7 +178,7 @@ class Layers(ModalScreen[None]):
 
 
 class Copy(ModalScreen[None]):
-    """A list of texts, of which enter or a click copies one."""
+    """A list of texts; enter or a click copies one."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Method(ModalScreen[None]):
-    """What a run is reduced by, each with its explanation."""
+    """Algorithm, partitioning and prioritization of a run, each with its explanation."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
@@ -58,12 +58,12 @@ class Method(ModalScreen[None]):
 
 
 class Quit(ModalScreen[str]):
-    """What becomes of the engine: "stop", "leave" or "cancel"."""
+    """Asks whether to stop the engine: returns "stop", "leave" or "cancel"."""
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
         Binding("s", "answer('stop')", "stop the engine", id="quit.stop", tooltip="stop the engine and leave"),
-        Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave, the engine goes on"),
+        Binding("l", "answer('leave')", "let it run on", id="quit.leave", tooltip="leave; the engine goes on"),
         Binding("escape,c", "answer('cancel')", "cancel", id="quit.cancel", tooltip="stay here"),
         Binding("left", "app.focus_previous", show=False, id="quit.previous", tooltip="previous button"),
         Binding("right", "app.focus_next", show=False, id="quit.next", tooltip="next button"),
@@ -73,7 +73,7 @@ class Quit(ModalScreen[str]):
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = "Quit"
             dialog.border_subtitle = "l let it run on   s stop   c cancel"
-            yield Static("The engine works on this run in a process of its own.", markup=False)
+            yield Static("The engine is a separate process; it can go on without this screen.", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Let it run on", id="leave", variant="primary")
                 yield Button("Stop the engine", id="stop", variant="warning")

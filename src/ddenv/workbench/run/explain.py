@@ -1,4 +1,4 @@
-"""What is happening, in words: the line of the algorithm a run is at, and what it does there and why. Pure text."""
+"""What is happening, in words: the current line of the algorithm, and what the run does there and why."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, f
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import count, metres, percent, plain
 
-# A list of kept models longer than this is cut, so that the sentence stays one.
+# Maximum number of kept models that a sentence names.
 NAMED = 8
 
 
@@ -29,7 +29,7 @@ Happening = tuple[Step | None, tuple[str, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """`line` is the number of one of the `lines` of the algorithm's listing, or None when the algorithm stands nowhere."""
+    """`line` is the number of the current one of the algorithm's `lines`, None if the run is at none of them."""
 
     line: int | None
     sentences: tuple[str, ...]
@@ -54,7 +54,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     if snapshot.gone:
         return None, (
             f"{plain(snapshot.error)}.",
-            "Nothing can be asked for any more: y copies names, R lists the runs, q leaves.",
+            "You can no longer guide this run: y copies names, R lists the runs, q leaves.",
         )
     if snapshot.error:
         return None, (snapshot.error,)
@@ -94,14 +94,14 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
 def _with_pause(state: RunState, happening: Happening) -> Happening:
     if not state.paused:
         return happening
-    rest = "what runs now is finished first" if state.tally["running"] else "nothing runs now"
-    first = f"Paused: no new test is started; {rest}. space resumes, s runs one test."
+    rest = "running tests finish first" if state.tally["running"] else "none is running"
+    first = f"Paused: no new test starts; {rest}. space resumes, s runs one test."
     step, sentences = happening
     return step, (first, *sentences)
 
 
 def _starting(_: RunState) -> tuple[str, ...]:
-    return ("The engine starts. It works in a process of its own and outlives this screen.",)
+    return ("The engine starts. It is a separate process: it goes on when this screen closes.",)
 
 
 def _created(_: RunState) -> tuple[str, ...]:
@@ -123,12 +123,12 @@ def _stopped(state: RunState) -> tuple[str, ...]:
 
 
 def _lost(state: RunState) -> tuple[str, ...]:
-    flying = state.tally["running"]
-    lost = f" Only {count(flying, 'test')} that ran then must run again." if flying else ""
+    unfinished = state.tally["running"]
+    lost = f" Only {count(unfinished, 'unfinished test')} must run again." if unfinished else ""
     return (f"The engine is not running: it was killed, or its machine went down. r resumes.{lost}",)
 
 
-# Nothing moves in these states.
+# The run stands still in these states.
 STANDING: dict[str, Callable[[RunState], tuple[str, ...]]] = {
     "starting": _starting,
     "created": _created,
@@ -143,7 +143,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     reached = sum(test.outcome == "pass" for test in tests)
     failed = sum(test.outcome == "failed" for test in tests)
     first = (
-        f"The whole world is run {count(options.baseline_runs, 'time')}, each with its own seed, to fix the failure f."
+        f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
     )
     if not tests:
         return (first,)
@@ -193,7 +193,7 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     test = running[0]
     sentences = _first_run(place, options) if test.run == 0 else _rerun(state, candidate, test, place, options)
     if ahead:
-        sentences = (*sentences, f"Idle workers run ahead: {count(ahead, 'later candidate')} at the same time.")
+        sentences = (*sentences, f"Idle workers test {count(ahead, 'later candidate')} at the same time.")
     return "test" if test.run == 0 else "rerun", sentences
 
 
@@ -205,7 +205,7 @@ def _next(state: RunState, candidate: Candidate, place: str, options: Settings) 
 
 
 def _place(candidate: Candidate, current: Round, options: Settings) -> str:
-    """A candidate, and where it stands among the others."""
+    """A candidate, and its place among the others."""
     models, gone = count(candidate.size, "model"), len(current.environment) - candidate.size
     if options.algorithm not in GROUPS:
         return f"{candidate.label} ({models}), candidate {candidate.index + 1} of {len(current.candidates)}"
@@ -217,7 +217,7 @@ def _place(candidate: Candidate, current: Round, options: Settings) -> str:
 def _first_run(place: str, options: Settings) -> tuple[str, ...]:
     return (
         f"First run of {place}.",
-        f"f again means: goal not reached in {options.timeout:g} s, and the end within {options.epsilon:g} m of f's end.",
+        f"It shows f if the goal is not reached in {options.timeout:g} s and it ends within {options.epsilon:g} m of f's end.",
     )
 
 
@@ -225,7 +225,7 @@ def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, option
     before = _last(state, candidate)
     return (
         f"Re-run {test.run} of {options.iterations} of {place}: {_why_again(before)}",
-        f"A failure can be flaky: only {count(1 + options.iterations, 'test')} without f make it dissimilar.",
+        f"A failure can be flaky: a candidate is dissimilar only after {count(1 + options.iterations, 'test')} without f.",
     )
 
 
@@ -249,12 +249,12 @@ def _otherwise(test: Test) -> str:
 
 
 def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
-    """The rounds are over, and what they rest on is made sure of."""
-    first = "Confirming what is left with full runs: tests were ended as soon as the robot was stuck for good."
+    """The rounds are over; full runs confirm their result."""
+    first = "Confirming what is left with full runs: earlier tests ended as soon as the robot was stuck for good."
     running = [test for test in snapshot.running if test.phase == "confirm"]
     if not running:
         return (first,)
-    what = f"all that is left but {plain(running[0].without)}" if running[0].without else "all that is left"
+    what = f"all that is left except {plain(running[0].without)}" if running[0].without else "all that is left"
     return (first, f"Now run {running[0].run + 1} of {what}.")
 
 
@@ -283,13 +283,13 @@ def _finished(state: RunState) -> Happening:
             f"{kept} left: {_names(state)}.",
         )
     if not state.environment:
-        none = "f is seen without any of the models that can be removed: look at the robot, its goal and what always stays."
+        none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
         return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
     single = len(state.environment) == 1
     pinned = state.pinned.intersection(state.environment)
     if pinned:
         return "returned", (f"Ended: {kept} left. {_proof_with_pins(state, len(pinned))}", f"Kept: {_names(state)}.")
-    proof = f"without {'it' if single else 'any one of them'} f is not seen again"
+    proof = f"without {'it' if single else 'any one of them'} f no longer shows"
     sure = "; full runs confirm it" if state.confirming else ""
     return "returned", (
         f"Minimal: {kept} left, and {proof}{sure}.",
@@ -301,9 +301,9 @@ def _finished(state: RunState) -> Happening:
 def _proof_with_pins(state: RunState, pinned: int) -> str:
     if pinned == len(state.environment):
         what = "it is" if pinned == 1 else "all of them are"
-        return f"{what[:1].upper()}{what[1:]} pinned: whether f is seen with less was not tried. p unpins."
+        return f"{what[:1].upper()}{what[1:]} pinned: fewer models were not tried. p unpins."
     others = "the other one" if len(state.environment) - pinned == 1 else "any one of the others"
-    return f"Without {others} f is not seen again; {count(pinned, 'model')} pinned by you always stayed."
+    return f"Without {others} f no longer shows; {count(pinned, 'model')} that you pinned always stayed."
 
 
 def _reason(state: RunState, otherwise: str) -> str:

@@ -1,4 +1,4 @@
-"""What the user's hand has to do with what happens now, in sentences: tries, pins, other ways, other settings. Pure text."""
+"""The user's decisions that affect what happens now, in sentences: tries, pins, going back, other settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ddenv.workbench.wording import count, plain
 
 HOW = {
     "adopted": "You adopted {what}",
-    "accepted": "You took the other failure of {what} for as good as f",
+    "accepted": "You accepted the other failure of {what} as f",
 }
 
 
@@ -32,7 +32,7 @@ def by_hand(state: RunState) -> tuple[str, ...]:
 
 
 def last_reduction(state: RunState) -> tuple[str, ...]:
-    """What the last test led to, while a run that pauses has made no other since: a step shows what came of it."""
+    """The last reduction, until the next test is made: a step shows its result."""
     here = state.here
     if here is None or here.how != "reduced" or here.parent is None or here.tests != state.tests_done:
         return ()
@@ -47,15 +47,15 @@ def _under_way(state: RunState, trial: Trial) -> str:
     most = 1 + settings(state).iterations
     tests = [state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests)]
     running = next((test for test in tests if test.outcome == "running"), None)
-    what = f"{trial.label} by hand ({count(trial.size, 'model')})"
+    what = f"{trial.label} ({count(trial.size, 'model')})"
     if running is None:
-        return f"{what} is tested next, before the round goes on."
+        return f"{what} is the next test, before the round goes on."
     again = f"re-run {running.run} of {most - 1}" if running.run else "first run"
-    return f"{what} is tested: {again}."
+    return f"{what} is being tested: {again}."
 
 
 def arrival(state: RunState) -> str:
-    """How the run came to its environment, if by the user's hand and nothing was reduced since; "" otherwise."""
+    """How the user's last decision led to this environment; "" if there is none, or a test was made since."""
     here = state.here
     last = state.decisions[-1] if state.decisions else None
     if here is None or last is None or last.tests != state.tests_done:
@@ -63,7 +63,7 @@ def arrival(state: RunState) -> str:
     if last.kind in ("go_back", "undo"):
         return f"{_capital(plain(last.words))}."
     if last.kind == "change":
-        return f"{_capital(plain(last.words))}: it holds from this round on."
+        return f"{_capital(plain(last.words))}, from this round on."
     if here.how in HOW and last.kind in ("adopt", "accept_other"):
         return f"{HOW[here.how].format(what=here.what)}: {_sizes(state, here)}."
     return ""
@@ -83,7 +83,7 @@ def out_of_budget(state: RunState) -> tuple[str, ...]:
     budget = state.budget
     if budget is None or state.tests_done < budget:
         return ()
-    return (f"The budget of {count(budget, 'test')} is used up: c gives more, and the run goes on.",)
+    return (f"The budget of {count(budget, 'test')} is used up: c raises it, and the run goes on.",)
 
 
 def older_engine(snapshot: Snapshot) -> tuple[str, ...]:
@@ -92,5 +92,5 @@ def older_engine(snapshot: Snapshot) -> tuple[str, ...]:
     if not version or snapshot.engine != "alive":
         return ()
     return (
-        f"Another version of ddenv works on this run ({plain(version)}): it may not know all that you can ask for here.",
+        f"Another version of ddenv works on this run ({plain(version)}): it may not know every command of this one.",
     )

@@ -1,4 +1,4 @@
-"""Follows a run file by the clock of a screen: looks at it, catches up with a long run, and stays with a candidate for a while."""
+"""Reads a run file again and again for a screen, catches up with a long run, and keeps one candidate in sight for a while."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ddenv.workbench.run.poll import Poll, Snapshot
 
 # How often the run file is read, s.
 PERIOD = 0.1
-# While a long run is caught up with: the time to the next look, and how often one of them is shown, s.
+# While it catches up with a long run: the time to the next look, and the time between two updates of the screen, s.
 AT_ONCE, CATCHING_UP = 0.002, 0.5
 # The map stays with a candidate for at least this time, s.
 CALM = 4.0
@@ -22,8 +22,8 @@ CALM = 4.0
 class Following:
     """Calls `seen(before, live)` after each look that found something new, and `show(changed)` when it is time to show it.
 
-    `before` is the snapshot before that look. `live` is False while a long run is caught up with: what happened then is old.
-    `changed` is False where nothing is new but the time.
+    `before` is the snapshot before that look. `live` is False while it catches up with a long run: its events are old.
+    `changed` is False if only the time changed.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Following:
         self._stays: tuple[tuple[int, int] | None, int, float] = (None, 0, 0.0)
 
     def begin(self) -> None:
-        """Looks now, and from now on."""
+        """Looks now, and then every `PERIOD`."""
         self.look()
         self._screen.set_interval(PERIOD, self.look)
 
@@ -62,7 +62,7 @@ class Following:
 
     @property
     def candidate(self) -> Candidate | None:
-        """The candidate that all is about. Where they take turns fast, one of them for a while: it can be looked at."""
+        """The candidate to show. However fast the current one changes, it stays for `CALM` seconds, so that it can be read."""
         snapshot, moment = self._poll.snapshot, time.monotonic()
         state, focus = snapshot.state, snapshot.focus
         round, index, until = self._stays

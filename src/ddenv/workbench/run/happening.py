@@ -1,4 +1,4 @@
-"""What is happening: where in its algorithm the run is, and what it does there and why."""
+"""The panel that shows what is happening: the current line of the algorithm, and sentences on it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ddenv.workbench.run.explain import Explanation, explain
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.widgets.lines import changed_lines
 
-# How often what goes on within a round is told anew, s.
+# Minimum time between two updates within a round, s.
 PERIOD = 1.0
 
 
@@ -25,8 +25,8 @@ class Happening(Widget):
         self._explanation = Explanation(None, ())
         self._snapshot: Snapshot | None = None
         self.trouble = ""
-        self._matter: tuple[object, ...] = ()
-        self._told = -math.inf
+        self._urgent: tuple[object, ...] = ()
+        self._shown_at = -math.inf
         self._first = 0
         self._lines = Text("")
 
@@ -34,11 +34,11 @@ class Happening(Widget):
         """`trouble` comes first: what went wrong with the engine itself."""
         if snapshot is self._snapshot and trouble == self.trouble:
             return
-        matter, moment = _matter(snapshot), time.monotonic()
-        if matter == self._matter and trouble == self.trouble and moment - self._told < PERIOD:
-            # Runs follow each other faster than anybody reads: the next look tells of the one that is then made.
+        urgent, moment = _urgent(snapshot), time.monotonic()
+        if urgent == self._urgent and trouble == self.trouble and moment - self._shown_at < PERIOD:
+            # Tests follow each other faster than anybody reads: the next update shows the one that runs then.
             return
-        self._snapshot, self._matter, self._told = snapshot, matter, moment
+        self._snapshot, self._urgent, self._shown_at = snapshot, urgent, moment
         explanation = explain(snapshot)
         if (explanation, trouble) != (self._explanation, self.trouble):
             self._explanation, self.trouble = explanation, trouble
@@ -53,7 +53,7 @@ class Happening(Widget):
         return self._window(self._wrapped()).append_text(self._sentences())
 
     def _drawn(self) -> Text:
-        """All lines as they stand on the screen."""
+        """All lines as the screen shows them."""
         wrapped = self._wrapped()
         return self._window(wrapped).append_text(Text("\n").join(wrapped))
 
@@ -74,8 +74,8 @@ class Happening(Widget):
         return Text("\n").join(sentences)
 
 
-def _matter(snapshot: Snapshot) -> tuple[object, ...]:
-    """What is told at once when it changes."""
+def _urgent(snapshot: Snapshot) -> tuple[object, ...]:
+    """What is shown at once when it changes."""
     state = snapshot.state
     number = None if state.round is None else (state.round.number, state.round.done)
     return snapshot.status, snapshot.error, state.paused, state.waiting_candidate, state.confirming, state.node, number
@@ -92,7 +92,7 @@ def _index(explanation: Explanation) -> int:
 
 
 def _scrolled(explanation: Explanation, room: int, first: int) -> int:
-    """The first line to show: the one of before, as long as the current line and its neighbours are in sight with it."""
+    """The first line to show: the same as before, unless the current line or its neighbours would be out of sight."""
     shown, index = _shown(explanation, room), _index(explanation)
     beside = min(1, (shown - 1) // 2)
     first = min(max(first, index + beside + 1 - shown), index - beside)

@@ -1,4 +1,4 @@
-"""What the keys that guide the run mean now: what they do, what the footer says, and why one does nothing."""
+"""What the keys that guide the run do now, what the footer says of them, and why one does nothing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_keys import GUIDING
 
-# These ask for models where none are selected.
+# These ask for models if none are selected.
 TITLES = {
     "pin": "Pin (or unpin) models: they always stay",
     "without": "Try without these models",
@@ -29,7 +29,7 @@ class KeyOffers:
         self._poll, self._table, self._world, self._asking, self._opening = poll, table, world, asking, opening
 
     def offer(self, name: str) -> Offer:
-        """What a key comes to now."""
+        """What a key does now."""
         return offer(name, self._asking.situation, self.pointed)
 
     @property
@@ -49,18 +49,18 @@ class KeyOffers:
         return frozenset() if name is None else frozenset((name,))
 
     def show(self, footer: KeyFooter) -> None:
-        """The footer offers what is possible."""
+        """Shows in the footer what is possible."""
         now, pointed = self._asking.situation, self.pointed
         for name, binding in GUIDING.items():
             offered = offer(name, now, pointed)
             footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
     def refuse(self, name: str) -> None:
-        """Says why a key does nothing."""
+        """Shows why a key does nothing."""
         self._asking.refuse(self.offer(name).why_not)
 
     def use(self, name: str) -> None:
-        """Does what a key means now; where models must be selected and none are, it asks for them."""
+        """Does what a key means now; it asks for models if none are selected but some are needed."""
         command = self.offer(name).command
         if command is not None:
             self._asking.ask(command)

@@ -12,8 +12,9 @@ from ddenv.runfile.state import Decision, RunState
 from ddenv.words import news
 from ddenv.workbench.wording import plain
 
-# Older lines are forgotten.
+# Maximum number of lines; the oldest go first.
 MOST = 2000
+NOTHING_DECIDED = "you decided nothing yet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +38,19 @@ class Log:
         return tuple(self._entries)
 
     def changed(self) -> bool:
-        """Whether there is anything new since this was asked last."""
+        """Whether there is anything new since the last call."""
         changed, self._changed = self._changed, False
         return changed
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
-        """One more event; one that was told already changes nothing."""
+        """One more event; the same event again changes nothing."""
         if after.revision <= self._revision:
             return
         self._revision = after.revision
         try:
             words = news(kind, before, after, attached=True)
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):
-            # A damaged scenario has no words; what is wrong with the run is told elsewhere.
+            # A damaged scenario has no words; the screen shows elsewhere what is wrong.
             words = ""
         if words:
             self._entries.append(Entry(after.updated_at, words))

@@ -1,4 +1,4 @@
-"""How a run reduces its world: what its algorithm uses of the pair, the words for it, and the explanations. Pure."""
+"""How a run reduces its world: the algorithm's listing, what it uses of the pair, and the explanations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FIX_F = (0, "f ← failure of R(E, goal, timeout), several runs")
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """`lines` with their numbers; the numbers of a run's steps; `sweep` is where each model is left out in turn at the end."""
+    """`lines` with their numbers; the line of each step; `sweep` is the one that leaves out each model in turn at the end."""
 
     lines: Lines
     split: int
@@ -120,7 +120,7 @@ PROBDD = Listing(
     returned=8,
     sweep=7,
 )
-# It differs only in which group it leaves out, and in what it makes of a vain test.
+# It chooses the group otherwise, and concludes something else when f does not show.
 SPLITTING = replace(
     PROBDD,
     lines=tuple(
@@ -132,7 +132,7 @@ SPLITTING = replace(
         for number, code in PROBDD.lines
     ),
 )
-# What every algorithm comes to, for those of other packages.
+# What all algorithms share, for those of other packages.
 ANY = Listing(
     (
         FIX_F,
@@ -176,7 +176,7 @@ def chosen(algorithm: str, pair: str) -> dict[Kind, str]:
 
 
 def labels(algorithm: str, pair: str) -> tuple[str, ...]:
-    """The method in short, without what the algorithm does not use: from the longest to the shortest way to say it."""
+    """The method in short, without what the algorithm does not use, from the longest form to the shortest."""
     if algorithm == "ddenv":
         return (pair,)
     used = uses(algorithm)
@@ -187,17 +187,17 @@ def labels(algorithm: str, pair: str) -> tuple[str, ...]:
 
 
 def paragraph(kind: Kind, name: str) -> str:
-    """What is said of a name, or why nothing is."""
+    """The explanation of a name, or why there is none."""
     if name not in names(kind):
         return "It comes with a package that is not installed here."
-    return plain(explanation(kind, name)) or "Nothing is said of it."
+    return plain(explanation(kind, name)) or "It has no explanation."
 
 
 def note(kind: Kind, algorithm: str) -> str:
-    """A sentence on what is not used, where it matters for this kind, or ""."""
+    """A sentence on what the algorithm does not use, as far as it concerns this kind, or ""."""
     unused = [part for part in BOTH if part not in uses(algorithm)]
     if kind in unused:
-        return f"Not used: {plain(algorithm)} does not look at the {kind}."
+        return f"Not used by {plain(algorithm)}."
     if kind != "algorithm" or not unused:
         return ""
     if len(unused) == 1:
@@ -205,12 +205,12 @@ def note(kind: Kind, algorithm: str) -> str:
     return "It uses neither the partitioning nor the prioritization."
 
 
-# These leave out one group of models a round, and each model in turn at the end.
+# These leave out one group of models per round, and each model in turn at the end.
 GROUPS = ("probdd", "splitting")
 
 
 def beginning(options: Settings, models: int) -> str:
-    """How the next round comes about, of so many models."""
+    """How the next round is made; E has this many `models`."""
     kept = f"the {count(models, 'model')} of E"
     names = chosen(options.algorithm, options.pair)
     match options.algorithm:
@@ -219,16 +219,16 @@ def beginning(options: Settings, models: int) -> str:
         case "ddmin":
             return f"{kept} are cut into parts of equal size, in the order of the world file."
         case "probdd":
-            return f"of {kept}, those go whose loss is the greatest gain to expect."
+            return f"of {kept}, the group with the greatest expected gain is left out."
         case "splitting":
-            return f"of {kept}, the farthest that are undecided go; {names['prioritization']} says what is far."
-    return f"{plain(options.algorithm)} decides what is tried of {kept}."
+            return f"of {kept}, the farthest undecided ones are left out; {names['prioritization']} says what is far."
+    return f"{plain(options.algorithm)} chooses candidates from {kept}."
 
 
 def follows(options: Settings, last: Round) -> str:
     """What the last round means for the next one, or ""."""
     if last.winner is None:
-        # The user changed something in the middle of it.
+        # The user changed something in the middle of the round.
         if not all(one.verdict for one in last.candidates):
             return ""
         reason = "Nothing showed f in the last round"
@@ -239,11 +239,11 @@ def follows(options: Settings, last: Round) -> str:
         return ""
     if last.candidates[last.winner].kind == "partition":
         return "One part alone showed f, so it is cut in two next."
-    return "One part could go: the others stay as they are, and n is one less."
+    return "One part was removed: the others stay as they are, and n is one less."
 
 
 def fruitless(options: Settings, current: Round, models: int) -> str:
-    """What it means that no candidate of the round `current` showed f; E has so many models."""
+    """What follows if no candidate of the round `current` showed f; E has this many `models`."""
     if options.algorithm in GROUPS and is_sweep(current):
         return "Each model was left out once: nothing more can be removed."
     if options.algorithm not in SMALLER:
@@ -254,7 +254,7 @@ def fruitless(options: Settings, current: Round, models: int) -> str:
 
 
 def _ddenv(_: Round) -> str:
-    return "the next round splits it into smaller parts"
+    return "the next round splits E into smaller parts"
 
 
 def _ddmin(_: Round) -> str:
@@ -264,13 +264,13 @@ def _ddmin(_: Round) -> str:
 def _probdd(last: Round) -> str:
     if _group(last) == 1:
         return "the model that was left out is needed"
-    return "each model that was left out is likelier to be needed"
+    return "each model that was left out is more likely to be needed"
 
 
 def _splitting(last: Round) -> str:
     if _group(last) == 1:
         return "the model that was left out is needed"
-    return "one of those that were left out is needed; half of them go next"
+    return "at least one of the models left out is needed; half of them are left out next"
 
 
 SMALLER: dict[str, Callable[[Round], str]] = {

@@ -52,7 +52,7 @@ class Chart(Widget):
     def show(self, snapshot: Snapshot) -> None:
         """The run as it is now."""
         state = snapshot.state
-        # Unless something was added these are the very same tuples, and are not compared item by item.
+        # Unless something was added these are the same objects, which compare fast.
         shown = (state.history, state.tests_done, state.lower_bound, state.decisions)
         if shown != self._shown:
             self._shown = shown
@@ -69,7 +69,7 @@ class Chart(Widget):
     def _drawn(self) -> Text:
         colors = self.app.theme_variables
         top = ink(colors, "primary")
-        # The terminal's own colours have no darker one of each.
+        # The terminal's own colours have no darker variants.
         below = top + DIM if self.app.native_ansi_color else ink(colors, "primary-muted")
         look = Look(top, below, ink(colors, "text-warning", bold=True))
         return steps(self._course, *self.size, look)
@@ -121,7 +121,7 @@ def _marks(most: int, rows: int) -> dict[int, str]:
 
 
 def _at(course: Course, tests: float) -> tuple[int, int]:
-    """How many models were left after so many tests, and how many were known to be needed."""
+    """How many models were left after `tests` tests, and how many were known to be needed."""
     place = bisect_right(course.points, tests, key=lambda point: point.tests) - 1
     point = course.points[max(0, place)]
     needed = max(point.needed, course.needed) if place == len(course.points) - 1 else point.needed
@@ -129,18 +129,18 @@ def _at(course: Course, tests: float) -> tuple[int, int]:
 
 
 def _row_of(models: int, most: int, rows: int) -> int:
-    """The row that the top of so many models is in; below the chart where there are none."""
+    """The row in which the top of `models` models is; for 0 the one below the chart."""
     return rows if not models else min(rows - 1, rows - 1 - int((models / most) * rows - 1e-9))
 
 
 def _line(
     at: Sequence[tuple[int, int]], levels: Sequence[int], most: int, rows: int, row: int
 ) -> list[tuple[str, str]]:
-    """The characters of a row, each with what it is: "top", "below" or "needed"."""
+    """The characters of a row, each with its kind: "top", "below" or "needed"."""
     line = []
     for (models, _), level in zip(at, levels, strict=True):
         eighths = max(1 if models else 0, round(models / most * rows * 8)) - 8 * (rows - 1 - row)
-        # Where steps and line meet in one row, the steps are what is seen.
+        # Where steps and line meet in one row, the steps are drawn.
         if level == row and eighths > 8:
             line.append((NEEDED, "needed"))
         else:

@@ -24,7 +24,7 @@ REST = 3 + 9 + 9
 
 
 class ModelsLeft(Vertical):
-    """The list of models, made only while it is in sight."""
+    """The list of models; it is filled only while it is in sight."""
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, classes="panel")
@@ -50,7 +50,7 @@ class ModelsLeft(Vertical):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """`part` is its letter, "+" if it is pinned, "" in no part; `stands` is where, `f` the end of f, m; `sensed` simulated s."""
+    """`part` is its letter, "+" if it is pinned, "" in no part; `stands` its footprint, `f` its end, m; `sensed` in simulated s."""
 
     name: str
     part: str
@@ -73,7 +73,7 @@ def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
 
 
 def _nearly(row: Row) -> float:
-    """How far from f the rectangle around a model is, m: of thousands only those in sight are measured exactly."""
+    """How far from f the rectangle around a model is, m: exact distances only for models in sight, of thousands."""
     if row.stands is None or row.f is None:
         return math.inf
     sides = zip(row.stands.low, row.f, row.stands.high, strict=True)
@@ -90,7 +90,7 @@ def line(row: Row, width: int) -> Text:
 
 
 def heading(width: int) -> str:
-    """What the columns are."""
+    """The names of the columns."""
     return f"{'model':<{max(4, width - REST)}}{'in':>3}{'from f':>9}{'sensed':>9}"
 
 

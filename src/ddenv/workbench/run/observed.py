@@ -10,13 +10,13 @@ from typing import Any
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 
-# A look that cannot have the file at once is made again soon, s.
+# Maximum time to wait for the file, s; a look that fails is soon repeated.
 PATIENCE = 0.02
 _BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 
 
 class Busy(UserError):
-    """Another program writes just now: what was read before still holds."""
+    """Another program is writing: what was read before stays valid."""
 
 
 class Gone(UserError):
@@ -26,7 +26,7 @@ class Gone(UserError):
 class Observed(RunFile):
     """An open run file that is never written. Raises UserError for what is no run file.
 
-    `strictly` leaves even the log's index alone, which after a crash has to be made anew.
+    `strictly` does not even touch the log's index, which must be rebuilt after a crash.
     """
 
     def __init__(self, path: Path, strictly: bool = False) -> None:
@@ -40,12 +40,12 @@ class Observed(RunFile):
         self._check()
 
     def refresh(self) -> bool:
-        """Whether there may be something new since the last call. Raises Gone, Busy, or UserError where nothing can be read."""
+        """Whether there may be something new since the last call. Raises Gone, Busy, or UserError if it cannot be read."""
         place = _place(self.path)
         if place[:2] != self._origin[:2]:
             raise Gone(f"{self.path}: the run file was {'replaced' if place[1] else 'deleted'} while it was open")
         if place != self._place:
-            # Without a log beside it the file is read as one that nobody writes: that ends as soon as somebody does.
+            # Without a log the file is open as immutable; now somebody writes it.
             self._db.close()
             self._open(place)
             return True
@@ -54,9 +54,9 @@ class Observed(RunFile):
         return changed
 
     def send(self, kind: str, **data: Any) -> int:
-        """As `RunFile.send`; may wait for another's write."""
+        """As `RunFile.send`; may wait for another writer."""
         if _place(self.path)[:2] != self._origin[:2]:
-            raise Gone(f"{self.path}: the run file is not there any more")
+            raise Gone(f"{self.path}: the run file is gone")
         with RunFile(self.path) as file:
             return file.send(kind, **data)
 
@@ -70,7 +70,7 @@ class Observed(RunFile):
     def _open(self, place: _Place) -> None:
         _, _, logged, shared, _ = place
         if logged and not shared and self._strictly:
-            raise UserError(f"{self.path}: its last writer crashed; open it once without --watch to mend that")
+            raise UserError(f"{self.path}: its last writer crashed; open it once without --watch to repair it")
         # All connections of a process share one index: while this one cannot write it, none can, and nothing could be sent.
         index = "&readonly_shm=1" if shared and self._strictly else ""
         how = f"mode=ro{index}" if logged else "immutable=1"
@@ -88,7 +88,7 @@ class Observed(RunFile):
             return self._db.execute(query, values).fetchall()
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF in _BUSY:
-                raise Busy(f"{self.path}: another program writes just now") from None
+                raise Busy(f"{self.path}: another program is writing") from None
             raise UserError(f"{self.path}: damaged run file: {error}") from None
         except (sqlite3.Error, OverflowError) as error:
             raise UserError(f"{self.path}: damaged run file: {error}") from None
@@ -104,7 +104,7 @@ def _place(path: Path) -> _Place:
         return 0, 0, False, False, (0, 0)
     shared = log is not None and _stat(f"{path}-shm") is not None
     logged = shared or (log is not None and log.st_size > 0)
-    # With a log its own age changes at moments that mean nothing.
+    # With a log the file's own age and size say nothing about new events.
     return file.st_dev, file.st_ino, logged, shared, (0, 0) if logged else (file.st_mtime_ns, file.st_size)
 
 

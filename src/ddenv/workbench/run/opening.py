@@ -23,7 +23,7 @@ from ddenv.workbench.wording import attach_name
 
 
 class Opening:
-    """Opens dialogs above `screen`, and does what they come to."""
+    """Opens dialogs above `screen`, and acts on their answers."""
 
     def __init__(self, screen: Screen[Any], poll: Poll, asking: Asking, world: WorldMap, scene: Scene) -> None:
         self._screen, self._poll, self._asking, self._world, self._scene = screen, poll, asking, world, scene
@@ -47,22 +47,22 @@ class Opening:
         self._screen.app.push_screen(dialog, lambda command: None if command is None else ask(command))
 
     def history(self) -> None:
-        """The tree of reductions, and the way back to one of them."""
+        """Shows the tree of reductions, to go back to one of them."""
         from ddenv.workbench.history.history_screen import History
 
         history = History(lambda: self._asking.situation, self._world.place)
         ask = self._asking.ask
-        # The question was asked there.
+        # The history asked the question already.
         self._screen.app.push_screen(history, lambda node: None if node is None else ask(GoBack(node), sure=True))
 
     def layers(self, then: Callable[[], None]) -> None:
-        """What the map shows; `then` comes when that is chosen."""
+        """Asks what the map shows; `then` is called when that is chosen."""
         from ddenv.workbench.run.choose import Layers
 
         self._screen.app.push_screen(Layers(self._world, LAYERS), lambda _: then())
 
     def copy(self, selected: Sequence[str]) -> None:
-        """What can be copied: names, and the commands that come back to this run."""
+        """Lists what can be copied: names, and the commands that come back to this run."""
         from ddenv.workbench.run.choose import Copy
 
         path = self._poll.path
@@ -70,7 +70,7 @@ class Opening:
         if selected:
             texts.append(("names selected", "\n".join(selected)))
         name = attach_name(path)
-        texts += [("to come back", f"ddenv open {name}"), ("to go on without it", f"ddenv resume {name}")]
+        texts += [("to come back", f"ddenv open {name}"), ("to go on without screen", f"ddenv resume {name}")]
         texts += [("where the run file is", str(path))]
         self._screen.app.push_screen(Copy(texts))
 
@@ -80,12 +80,12 @@ class Opening:
         self._screen.app.push_screen(ExportScreen(self._poll.path))
 
     def method(self) -> None:
-        """How the run is reduced."""
+        """Explains how the run is reduced."""
         options = settings(self._poll.snapshot.state)
         self._screen.app.push_screen(Method(options.algorithm, options.pair))
 
     def scene(self) -> None:
-        """The address of the 3-D scene, which is started if it is not on."""
+        """Shows the address of the 3-D scene; starts it if it is not on."""
         dialog = SceneDialog(self._scene)
         if not self._scene.on:
             self._scene.start()
@@ -106,12 +106,12 @@ class Opening:
 
     def detach(self) -> None:
         """Leaves the workbench and says how to come back."""
-        works = "The engine works on" if self._poll.snapshot.engine != "absent" else "No engine is running"
+        works = "The engine goes on" if self._poll.snapshot.engine != "absent" else "No engine is running"
         again = f"{attach_name(self._poll.path)}{' --watch' if self._poll.watch else ''}"
         self._exit(f"{works}. Attach again with: ddenv open {again}")
 
     def quit(self) -> None:
-        """Leaves at once where there is no engine; else asks what becomes of it."""
+        """Leaves at once if no engine is running; else asks whether to stop it."""
         snapshot = self._poll.snapshot
         if snapshot.engine == "absent" or snapshot.gone:
             self._screen.app.exit(0)

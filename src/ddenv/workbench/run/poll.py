@@ -1,4 +1,4 @@
-"""Looks at a run file again and again, and says when something changed."""
+"""Reads a run file again and again, and returns what changed."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ddenv.workbench.run.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.
 LOCK_PERIOD = 0.5
-# How often the poses of running tests are read: more would only be more to write to a terminal, s.
+# How often the poses of running tests are read: more often would only send more to the terminal, s.
 LIVE_PERIOD = 0.25
-# So long a look may take, s, and so many events are read at a time: keys are answered while a long run is caught up with.
+# Maximum time of a look, s, and number of events read at a time: keys are answered even while a long run is read.
 PATIENCE = 0.015
 SOME_EVENTS = 50
 
@@ -39,8 +39,8 @@ class Snapshot:
 
     `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path
     in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the
-    run file cannot be read. `gone` says that it was deleted or replaced: all else is what was read last.
-    `behind` says that there is more in it than was read yet.
+    run file cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
+    `behind` says that not all of it was read yet.
     """
 
     state: RunState = field(default_factory=RunState)
@@ -55,13 +55,13 @@ class Snapshot:
 
     @property
     def older_engine(self) -> str:
-        """The version of the ddenv whose engine works on the run, or did last, if it is not this one's; "" if it is, or unknown."""
+        """The version of the run's last engine, if it is another version than this program's; otherwise "", or if unknown."""
         version = self.state.engine_version
         return "" if version == __version__ else version
 
     @property
     def status(self) -> str:
-        """The state's status, or "starting" or "lost" where the engine's own state tells more."""
+        """The state's status, or "starting" or "lost" if the engine's lock says so."""
         if self.engine == "starting":
             return "starting"
         if self.state.ended or self.behind or self.engine == "alive" or self.state.status == "created":
@@ -77,7 +77,7 @@ class Snapshot:
 
     @property
     def focus(self) -> Candidate | None:
-        """The candidate that all is about now: the one that waits, or else the first one that is being tested."""
+        """The current candidate: the one that waits, or else the first one that is being tested."""
         current = self.state.round
         if current is None or current.done or self.status in ("finished", "lost"):
             return None
@@ -96,8 +96,8 @@ class Snapshot:
 class Poll:
     """One open run file, which is only ever read.
 
-    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written. `told` is
-    called with each event's kind, and the states before and after it; again with the same ones where a look was cut short.
+    `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written.
+    `on_event` is called with each event's kind and the states before and after it; twice with the same if a look was cut short.
     """
 
     def __init__(
@@ -106,12 +106,12 @@ class Poll:
         *,
         starting: Callable[[], bool] = lambda: False,
         watch: bool = False,
-        told: Callable[[str, RunState, RunState], None] = lambda kind, before, after: None,
+        on_event: Callable[[str, RunState, RunState], None] = lambda kind, before, after: None,
     ) -> None:
         """Raises UserError for a file that is no run file."""
         self.path = path
         self.watch = watch
-        self._told = told
+        self._on_event = on_event
         self.file = Observed(path, strictly=watch)
         self._starting = starting
         self._snapshot: Snapshot | None = None
@@ -141,7 +141,7 @@ class Poll:
             self.file.tidy()
 
     def look(self) -> Snapshot | None:
-        """The new snapshot, or None if nothing changed since the last look, or another program writes just now."""
+        """The new snapshot, or None if nothing changed since the last look, or another program is writing."""
         try:
             self._behind = self.file.refresh() or self._behind
             snapshot = self._read()
@@ -159,7 +159,7 @@ class Poll:
         return snapshot
 
     def _read(self) -> Snapshot:
-        """Of a damaged file as much as makes sense is shown, with what is wrong. Raises Busy."""
+        """Reads as much as makes sense of a damaged file, with what is wrong. Raises Busy."""
         engine, last = self._engine(), self._snapshot
         if last is not None and not self._behind:
             spent = self._spent(last.state, engine)
@@ -180,19 +180,19 @@ class Poll:
         return replace(snapshot, behind=more)
 
     def _left(self, why: str) -> Snapshot:
-        """What was read last of a file that is not there any more."""
+        """What was read last of a file that is gone."""
         error = f"{why}; what you see is what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
     def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
-        """The state after the new events, up to the first one that makes no sense, and whether there are more of them."""
+        """The state after the new events, up to the first invalid one; what is wrong with that; whether there are more."""
         begun, more = time.monotonic(), True
         try:
             while more:
                 events = self.file.events(state.revision, SOME_EVENTS)
                 for event in events:
                     before, state = state, apply(state, event)
-                    self._told(event.kind, before, state)
+                    self._on_event(event.kind, before, state)
                 more = len(events) == SOME_EVENTS
                 if time.monotonic() - begun > PATIENCE:
                     break
@@ -223,7 +223,7 @@ class Poll:
         return self._live(state), True
 
     def _live(self, state: RunState) -> tuple[Live, ...]:
-        """Only what makes sense: a row names a running test and has a whole, finite pose."""
+        """Only valid rows: they name a test and have a whole, finite pose."""
         try:
             rows = self.file.live()
             return tuple(row for row in rows if 0 < row.test <= len(state.tests) and _finite(row))

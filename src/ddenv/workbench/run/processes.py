@@ -11,14 +11,14 @@ from ddenv.workbench.wording import plain
 
 # Exit codes of an engine that has finished or was stopped.
 GOOD_ENDS = (0, 1)
-# So long the screen may stand still for a program that is asked to end, s.
+# Maximum time that the screen waits for a program to end, s.
 A_MOMENT = 0.3
-# Of a log only its end is read, bytes.
+# How much of the end of a log is read, bytes.
 TAIL = 4000
 
 
 class Engine:
-    """The engine of one run, if this workbench started it. It is never ended from here: it outlives the screen."""
+    """The engine of one run, if this workbench started it. It goes on when the screen closes."""
 
     def __init__(self, run: Path, process: subprocess.Popen[bytes] | None = None) -> None:
         self.run = run
@@ -37,7 +37,7 @@ class Engine:
         self._worked, self._last_words = False, ""
 
     def seen_at_work(self) -> None:
-        """It has the run's lock: from now on the lock tells whether it lives."""
+        """It has the run's lock: from now on the lock shows whether it is alive."""
         self._worked = True
 
     @property
@@ -46,13 +46,13 @@ class Engine:
 
     @property
     def trouble(self) -> str:
-        """Why it ended otherwise than by itself or because it was asked to, or nothing."""
+        """The error that ended it, or ""."""
         code = None if self._process is None else self._process.poll()
         if code in (None, *GOOD_ENDS):
             return ""
         from ddenv.runs.programs import last_words
 
-        # Asked for at each look, and the log can be long.
+        # Read once: this is called at each look, and the log can be long.
         self._last_words = self._last_words or plain(last_words(self.run))
         return f"The engine ended: {self._last_words}"
 
@@ -81,7 +81,7 @@ class Scene:
             self.trouble = f"the scene cannot be started: {error.strerror}"
 
     def wait(self) -> None:
-        """Blocks until the program has said its URL or has ended: not for the screen's thread."""
+        """Blocks until the program has printed its URL or has ended: not for the screen's thread."""
         process = self._process
         if process is None or process.stdout is None:
             return
@@ -101,7 +101,7 @@ class Scene:
         try:
             process.wait(timeout=A_MOMENT)
         except subprocess.TimeoutExpired:
-            # It takes its time, and the screen has none.
+            # The screen waits no longer.
             Thread(target=_end, args=(process,), name="scene").start()
         else:
             _close(process)

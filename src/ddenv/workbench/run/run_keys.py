@@ -1,4 +1,4 @@
-"""The keys of the run screen, and which of them the footer has room for.
+"""The keys of the run screen, and which of them the footer shows first.
 
 A key that guides the run has the action `guide`, with its name in `ddenv.guiding.offers.ACTIONS`.
 """
@@ -18,7 +18,7 @@ _KEYS = [
         "guide('pause')",
         "pause",
         id="run.pause",
-        tooltip="pause: no new test is started; again to go on; starts the engine where none works",
+        tooltip="pause: start no new test; again to go on; starts an engine if none is running",
     ),
     Binding("s", "guide('step')", "step", id="run.step", tooltip="run one test, then pause"),
     Binding(
@@ -26,8 +26,8 @@ _KEYS = [
         "guide('accept')",
         "accept",
         id="run.accept",
-        tooltip="accept the reduction that waits; or adopt the try under the cursor that shows f; or take another failure of the "
-        "candidate or try under the cursor for as good as f",
+        tooltip="accept the reduction that waits; or adopt the try under the cursor that shows f; or count another failure of the "
+        "candidate or try under the cursor as f, too",
     ),
     Binding(
         "x",
@@ -79,7 +79,7 @@ _KEYS = [
         "guide('change')",
         "settings",
         id="run.change",
-        tooltip="change pair, algorithm, iterations or budget from here on",
+        tooltip="change pair, algorithm, iterations or budget, from the next round on",
     ),
     Binding(
         "E",
@@ -89,7 +89,7 @@ _KEYS = [
         tooltip="export: the world that is left, a scenario that runs it, the report",
     ),
     Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
-    Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks what becomes of the engine"),
+    Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks whether to stop the engine"),
     _hidden("S", "guide('step_round')", "round", "run.round", "run to the end of the round, then pause"),
     _hidden("t", "guide('mode')", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
     _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
@@ -102,8 +102,8 @@ _KEYS = [
     _hidden("3", "pane('chart')", "chart", "run.chart", "the chart of models left by test"),
     _hidden("4", "pane('now')", "what is happening", "run.now", "what is happening, in words"),
     _hidden("5,L", "pane('log')", "log", "run.log", "the log: what happened so far, with the time of day"),
-    _hidden("g", "next_pane", "next pane", "run.next_pane", "the next of these panes"),
-    _hidden("escape", "follow", "follow", "run.follow", "nothing is selected, and cursor and map follow the run again"),
+    _hidden("g", "next_pane", "next pane", "run.next_pane", "the next pane"),
+    _hidden("escape", "follow", "follow", "run.follow", "select nothing; cursor and map follow the run again"),
     _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
     _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
     _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
@@ -115,7 +115,7 @@ KEYS: list[BindingType] = [*_KEYS]
 # The names of the actions that guide the run, and their bindings by these names.
 GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
 GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
-# In the order of the screen, and in the order in which they are given room: on wide screens there is some for more.
+# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
 MORE = ("run.find", "run.layers", "run.copy", "run.scene", "run.runs")
 SHOWN = tuple(
     id

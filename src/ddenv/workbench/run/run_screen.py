@@ -26,7 +26,7 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.log import Log, decision_line
+from ddenv.workbench.run.log import NOTHING_DECIDED, Log, decision_line
 from ddenv.workbench.run.models_chart import Chart
 from ddenv.workbench.run.models_left import ModelsLeft
 from ddenv.workbench.run.opening import Opening
@@ -66,7 +66,7 @@ class RunScreen(Screen[None]):
         super().__init__()
         self.run = run
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
-        self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, told=self._log.add)
+        self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._log.add)
         self._table, self._map, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
         self._footer = KeyFooter(LOOKING, LOOKING) if watch else KeyFooter(SHOWN, FIRST)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
@@ -103,7 +103,7 @@ class RunScreen(Screen[None]):
             with Vertical(id="run-more"):
                 yield ModelsLeft(id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
-                    yield Lines(decision_line, nothing="nothing was decided by hand yet", tail=True, id="decisions")
+                    yield Lines(decision_line, nothing=NOTHING_DECIDED, tail=True, id="decisions")
         if self.poll.watch:
             yield Static("watching only: no key changes anything in this run", id="watching", markup=False)
         yield Status(id="status")
@@ -158,9 +158,9 @@ class RunScreen(Screen[None]):
     def _seen(self, before: Snapshot, live: bool) -> None:
         if self.snapshot.engine == "alive":
             self.engine.seen_at_work()
-        self.asking.tell_refusal(before)
+        self.asking.show_refusal(before)
         if live:
-            self.asking.tell_tries(before)
+            self.asking.show_verdicts(before)
 
     def _show(self, changed: bool) -> None:
         if changed:

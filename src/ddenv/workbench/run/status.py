@@ -21,7 +21,7 @@ from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
-# What is said in fewer words, or not at all, until the rest has room: from the least important on.
+# What is shortened or left out until the rest fits, the least important first.
 SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
 
 
@@ -35,7 +35,7 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """Something the status line says; the longest of its `forms` that there is room for."""
+    """Something that the status line says, in the longest of its `forms` that fits."""
 
     name: str
     forms: tuple[str, ...]
@@ -80,7 +80,7 @@ class Status(Widget):
         self._cut = 0
 
     def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
-        """`scene` is the URL of the 3-D scene while it is on, `asked` what the engine has been asked but not done yet."""
+        """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer."""
         if (scene, asked) == self._besides and snapshot is self._snapshot:
             return
         tests = snapshot.state.tests
@@ -109,7 +109,7 @@ class Status(Widget):
 
 
 def heading(state: RunState) -> Heading:
-    """The words of the header, from the longest ones on."""
+    """The words of the header, the longest form first."""
     options = settings(state)
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
     total, kept = len(state.elements), len(state.environment)
@@ -122,7 +122,7 @@ def heading(state: RunState) -> Heading:
         n = "" if options.algorithm in GROUPS else f" · n {state.round.n_partitions}"
         step = [f"round {state.round.number}{n}"]
     rights = ([*branch, *step, size, *pinned, *more], [*branch, *step, size, *pinned], [*branch, size], [size])
-    # Without branches and pins there is one way to say it.
+    # Without branches and pins there is only one form.
     return Heading(lefts, tuple(" · ".join(words) for words in (rights if branch or pinned else rights[:1])))
 
 
@@ -145,7 +145,7 @@ def facts(
     asked: str = "",
     cut: int = 0,
 ) -> tuple[Fact, ...]:
-    """What there is to say, in the order of the screen."""
+    """What the status line says, in its order."""
     state = snapshot.state
     status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
     sign, word = STATUS.get(status, ("·", status))
@@ -169,7 +169,7 @@ def facts(
 
 
 def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:
-    """(name, words) of what fits into so many cells."""
+    """(name, words) of what fits into `width` cells."""
     forms = {fact.name: list(fact.forms) for fact in said}
     for name in SHRINK:
         if sum(len(each[0]) + 3 for each in forms.values() if each[0]) <= width:
@@ -180,7 +180,7 @@ def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:
 
 
 def cut_tests(tests: PersistentTuple[Test], before: PersistentTuple[Test], cut: int) -> int:
-    """How many of `tests` were ended early, if `cut` of those of `before` were: only what changed is looked at."""
+    """How many of `tests` were ended early, if `cut` of those of `before` were: it reads only tests that changed."""
     if len(tests) < len(before):
         before, cut = PersistentTuple(), 0
     for test in tests.changed_since(before):

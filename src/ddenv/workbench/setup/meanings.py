@@ -25,7 +25,7 @@ def not_used(field: Field, now: Circumstances) -> str:
     """Why a field has no effect, or ""."""
     only = field.setting.used_by if field.setting else ()
     if only and now.algorithm in OURS and now.algorithm not in only:
-        return f"Not used: {plain(now.algorithm)} does not look at it."
+        return f"Not used by {plain(now.algorithm)}."
     return ""
 
 

@@ -1,0 +1,100 @@
+"""The setup screen explains scenarios, schemas and fields."""
+
+import fake_run
+import pytest
+import yaml
+from textual.widgets import Select, Static
+
+from ddenv.schemas import explanation
+from ddenv.workbench.run.methods import KINDS
+from ddenv.workbench.setup.fields import Explained
+from tests.workbench.setup.setup_session import Opened
+
+
+@pytest.mark.screens
+async def test_a_description_that_does_not_fit_says_so(scenarios):
+    own = fake_run.scenario() | {"description": "far " * 60 + "end"}
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
+    for size, whole in (((80, 24), False), ((200, 60), True)):
+        async with Opened(size) as session:
+            told = session.screen.query_one("#about", Static).render().plain
+            assert told.endswith("far end" if whole else " far …")
+            assert whole or len(told.splitlines()) == 2
+
+
+@pytest.mark.screens
+async def test_what_is_focused_highlighted_or_changed_is_explained(scenarios):
+    async with Opened() as session:
+        assert session.explained() == ("algorithm ddenv", explanation("algorithm", "ddenv"))
+        await session.press("enter", "tab")
+        assert session.app.focused.id == "partitioning"
+        assert session.explained() == ("partitioning model2model", explanation("partitioning", "model2model"))
+        await session.press("enter", "down")
+        assert session.explained() == ("partitioning timeseg", explanation("partitioning", "timeseg"))
+        assert session.method()[1] == "model2model"
+        await session.press("escape")
+        assert session.explained()[0] == "partitioning model2model"
+        session.screen.query_one("#prioritization", Select).value = "random"
+        await session.pilot.pause()
+        assert session.explained() == ("prioritization random", explanation("prioritization", "random"))
+
+
+@pytest.mark.screens
+async def test_another_scenario_brings_its_own_explanation(scenarios):
+    other = fake_run.scenario(name="other")
+    other["reduction"] |= {"algorithm": "probdd", "as_printed": True}
+    (scenarios / "other.yaml").write_text(yaml.safe_dump(other))
+    async with Opened() as session:
+        await session.press("down")
+        assert session.explained()[0] == "algorithm probdd"
+        assert session.screen.form.texts["as_printed"] == "on"
+
+
+@pytest.mark.screens
+async def test_each_field_says_what_it_means_and_costs(scenarios):
+    async with Opened() as session:
+        await session.press("f9")
+        for id, label in (("as_printed", "as printed"), ("goal_x", "goal x m"), ("accept", "accept")):
+            session.screen.query_one(f"#{id}").focus()
+            await session.pilot.pause()
+            title, words = session.explained()
+            assert title == label
+            assert words.endswith(".")
+        session.screen.query_one("#iterations").focus()
+        session.fill(iterations="7")
+        await session.pilot.pause()
+        assert session.explained()[1].endswith("A candidate without f costs 8 tests.")
+
+
+UNUSED = {
+    "ddenv": ([], "", ""),
+    "splitting": (["partitioning"], "does not use the partitioning", "Not used by splitting"),
+    "ddmin": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used by ddmin"),
+    "probdd": (["partitioning", "prioritization"], "uses neither the partitioning", "Not used by probdd"),
+}
+
+
+@pytest.mark.screens
+async def test_what_the_algorithm_does_not_use_is_dimmed_and_said(scenarios):
+    async with Opened() as session:
+        for algorithm, (unused, words, beside) in UNUSED.items():
+            session.screen.query_one("#algorithm", Select).focus()
+            session.screen.query_one("#algorithm", Select).value = algorithm
+            await session.pilot.pause()
+            assert words in session.explained()[1]
+            assert [kind for kind in KINDS if session.screen.query_one(f"#{kind}").has_class("-unused")] == unused
+            session.screen.query_one("#partitioning").focus()
+            await session.pilot.pause()
+            assert session.explained()[1].startswith(beside or explanation("partitioning", "model2model"))
+
+
+@pytest.mark.screens
+async def test_a_long_explanation_scrolls(scenarios):
+    async with Opened((64, 18)) as session:
+        await session.press("enter", "down", "end", "enter")
+        panel = session.screen.query_one(Explained)
+        assert session.explained()[0] == "algorithm splitting"
+        await session.press("pagedown")
+        assert panel.scroll_offset.y > 0
+        await session.press("pageup", "pageup")
+        assert panel.scroll_offset.y == 0
