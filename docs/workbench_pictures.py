@@ -202,7 +202,7 @@ async def export(pilot: Pilot[int], run: Path) -> None:
 
 async def branch(pilot: Pilot[int]) -> None:
     """Back to the first reduction, on by another method, and both ends side by side."""
-    await press(pilot, "h", *["up"] * 9, "down", "enter", "y")
+    await press(pilot, "h", "home", "down", "enter", "y")
     await until(pilot, lambda: state(pilot).node == 1 and state(pilot).paused)
     await press(pilot, "c")
     await take(pilot, "change")

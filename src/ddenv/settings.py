@@ -1,4 +1,4 @@
-"""Each setting of a run, once: type, default, unit, range, meaning, where it shows, and whether it may change on the way.
+"""Each setting of a run, once: type, default, unit, range, meaning, where it shows, and whether it may change during a run.
 
 The scenario's sections, the setup form, the command line and its help, the tables in the docs, and the report come from here. A
 new setting is one line in a class below. Nothing heavy is imported: the command line needs this file at once.

@@ -156,7 +156,7 @@ def test_a_branch_with_steps_of_its_own_is_told_before_the_way_to_here(run):
 def test_settings_that_were_changed_on_the_way(run):
     run.created().baseline().write("changed", settings={"iterations": 7})
     rows = dict(tuple(map(words, row[:2])) for row in table(content(read_run(run.path)), "setting"))
-    assert rows["iterations"] == "7 (changed on the way; at first 3)"
+    assert rows["iterations"] == "7 (changed during the run; at first 3)"
     assert rows["goal"] == "x 6 m, y 0 m"
 
 

@@ -35,9 +35,9 @@ def settings(record: Record) -> Section:
 
 
 def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
-    """The value of a setting, and what it was at first where that was changed on the way."""
+    """The value of a setting, and what it was at first where that was changed during the run."""
     now, first = (_value(read(each, one)) or one.none for each in (scenario, asked))
-    return now if first == now else f"{now} (changed on the way; at first {first})"
+    return now if first == now else f"{now} (changed during the run; at first {first})"
 
 
 def _value(value: Any) -> str:

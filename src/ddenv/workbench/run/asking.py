@@ -64,7 +64,7 @@ class Asking:
         if self._poll.watch:
             return self._watching
         if snapshot.gone:
-            return "the run file is gone: nobody can guide it any more; q leaves"
+            return "the run file is gone: it can no longer be guided; q leaves"
         return "this run file cannot be read" if snapshot.error else ""
 
     @cached_property

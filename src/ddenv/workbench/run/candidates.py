@@ -105,7 +105,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         self._arrange()
 
     def show(self, snapshot: Snapshot) -> None:
-        """The run as it is now."""
+        """Shows the run as it is now."""
         before, self._listed, self._snapshot = self._listed, listed(snapshot), snapshot
         if self._listed.of != before.of:
             self.following, self.cursor_row = True, 0

@@ -50,7 +50,7 @@ class Chart(Widget):
         self._text = Text("")
 
     def show(self, snapshot: Snapshot) -> None:
-        """The run as it is now."""
+        """Shows the run as it is now."""
         state = snapshot.state
         # Unless something was added these are the same objects, which compare fast.
         shown = (state.history, state.tests_done, state.lower_bound, state.decisions)

@@ -36,7 +36,7 @@ class ModelsLeft(Vertical):
         yield Lines(line, nothing="none", id="models")
 
     def show(self, state: RunState, prints: Sequence[Footprint]) -> None:
-        """The run as it is now; `prints` are where its models stand."""
+        """Shows the run as it is now; `prints` are the footprints of its models."""
         split = None if state.round is None or state.round.done else state.round.split
         made_of = (state.environment, split, state.pinned, state.evidence_test, state.baseline, prints)
         lines = self.query_one("#models", Lines)

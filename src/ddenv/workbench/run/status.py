@@ -49,7 +49,7 @@ class Header(Widget):
         self._heading = Heading()
 
     def show(self, snapshot: Snapshot) -> None:
-        """The run as it is now."""
+        """Shows the run as it is now."""
         now = heading(snapshot.state)
         if now != self._heading:
             self._heading = now
