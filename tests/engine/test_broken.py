@@ -125,7 +125,8 @@ BREAKS = """
 @pytest.mark.programs
 def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_path):
     run = tmp_path / "run.ddenv"
-    create_run(own_scenario(tmp_path, BREAKS, "{world}", baseline_runs=3, iterations=1), run)
+    scenario = own_scenario(tmp_path, BREAKS, "{world}", baseline_runs=3, iterations=1, growth="paper", skip="known")
+    create_run(scenario, run)
     done = _resume(run)
     assert done.returncode == 2
     assert done.stderr == (
