@@ -70,7 +70,7 @@ async def test_strange_names_are_shown_as_text_and_steer_nothing(scenarios, runs
 
 NAMES = (
     ("x" * 300, "cannot be written"),
-    ("a\0b", "cannot be"),
+    ("a\0b", "is not a valid file name"),
     (".hidden", "is not a valid file name"),
     ("no/such", ""),
 )
