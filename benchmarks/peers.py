@@ -128,12 +128,12 @@ def table(asked: Asked, reducers: list[str]) -> None:
 def cells(asked: Asked, reducer: str) -> list[str]:
     """The cells of one reduction, or of its error."""
 
-    def tell(tests: int) -> None:
+    def report(tests: int) -> None:
         print(f"\r{asked.name}: {reducer}: {tests} tests  ", end="", file=sys.stderr, flush=True)
 
-    tell(0)
+    report(0)
     try:
-        result = ours(asked, reducer, tell) if reducer in OURS else theirs(asked, reducer, tell)
+        result = ours(asked, reducer, report) if reducer in OURS else theirs(asked, reducer, report)
     except UserError as error:
         return [str(error), *[""] * (len(HEADER) - 2)]
     finally:
@@ -149,7 +149,7 @@ def cells(asked: Asked, reducer: str) -> list[str]:
     ]
 
 
-def ours(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
+def ours(asked: Asked, reducer: str, report: Callable[[int], None]) -> Result:
     """One reduction by ddenv. Raises UserError."""
     path = asked.folder / f"{list(OURS).index(reducer)}.ddenv"
     words = [sys.executable, "-m", "ddenv", "run", asked.name, *OURS[reducer], "--json", "--output", str(path)]
@@ -161,7 +161,7 @@ def ours(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
         program = subprocess.Popen(words, stdout=out, stderr=log, start_new_session=True)
         try:
             while not _ended(program):
-                tell(_tests_in(path))
+                report(_tests_in(path))
             seconds = time.perf_counter() - started
         except KeyboardInterrupt:
             program.send_signal(signal.SIGINT)
@@ -197,7 +197,7 @@ def _content(file: tempfile._TemporaryFileWrapper) -> str:
     return file.read().decode()
 
 
-def theirs(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
+def theirs(asked: Asked, reducer: str, report: Callable[[int], None]) -> Result:
     """One reduction by another reducer. Raises UserError."""
     record = asked.folder / f"{list(REDUCERS).index(reducer)}.tests"
     context = DrakeContext()
@@ -209,7 +209,7 @@ def theirs(asked: Asked, reducer: str, tell: Callable[[int], None]) -> Result:
     there.close()
     try:
         while not here.poll(LOOK):
-            tell(counts(record).tests)
+            report(counts(record).tests)
         message = here.recv()
         seconds = time.perf_counter() - started
         if isinstance(message, str):

@@ -8,7 +8,7 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Label
 
-from ddenv.workbench.background import is_open, tell
+from ddenv.workbench.background import call_if_open, is_open
 from tests.waiting import eventually
 
 
@@ -29,7 +29,7 @@ class Page(Screen):
         with Panel():
             yield Label("", id="cost")
 
-    def tell_cost(self, words):
+    def show_cost(self, words):
         self.query_one("#cost", Label).update(words)
 
 
@@ -41,10 +41,10 @@ async def page():
 
 
 async def test_an_open_screen_is_told(page):
-    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    await asyncio.to_thread(call_if_open, page, page.show_cost, "3 tests")
     assert str(page.query_one(Label).content) == "3 tests"
     await page.app.push_screen(Page())
-    await asyncio.to_thread(tell, page, page.tell_cost, "4 tests")
+    await asyncio.to_thread(call_if_open, page, page.show_cost, "4 tests")
     assert str(page.query_one(Label).content) == "4 tests"
 
 
@@ -55,12 +55,12 @@ async def test_a_screen_that_is_being_closed_is_told_nothing_more(page):
     await eventually(lambda: not page.query(Label))
     assert not closing.done()
     assert not is_open(page)
-    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    await asyncio.to_thread(call_if_open, page, page.show_cost, "3 tests")
     panel.may_close.set()
     await closing
-    await asyncio.to_thread(tell, page, page.tell_cost, "3 tests")
+    await asyncio.to_thread(call_if_open, page, page.show_cost, "3 tests")
 
 
 async def test_an_app_that_ends_is_told_nothing_more(page):
     page.app.exit()
-    await asyncio.to_thread(tell, page, pytest.fail, "told")
+    await asyncio.to_thread(call_if_open, page, pytest.fail, "told")

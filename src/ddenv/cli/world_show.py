@@ -68,15 +68,15 @@ def terminal_map(
     _marks(canvas, view, spawn, goal, color)
     drawn = list(_framed(canvas, view, color))
     left = columns - AXIS - view.columns - len(GAP) if layout.beside else columns
-    told = _legend(entries, left, layout.legend_lines)
+    legend = _legend(entries, left, layout.legend_lines)
     title = shortened(_title(world, models, spawn, goal), columns)
     if not layout.beside:
-        return "\n".join([title, *drawn, *told])
+        return "\n".join([title, *drawn, *legend])
     empty = " " * (view.columns + AXIS)
-    height = max(len(drawn), len(told))
+    height = max(len(drawn), len(legend))
     drawn += [empty] * (height - len(drawn))
-    told += [""] * (height - len(told))
-    return "\n".join([title, *(f"{line}{GAP}{text}".rstrip() for line, text in zip(drawn, told, strict=True))])
+    legend += [""] * (height - len(legend))
+    return "\n".join([title, *(f"{line}{GAP}{text}".rstrip() for line, text in zip(drawn, legend, strict=True))])
 
 
 def _title(world: World, models: Sequence[Drawn], spawn: Pose | None, goal: Point | None) -> str:
@@ -100,8 +100,8 @@ def _entries(models: Sequence[Drawn]) -> list[Entry]:
 
 def _numbers(each: Drawn) -> tuple[str, str]:
     (x, y, _), size = each.center, each.size
-    told = " x ".join(f"{part:.2f}" for part in size) if each.outline.polygons else "no shapes"
-    return f"{x:.2f}, {y:.2f}", told
+    words = " x ".join(f"{part:.2f}" for part in size) if each.outline.polygons else "no shapes"
+    return f"{x:.2f}, {y:.2f}", words
 
 
 def _widths(entries: Sequence[Entry], columns: int) -> list[int]:
@@ -131,9 +131,9 @@ def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
 
 
 def _more(number: int, columns: int) -> str:
-    told = f"... and {number} more"
-    remedy = f"{told} (--svg FILE names them)"
-    return remedy if width(remedy) <= columns else told
+    words = f"... and {number} more"
+    remedy = f"{words} (--svg FILE names them)"
+    return remedy if width(remedy) <= columns else words
 
 
 def _cell(entry: Entry, widths: Sequence[int]) -> str:

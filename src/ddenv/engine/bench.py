@@ -12,7 +12,7 @@ import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal, Keep
-from ddenv.engine.judging import failures_of, told
+from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import SharingPool
 from ddenv.errors import UserError
@@ -187,7 +187,7 @@ class Bench:
         if isinstance(result, RunResult):
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
-        data = told(result, self._counted())
+        data = result_data(result, self._counted())
         noticed = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
         self._journal.record("test_finished", motions, test=test, **data | noticed)
 

@@ -17,7 +17,7 @@ from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.world.scenario import FailureSpec
 
 
-def told(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
+def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
     """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
 
     `failures` are f, and what the user took for as good; the nearest one counts.

@@ -41,13 +41,13 @@ class Place:
 
 def simulator() -> str:
     """What a test is computed with, so far as its bits may depend on it."""
-    told = []
+    versions = []
     for name in PACKAGES:
         try:
-            told.append(f"{name} {version(name)}")
+            versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:
-            told.append(f"no {name}")
-    return ", ".join(told)
+            versions.append(f"no {name}")
+    return ", ".join(versions)
 
 
 def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key, Place]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ddenv.engine.judging import failures_of, told
+from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
@@ -99,7 +99,7 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
             for index, result in pool.finished(1.0):
                 trial = trials[index]
                 asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
-                results[index] = asked | told(result, subject.failures)
+                results[index] = asked | result_data(result, subject.failures)
             while shown in results:
                 yield results.pop(shown)
                 shown += 1

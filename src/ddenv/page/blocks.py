@@ -54,7 +54,7 @@ class Picture:
 
     name: str
     svg: str
-    told: str
+    alternative: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ def _block(block: Block) -> str:
         case Table():
             return _table(block)
         case Picture():
-            words = escape(plain(block.told))
+            words = escape(plain(block.alternative))
             return f'<figure class="{block.name}" aria-label="{words}">\n{block.svg}\n</figure>'
         case Code():
             return _code(block)

@@ -82,7 +82,7 @@ def _block(block: Block, stem: str) -> list[str]:
         case Table():
             return _table(block)
         case Picture():
-            return [f"![{_text(block.told)}]({quote(_file(stem, block))})"]
+            return [f"![{_text(block.alternative)}]({quote(_file(stem, block))})"]
         case Code():
             return _code(block)
     raise TypeError(type(block).__name__)

@@ -43,7 +43,7 @@ def chart(state: RunState) -> str:
     ]
     if any(number for _, number in needed):
         parts.append(f'<path class="needed" d="M{bound}"/>')
-    parts += _told(state, at, last, most, any(number for _, number in needed))
+    parts += _labels(state, at, last, most, any(number for _, number in needed))
     return "\n".join([*parts, "</svg>"])
 
 
@@ -80,7 +80,7 @@ def axes(at: At, last: int, most: int) -> Iterator[str]:
     yield f'<text class="tick" x="{LEFT - 7:.1f}" y="13" text-anchor="start">models left</text>'
 
 
-def _told(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
+def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
     """The number at the end, and what the lower line is."""
     x, y = at(last, len(state.environment))
     yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'

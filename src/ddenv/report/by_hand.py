@@ -31,11 +31,11 @@ def guiding(record: Record) -> Section | None:
 
 def _decisions(state: RunState) -> list[Block]:
     rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
-    told = say(
+    lead = say(
         f"{count(len(rows), 'decision')} by hand, each with the tests made until then and the environment it was made in."
     )
     head = ("time", "tests", "at", "what the user did")
-    return [told, Table(head, _cut(rows, 3), frozenset({1, 2}))]
+    return [lead, Table(head, _cut(rows, 3), frozenset({1, 2}))]
 
 
 def _trials(state: RunState) -> list[Block]:

@@ -99,12 +99,12 @@ def _tests(state: RunState) -> list[Block]:
     table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
     if not state.deflake_runs and not state.cut_tests and not state.tally["lost"]:
         return [table]
-    told = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates that did not show f at first."
+    words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates that did not show f at first."
     if state.cut_tests:
-        told += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
+        words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
     if lost := state.tally["lost"]:
-        told += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
-    return [table, say(told)]
+        words += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
+    return [table, say(words)]
 
 
 def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) -> tuple[Cell, ...]:

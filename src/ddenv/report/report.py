@@ -57,8 +57,8 @@ def _verdict(state: RunState) -> str:
     enough = "is" if left == 1 else "are"
     if left == all_of_them:
         return f"The robot fails among all {count(left, 'model')}; none is removed yet"
-    told = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
-    return told if state.minimal else f"{told} so far"
+    words = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
+    return words if state.minimal else f"{words} so far"
 
 
 def _damage(record: Record) -> list[Paragraph]:
@@ -101,15 +101,15 @@ def _minimal(state: RunState) -> Paragraph:
 def _failure(state: RunState) -> list[Paragraph]:
     """The scenario in its author's words, and how the robot failed in it."""
     description = plain(state.scenario.get("description", ""))
-    told = [say(description)] if description else []
+    described = [say(description)] if description else []
     base = state.baseline
     if base is None:
         seen = count(state.tests_done, "run")
         words = f"The whole world is run first to fix the failure: {seen} ended so far."
-        return [*told, say(words)] if state.tests_done else told
+        return [*described, say(words)] if state.tests_done else described
     words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m"
     words += f"{_short_of(state, base)}{_after(state, base)}."
-    return [*told, say(words)]
+    return [*described, say(words)]
 
 
 def _short_of(state: RunState, base: Baseline) -> str:

@@ -216,8 +216,8 @@ def _axes(frame: Frame) -> Iterator[str]:
 
 def _model(each: Drawn, sort: str, frame: Frame, coarse: bool) -> str:
     flat = " floor" if each.floor else ""
-    told = {"kept": "left", "gone": "removed", "still": "always there", "whole": "can be removed"}[sort]
-    title = f"<title>{_text(each.model.name)} ({told})</title>"
+    words = {"kept": "left", "gone": "removed", "still": "always there", "whole": "can be removed"}[sort]
+    title = f"<title>{_text(each.model.name)} ({words})</title>"
     polygons = each.outline.polygons
     if not polygons:
         x, y = frame.pixels(np.array([each.outline.center]))[0]

@@ -17,7 +17,7 @@ MOST_ROUNDS = 60
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
+class _Row:
     """A round, its finished tests, whether it is still on, and whether its reduction was taken back."""
 
     round: Round
@@ -40,18 +40,18 @@ def way(record: Record) -> Section | None:
     state = record.state
     if state.baseline is None:
         return None
-    blocks: list[Block] = [Picture("chart", chart(state), _told(state))]
+    blocks: list[Block] = [Picture("chart", chart(state), _alternative(state))]
     if record.rounds:
         undone = frozenset(node.round for node in state.nodes if node.rejected and node.how == "reduced")
         tests = Counter(test.round for test in state.tests if test.phase == "round" and test.is_finished)
-        told = [_Told(each, tests[each.number], _is_on(state, each), each.number in undone) for each in record.rounds]
-        blocks += _table(told)
+        judged = [_Row(each, tests[each.number], _is_on(state, each), each.number in undone) for each in record.rounds]
+        blocks += _table(judged)
     else:
         blocks.append(say("No round has begun yet."))
     return Section("How it got there", tuple(blocks))
 
 
-def _told(state: RunState) -> str:
+def _alternative(state: RunState) -> str:
     bound = f" At least {state.lower_bound} of them are known to be needed." if state.lower_bound else ""
     return (
         f"Models left after each test, down to {len(state.environment)} after {count(state.tests_done, 'test')}.{bound}"
@@ -62,31 +62,31 @@ def _is_on(state: RunState, round: Round) -> bool:
     return not state.ended and not round.done and state.round is not None and round.number == state.round.number
 
 
-def _table(told: list[_Told]) -> list[Block]:
-    shown = _shown(told)
+def _table(judged: list[_Row]) -> list[Block]:
+    shown = _shown(judged)
     rows: list[tuple[Cell, ...]] = []
-    for first, last in _spans(len(told), shown):
+    for first, last in _spans(len(judged), shown):
         if first in shown:
-            rows.append(_row(told[first]))
+            rows.append(_row(judged[first]))
         else:
-            rows.append(_summed(told[first:last]))
+            rows.append(_summed(judged[first:last]))
     head = ("round", "parts n", "tried", "first similar", "models left", "tests")
     table = Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))
     explained = "A round tries one set of models after the other; the first one that shows f is what is left then."
-    if any(each.tried and not each.tests for each in told):
+    if any(each.tried and not each.tests for each in judged):
         explained += " What was judged before is not tested again."
     return [say(explained), table]
 
 
-def _shown(told: list[_Told]) -> frozenset[int]:
+def _shown(judged: list[_Row]) -> frozenset[int]:
     """Which rounds have a row of their own: of very many those that reduced, the first and the last of them."""
-    numbers = range(len(told))
-    if len(told) <= MOST_ROUNDS:
+    numbers = range(len(judged))
+    if len(judged) <= MOST_ROUNDS:
         return frozenset(numbers)
-    wins = [number for number in numbers if told[number].won is not None]
+    wins = [number for number in numbers if judged[number].won is not None]
     half = MOST_ROUNDS // 2
     kept = wins if len(wins) <= MOST_ROUNDS else wins[:half] + wins[-half:]
-    return frozenset([*kept, 0, len(told) - 1])
+    return frozenset([*kept, 0, len(judged) - 1])
 
 
 def _spans(length: int, shown: frozenset[int]) -> Iterator[tuple[int, int]]:
@@ -100,32 +100,32 @@ def _spans(length: int, shown: frozenset[int]) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def _row(told: _Told) -> tuple[Cell, ...]:
-    round, won = told.round, told.won
+def _row(row: _Row) -> tuple[Cell, ...]:
+    round, won = row.round, row.won
     left = len(round.environment) if won is None else won.size
-    tried = f"{told.tried} of {len(round.candidates)}"
+    tried = f"{row.tried} of {len(round.candidates)}"
     size = str(left) if won is None else Strong(str(left))
-    return str(round.number), str(round.n_partitions), tried, _came(told), size, str(told.tests)
+    return str(round.number), str(round.n_partitions), tried, _first_similar(row), size, str(row.tests)
 
 
-def _came(told: _Told) -> str:
-    verdicts = Counter(one.verdict for one in told.round.candidates)
+def _first_similar(row: _Row) -> str:
+    verdicts = Counter(one.verdict for one in row.round.candidates)
     refused = [f"{verdicts[word]} {word}" for word in ("vetoed", "rejected") if verdicts[word]]
     words = f" ({', '.join(refused)})" if refused else ""
-    if told.won is not None:
-        return f"{told.won.label}{', taken back' if told.undone else ''}{words}"
-    if told.on:
+    if row.won is not None:
+        return f"{row.won.label}{', taken back' if row.undone else ''}{words}"
+    if row.on:
         return f"under way{words}"
     return f"left before its end{words}" if verdicts[""] else f"none{words}"
 
 
-def _summed(told: list[_Told]) -> tuple[Cell, ...]:
+def _summed(judged: list[_Row]) -> tuple[Cell, ...]:
     """Several rounds in one row."""
-    wins = sum(each.won is not None for each in told)
-    first, last = told[0].round, told[-1].round
-    numbers = f"{first.number} to {last.number}" if len(told) > 1 else str(first.number)
-    tried = str(sum(each.tried for each in told))
-    words = f"{wins} of {len(told)} reduced" if wins else "none"
-    won = told[-1].won
+    wins = sum(each.won is not None for each in judged)
+    first, last = judged[0].round, judged[-1].round
+    numbers = f"{first.number} to {last.number}" if len(judged) > 1 else str(first.number)
+    tried = str(sum(each.tried for each in judged))
+    words = f"{wins} of {len(judged)} reduced" if wins else "none"
+    won = judged[-1].won
     left = len(last.environment) if won is None else won.size
-    return numbers, "", tried, words, str(left), str(sum(each.tests for each in told))
+    return numbers, "", tried, words, str(left), str(sum(each.tests for each in judged))

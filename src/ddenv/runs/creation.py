@@ -19,12 +19,12 @@ from ddenv.world.scenario import Scenario
 RESOURCE = "resource "
 
 
-def create_run(scenario: Scenario, path: Path, tell: Callable[[str], None] | None = None) -> World:
+def create_run(scenario: Scenario, path: Path, announce: Callable[[str], None] | None = None) -> World:
     """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written.
 
-    `tell` is called with a line of text before slow steps.
+    `announce` is called with a line of text before slow steps.
     """
-    world, _ = load_parts(scenario, tell)
+    world, _ = load_parts(scenario, announce)
     documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
     documents |= {
         "scenario": scenario.model_dump_json().encode(),

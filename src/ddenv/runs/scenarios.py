@@ -88,16 +88,16 @@ def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, 
     return data
 
 
-def load_parts(scenario: Scenario, tell: Callable[[str], None] | None = None) -> tuple[World, Model]:
+def load_parts(scenario: Scenario, announce: Callable[[str], None] | None = None) -> tuple[World, Model]:
     """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
 
-    `tell` is called with a line before something that takes longer. Raises UserError.
+    `announce` is called with a line before something that takes longer. Raises UserError.
     """
     if scenario.oracle is not None:
         command_words(scenario)
     reading, robot_file = scenario.reading, scenario.robot.model
-    world = read_world(scenario.world, reading, tell)
-    around_robot = disk_of(robot_file, reading, tell)
+    world = read_world(scenario.world, reading, announce)
+    around_robot = disk_of(robot_file, reading, announce)
     robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
     world = replace(world, resources={**world.resources, **around_robot.taken})
     check_parts(scenario, world, robot)

@@ -22,7 +22,7 @@ from ddenv.study.plan import Cell, Plan, Size, longest_first, sizes
 from ddenv.study.results import read_cell
 from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.study.study_page import write_study
-from ddenv.study.work import PER_CELL, Work, is_done, made, work
+from ddenv.study.work import PER_CELL, Work, is_done, tests_made, work
 from ddenv.words import count, duration
 
 
@@ -102,15 +102,15 @@ class Progress:
         self._folder, self._seeds = folder, plan.seeds
         self._worlds, self._jobs = worlds, jobs
         self._out, self._live = out, out.isatty() and os.environ.get("TERM") != "dumb"
-        self._told = 0
+        self._reported = 0
         self._next_look = 0.0
         self._next_line = time.monotonic() + QUIET
         self._left: float | None = None
 
     def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
         """Tells what is new."""
-        for each in ended[self._told :]:
-            self._told += 1
+        for each in ended[self._reported :]:
+            self._reported += 1
             seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
             self._say(f"{self._done}  {each.cell.label}{seed}: {self._ending(each)}")
         now = time.monotonic()
@@ -126,7 +126,7 @@ class Progress:
 
     @property
     def _done(self) -> str:
-        return f"{self._before + self._told}/{self._in_all}"
+        return f"{self._before + self._reported}/{self._in_all}"
 
     def close(self) -> None:
         """Takes the last line away."""
@@ -217,7 +217,7 @@ def _make(plan: Plan, done: Set[str], folder: Path, jobs: int, worlds: dict[str,
     written = 0.0
 
     def write() -> None:
-        tests = sum(made(each.state) - each.made_before for each in cells)
+        tests = sum(tests_made(each.state) - each.made_before for each in cells)
         write_sittings(folder, (*earlier, replace(begun, seconds=time.monotonic() - began, tests=tests)))
 
     def look(running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:

@@ -127,7 +127,7 @@ def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
     if record.world is None:
         yield say("No map: the world cannot be read.", notice=True)
         return
-    told = (
+    alternative = (
         f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
     )
-    yield Picture(name, picture(record, plan(record.world, CORNERS), name), told)
+    yield Picture(name, picture(record, plan(record.world, CORNERS), name), alternative)

@@ -95,10 +95,14 @@ def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
 def _computed(found: Sequence[Found]) -> list[Block]:
     """Names the versions: tests of several versions may differ."""
     drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
-    told = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
+    versions = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
     taken = sum(each.taken for each in found)
-    words = f"Computed with {told[0]}." if len(told) == 1 else f"Not all of it was computed alike: {'; '.join(told)}."
-    blocks: list[Block] = [say(words, notice=len(told) > 1)] if told else []
+    words = (
+        f"Computed with {versions[0]}."
+        if len(versions) == 1
+        else f"Not all of it was computed alike: {'; '.join(versions)}."
+    )
+    blocks: list[Block] = [say(words, notice=len(versions) > 1)] if versions else []
     if taken:
         blocks.append(
             say(

@@ -44,18 +44,18 @@ def start_check(run: Path, cell: Cell, jobs: int) -> tuple[subprocess.Popen[byte
     """Starts the runs as a program; what it prints goes to the file. As many runs of each as a candidate gets in a reduction."""
     words = [sys.executable, "-m", "ddenv", "test", "--minimal", "--leave-each-out", "--json"]
     words += ["--seed", str(_seed(cell)), "--repeat", str(_runs(cell)), "--jobs", str(jobs), "--", str(run)]
-    told = tempfile.TemporaryFile("w+")  # noqa: SIM115
+    output = tempfile.TemporaryFile("w+")  # noqa: SIM115
     # A ctrl+c is for the study, which ends its programs itself.
     program = subprocess.Popen(
-        words, stdin=subprocess.DEVNULL, stdout=told, stderr=subprocess.STDOUT, start_new_session=True
+        words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
     )
-    return program, told
+    return program, output
 
 
-def write_check(folder: Path, cell: Cell, told: IO[str]) -> None:
+def write_check(folder: Path, cell: Cell, output: IO[str]) -> None:
     """Keeps what a check that has ended came to. Raises UserError with its own words if it did not come to its end."""
-    told.seek(0)
-    text = told.read()
+    output.seek(0)
+    text = output.read()
     try:
         runs = json.loads(text.strip().rpartition("\n")[2])["runs"]
         shown = Counter(run["without"] for run in runs if run["outcome"] == "similar")
@@ -96,14 +96,14 @@ def difference(file: RunFile, cell: Cell) -> str:
     if first is None:
         raise UserError(f"{file.path}: damaged run file: it has no events")
     asked = json.loads(cell.scenario.model_dump_json())
-    if _told(first.data.get("scenario")) != _told(asked):
+    if _compared(first.data.get("scenario")) != _compared(asked):
         return "another scenario, or with other options"
     if file.document("world") != read_bytes(cell.scenario.world):
         return "another world"
     return "" if file.document("robot") == read_bytes(cell.scenario.robot.model) else "another robot"
 
 
-def _told(scenario: object) -> object:
+def _compared(scenario: object) -> object:
     """A scenario without its words, and without where its files are: a study may go on in another place."""
     if not isinstance(scenario, dict):
         return None

@@ -130,8 +130,8 @@ def least_to_find(models: int, needed: int, iterations: int, baseline_runs: int)
     x + x^(1 + iterations) = 1 (Kraft's inequality; a bit a test without re-runs), and log2 C(n, k) bits have to be told. A
     method that knows more, as that models near f are likelier, may need less.
     """
-    told = math.log(math.comb(models, needed)) / -math.log(_root(1 + iterations))
-    return max(baseline_runs + math.ceil(told - 1e-9), least_to_show(models, needed, iterations, baseline_runs))
+    least = math.log(math.comb(models, needed)) / -math.log(_root(1 + iterations))
+    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, iterations, baseline_runs))
 
 
 def _root(cost: int) -> float:

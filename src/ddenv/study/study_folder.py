@@ -97,13 +97,13 @@ def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
 
 def versions() -> str:
     """ddenv, Python and what computes, with their versions; nothing is imported for it."""
-    told = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
+    found = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
     for name in PACKAGES:
         try:
-            told.append(f"{name} {version(name)}")
+            found.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             continue
-    return ", ".join(told)
+    return ", ".join(found)
 
 
 def machine() -> str:

@@ -47,7 +47,7 @@ def _verdict(found: Sequence[Found], minimal: Sequence[Found]) -> str:
 
 
 def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
-    told = [
+    lead = [
         say(
             "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
             "models that make the robot fail: smaller and smaller parts of it are run, and kept while the same failure f shows, "
@@ -60,7 +60,7 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
         better = sum(each.smaller >= paper.smaller for each, paper in beside)
         fewer = sum(each.tests <= paper.tests for each, paper in beside)
         ours, hours = sum(each.seconds for each, _ in beside), sum(paper.minutes for _, paper in beside) / 60
-        told.append(
+        lead.append(
             say(
                 f"Beside the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
                 f"tests in {fewer}. They took {hours:.0f} hours there; here their tests take {duration(ours)}, one after another. "
@@ -69,13 +69,13 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
             )
         )
     if missing := len(found) - len(minimal):
-        told.append(
+        lead.append(
             say(
                 f"{count(missing, 'cell')} without a world that is shown to be minimal: the tables say why.",
                 notice=True,
             )
         )
-    return told
+    return lead
 
 
 def _figures(

@@ -33,8 +33,8 @@ def section(folder: Path, group: Group) -> Section:
     blocks += _problems(group)
     if group.minimal:
         blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
-        told = "Models left after each test, a line for each method (the paper's Figure 2):"
-        blocks += [say(told), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), told)]
+        title = "Models left after each test, a line for each method (the paper's Figure 2):"
+        blocks += [say(title), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), title)]
     blocks += worlds(folder, group, file_name(group.scenario))
     return Section(title, tuple(blocks))
 
@@ -210,7 +210,7 @@ def _fewest(row: Row) -> float:
 
 
 def _words(groups: Sequence[Group]) -> list[Block]:
-    told: list[Block] = []
+    lines: list[Block] = []
     for group in groups:
         rows = [row for row in group.rows if row.tests is not None]
         if rows:
@@ -218,8 +218,8 @@ def _words(groups: Sequence[Group]) -> list[Block]:
             equal = sum(row.tests == first.tests for row in rows) - 1
             also = f" and {count(equal, 'other')}" if equal else ""
             words = f": {first.method.label}{also} with {first.tests:g} tests; the most takes {last.method.label}, {last.tests:g}."
-            told.append(say(Strong(plain(group.scenario.name)), words))
-    return told
+            lines.append(say(Strong(plain(group.scenario.name)), words))
+    return lines
 
 
 def _about_the_bound() -> Block:

@@ -63,7 +63,7 @@ def is_done(folder: Path, cell: Cell) -> bool:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
         raise UserError(f"{path}: was made of {other}; choose another folder with -o, or delete {path.parent}")
-    if state.status != "finished" or _is_in_vain(state) or engine_is_alive(path):
+    if state.status != "finished" or _all_broke(state) or engine_is_alive(path):
         return False
     return not state.minimal or read_check(folder, cell, state.environment) is not None
 
@@ -113,8 +113,8 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
     path = run_path(folder, cell)
     if path.exists():
         with RunFile(path) as file:
-            in_vain = _is_in_vain(fold(file.events()))
-        if in_vain:
+            all_broke = _all_broke(fold(file.events()))
+        if all_broke:
             path.unlink()
     if not path.exists():
         # What an earlier run of this name came to is not this one's.
@@ -122,7 +122,7 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
         create_run(cell.scenario, path)
     each = Work(cell, path, workers, RunFile(path))
     each.state = fold(each.file.events())
-    each.made_before = made(each.state)
+    each.made_before = tests_made(each.state)
     each.known = each.state.revision
     if not engine_is_alive(path) and each.state.status != "finished":
         each.engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
@@ -141,8 +141,8 @@ def _has_ended(folder: Path, each: Work) -> bool:
         return False
     if each.state.status != "finished":
         # An engine that died before it wrote anything has left the reason of the one before.
-        told = each.state.ended and each.state.revision > each.known
-        each.problem = each.state.reason if told else last_words(each.path)
+        ended = each.state.ended and each.state.revision > each.known
+        each.problem = each.state.reason if ended else last_words(each.path)
         return True
     if not each.state.minimal or read_check(folder, each.cell, each.state.environment) is not None:
         return True
@@ -150,24 +150,24 @@ def _has_ended(folder: Path, each: Work) -> bool:
     return False
 
 
-def _check_has_ended(folder: Path, each: Work, program: subprocess.Popen[bytes], told: IO[str]) -> bool:
+def _check_has_ended(folder: Path, each: Work, program: subprocess.Popen[bytes], output: IO[str]) -> bool:
     if program.poll() is None:
         return False
     try:
-        write_check(folder, each.cell, told)
+        write_check(folder, each.cell, output)
     except UserError as error:
         each.problem = str(error)
-    told.close()
+    output.close()
     return True
 
 
-def _is_in_vain(state: RunState) -> bool:
+def _all_broke(state: RunState) -> bool:
     """Whether the simulator broke in all baseline runs: it may have been mended since."""
     broke = all(test.outcome in ("error", "timeout") for test in state.finished_tests)
     return state.status == "finished" and state.baseline is None and broke
 
 
-def made(state: RunState) -> int:
+def tests_made(state: RunState) -> int:
     """How many tests were made in a run, and not taken over from another one."""
     return state.tests_done - sum(test.taken for test in state.tests)
 

@@ -12,7 +12,7 @@ def is_open(node: DOMNode) -> bool:
     return node.is_attached and node.screen.display
 
 
-def tell(node: DOMNode, callback: Callable[..., object], *words: object) -> None:
+def call_if_open(node: DOMNode, callback: Callable[..., object], *words: object) -> None:
     """Calls `callback(*words)` in the app's own thread, from another one, unless `node` is closed."""
 
     def call() -> None:

@@ -31,13 +31,13 @@ REFUSED = {
 }
 
 
-def read_world(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None] | None = None) -> World:
+def read_world(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> World:
     """The world in the SDF file `path`. Raises UserError with file, line and XPath.
 
-    `tell` is called with a line of text before slow steps.
+    `announce` is called with a line of text before slow steps.
     """
     text = read_bytes(path)
-    return parse_world(text, path, reading, disk_of(path, reading, tell))
+    return parse_world(text, path, reading, disk_of(path, reading, announce))
 
 
 def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
@@ -53,9 +53,9 @@ def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
         raise UserError(f"{path}: models or frames are nested too deeply") from None
 
 
-def read_model(path: Path, reading: Reading = PLAIN, tell: Callable[[str], None] | None = None) -> Model:
+def read_model(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> Model:
     """The one model in the SDF or URDF file `path`, such as a robot. Raises UserError."""
-    return parse_model(read_bytes(path), path, reading, disk_of(path, reading, tell))
+    return parse_model(read_bytes(path), path, reading, disk_of(path, reading, announce))
 
 
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
@@ -80,12 +80,12 @@ def _urdf_root(text: bytes, path: Path) -> Element | None:
     return root if root is not None and root.tag == ROOT else None
 
 
-def disk_of(path: Path, reading: Reading, tell: Callable[[str], None] | None) -> Disk:
+def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Disk:
     """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
     for folder in reading.model_path:
         if not folder.is_dir():
             raise UserError(f"reading.model_path: there is no folder {folder}")
-    return Disk(path.parent, reading.model_path, tell)
+    return Disk(path.parent, reading.model_path, announce)
 
 
 def _world(text: bytes, path: Path, context: Context) -> World:

@@ -110,7 +110,7 @@ def test_limits(world, monkeypatch):
 def test_tells_before_something_slow(world):
     told = []
     (world / "big.obj").write_text(CUBE + "\n#" + "x" * 3_500_000)
-    disk = Disk(world, tell=told.append)
+    disk = Disk(world, announce=told.append)
     disk.mesh("cube.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=True)
     disk.mesh("big.obj", world, convex=False)

@@ -16,7 +16,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import is_open, tell
+from ddenv.workbench.background import call_if_open, is_open
 from ddenv.workbench.wording import count, plain
 
 # What can be written: its id, its label, and the endings that its name may have.
@@ -91,7 +91,7 @@ class ExportScreen(ModalScreen[None]):
     @work(thread=True, group="look")
     def _look(self) -> None:
         words = what_is_left(self._file)
-        tell(self, self._show_left, words)
+        call_if_open(self, self._show_left, words)
 
     def _show_left(self, words: str) -> None:
         self.query_one("#export-left", Static).update(words)
@@ -163,7 +163,7 @@ class ExportScreen(ModalScreen[None]):
 
         there = [path for path in files_of(wanted) if is_there(path)]
         if there and not agreed.issuperset(there):
-            tell(self, self._ask, there)
+            call_if_open(self, self._ask, there)
             return
         written: list[str] = []
         wrong = ""

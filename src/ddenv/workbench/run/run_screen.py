@@ -15,7 +15,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import tell
+from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
@@ -137,7 +137,7 @@ class RunScreen(Screen[None]):
             place, notice = place_of_run(self.run), ""
         except UserError as error:
             place, notice = Place(), str(error)
-        tell(self, self._placed, place, notice)
+        call_if_open(self, self._placed, place, notice)
 
     def _placed(self, place: Place, notice: str) -> None:
         self._map.set_place(place, notice)

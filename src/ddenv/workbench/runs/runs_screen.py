@@ -14,7 +14,7 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Footer, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import is_open, tell
+from ddenv.workbench.background import call_if_open, is_open
 from ddenv.workbench.messages import ShowRun, ShowSetup
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, delete_run, named
 from ddenv.workbench.runs.runs_table import RunTable, about
@@ -77,7 +77,7 @@ class RunsScreen(Screen[None]):
 
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(PATIENCE)
-        tell(self, self._show, runs)
+        call_if_open(self, self._show, runs)
 
     def _show(self, runs: list[Recent]) -> None:
         self._reading = False
@@ -101,7 +101,7 @@ class RunsScreen(Screen[None]):
         panel = self.query_one("#list")
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
         panel.border_subtitle = Text(f"{count(works, 'engine')} at work" if works else "")
-        self._tell()
+        self._show_title()
 
     def _nothing(self, part: str) -> str:
         from ddenv.runs.folder import runs_folder
@@ -111,7 +111,7 @@ class RunsScreen(Screen[None]):
         return f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
 
     @on(DataTable.RowHighlighted)
-    def _tell(self) -> None:
+    def _show_title(self) -> None:
         run = self._chosen
         width = self.query_one("#about").size.width or 30
         self.query_one("#about", Static).update(Text("") if run is None else about(run, width))

@@ -13,7 +13,7 @@ from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.map.names import shortened
-from ddenv.workbench.background import tell
+from ddenv.workbench.background import call_if_open
 from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
 from ddenv.workbench.wording import count, plain
@@ -41,7 +41,7 @@ class RunList(OptionList):
 
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
-        tell(self, self._show, runs)
+        call_if_open(self, self._show, runs)
 
     def _show(self, runs: list[Recent]) -> None:
         self._runs = {str(run.path): run for run in runs}

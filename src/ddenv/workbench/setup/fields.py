@@ -137,7 +137,7 @@ class OptionsForm(Vertical):
 
     def on_mount(self) -> None:
         self.query_one("#jobs", Input).value = _default_jobs()
-        self.tell("")
+        self.show_message("")
 
     # What stands in it.
 
@@ -252,7 +252,7 @@ class OptionsForm(Vertical):
             if field.id not in self._unopened:
                 self.query_one(f"#{field.id}").set_class(bool(not_used(field, now)), "-unused")
 
-    def tell_cost(self, words: str) -> None:
+    def show_cost(self, words: str) -> None:
         """Tests and time that the settings come to."""
         self.query_one("#cost", Static).update(Text(words, no_wrap=True, overflow="ellipsis"))
 
@@ -263,7 +263,7 @@ class OptionsForm(Vertical):
 
     def complain(self, error: UserError) -> None:
         """One line below the fields; the wrong field is marked and gets the cursor."""
-        self.tell(f"{MARK}{error}")
+        self.show_message(f"{MARK}{error}")
         id = form.field_of(error)
         if id is None:
             return
@@ -276,7 +276,7 @@ class OptionsForm(Vertical):
             wrong.add_class("-wrong")
             wrong.focus()
 
-    def tell(self, words: str) -> None:
+    def show_message(self, words: str) -> None:
         line = self.query_one("#wrong", Static)
         line.display = bool(words)
         line.update(Text(plain(words)))

@@ -17,7 +17,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
-from ddenv.workbench.background import tell
+from ddenv.workbench.background import call_if_open
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
@@ -102,16 +102,16 @@ class Preview(Vertical):
             place, name = place_of(choice.world, choice.scenario), _free_name(choice.settings.name)
         except UserError as error:
             if not worker.is_cancelled:
-                tell(self, self._fail, str(error))
+                call_if_open(self, self._fail, str(error))
             return
         if worker.is_cancelled:
             return
-        tell(self, self._show, choice, place, name)
+        call_if_open(self, self._show, choice, place, name)
         if opened:
             remember(path)
         past = past_of(choice.settings, runs_folder())
         if not worker.is_cancelled:
-            tell(self, self.post_message, self.PastRead(choice, past))
+            call_if_open(self, self.post_message, self.PastRead(choice, past))
 
     def _fail(self, why: str) -> None:
         self.map.set_place(Place(), why)

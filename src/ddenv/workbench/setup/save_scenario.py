@@ -14,7 +14,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import tell
+from ddenv.workbench.background import call_if_open
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
@@ -97,18 +97,18 @@ class SaveScenario(ModalScreen[Path | None]):
     @on(Input.Changed)
     def _changed(self) -> None:
         self._replace = None
-        self._tell("")
+        self._show_error("")
 
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
         try:
             path = scenario_path(event.value)
         except UserError as error:
-            self._tell(str(error))
+            self._show_error(str(error))
             return
         if path.exists() and path != self._replace:
             self._replace = path
-            self._tell(f"{path} exists already: enter again replaces it, or type another name")
+            self._show_error(f"{path} exists already: enter again replaces it, or type another name")
             return
         self._write(path)
 
@@ -117,11 +117,11 @@ class SaveScenario(ModalScreen[Path | None]):
         try:
             save_scenario(self._scenario, path)
         except UserError as error:
-            tell(self, self._tell, str(error))
+            call_if_open(self, self._show_error, str(error))
             return
-        tell(self, self.dismiss, path)
+        call_if_open(self, self.dismiss, path)
 
-    def _tell(self, words: str) -> None:
+    def _show_error(self, words: str) -> None:
         self.query_one("#wrong", Static).update(Text(plain(words)))
 
     def action_cancel(self) -> None:

@@ -15,7 +15,7 @@ from textual.screen import Screen
 from textual.widgets import Button, Footer, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import tell
+from ddenv.workbench.background import call_if_open
 from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
@@ -124,7 +124,7 @@ class SetupScreen(Screen[None]):
         from ddenv.world.load import SCENARIOS, bundled_names
 
         bundled = [SCENARIOS / f"{name}.yaml" for name in bundled_names()]
-        tell(self, self._offer, bundled, recent_files())
+        call_if_open(self, self._offer, bundled, recent_files())
 
     def _offer(self, bundled: list[Path], recent: list[Path]) -> None:
         files = self.query_one(FileList)
@@ -160,14 +160,14 @@ class SetupScreen(Screen[None]):
     def _choose(self, path: Path) -> None:
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
-        self.form.tell("")
+        self.form.show_message("")
         self.preview.read(path, opened=path == self._opened_now)
         self._show_outcome()
 
     @on(Preview.Failed)
     def _cannot_be_read(self) -> None:
         self._awaited = False
-        self.form.tell("")
+        self.form.show_message("")
 
     @on(Preview.Read)
     def _was_read(self, event: Preview.Read) -> None:
@@ -176,7 +176,7 @@ class SetupScreen(Screen[None]):
             return
         self._awaited = False
         # A complaint about a key that came too early is out of date.
-        self.form.tell("")
+        self.form.show_message("")
         self.form.suggest_name(event.free_name)
         placed = choice.scenario is not None
         self.form.show_settings(choice.settings, placed, self._keep_places)
@@ -225,7 +225,7 @@ class SetupScreen(Screen[None]):
             except UserError as error:
                 cost = f"not ready: {error}"
         if cost or not words:
-            self.form.tell_cost(cost)
+            self.form.show_cost(cost)
         self.form.tell_command(words, typed)
 
     @work(thread=True, group="cost", exclusive=True)
@@ -235,7 +235,7 @@ class SetupScreen(Screen[None]):
         worker = get_current_worker()
         cost = whole_cost(scenario, models, jobs, past)
         if not worker.is_cancelled:
-            tell(self, self.form.tell_cost, cost)
+            call_if_open(self, self.form.show_cost, cost)
 
     def _scenario(self) -> Scenario:
         """The scenario that the form describes. Raises UserError."""
@@ -290,7 +290,7 @@ class SetupScreen(Screen[None]):
             self._complain(error)
             return
         self._busy = True
-        self.form.tell("checking ...")
+        self.form.show_message("checking ...")
         self._create(new, only_baseline)
 
     @work(thread=True, group="start", exclusive=True)
@@ -298,9 +298,9 @@ class SetupScreen(Screen[None]):
         try:
             engine = create(new, only_baseline)
         except UserError as error:
-            tell(self, self._complain, error)
+            call_if_open(self, self._complain, error)
             return
-        tell(self, self.post_message, ShowRun(new.path, engine=engine))
+        call_if_open(self, self.post_message, ShowRun(new.path, engine=engine))
 
     def _complain(self, error: UserError) -> None:
         """Shows what is wrong, and the field that it is about."""
@@ -334,9 +334,9 @@ class SetupScreen(Screen[None]):
         try:
             saved = Saved(path, load_scenario(path))
         except UserError as error:
-            tell(self, self._complain, error)
+            call_if_open(self, self._complain, error)
             return
-        tell(self, self._keep_saved, saved)
+        call_if_open(self, self._keep_saved, saved)
 
     def _keep_saved(self, saved: Saved) -> None:
         self._saved = saved

@@ -41,15 +41,15 @@ class Resources(Protocol):
 class Disk:
     """Reads from disk, and keeps everything it returned in `taken`, for a later `Stored`.
 
-    `tell` is called with a line of text before slow steps.
+    `announce` is called with a line of text before slow steps.
     """
 
     def __init__(
-        self, world_folder: Path, model_path: Sequence[Path] = (), tell: Callable[[str], None] | None = None
+        self, world_folder: Path, model_path: Sequence[Path] = (), announce: Callable[[str], None] | None = None
     ) -> None:
         self.taken: dict[str, bytes] = {}
         self._folders = search_folders(model_path, world_folder)
-        self._tell = tell or (lambda message: None)
+        self._announce = announce or (lambda message: None)
         self._sdfs = _Answers[tuple[Path, bytes]]()
         self._meshes = _Answers[Mesh]()
         # A collision and its visual mostly use the same file, one after the other.
@@ -81,7 +81,7 @@ class Disk:
         if self._last is None or self._last[0] != path:
             size = size_of(path)
             if SLOW_MESH < size <= MESH_LIMIT:
-                self._tell(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
+                self._announce(f"reading mesh {path.name} ({size / 1e6:.0f} MB)")
             self._last = None
             self._last = (path, read_parts(path))
         return self._last[1]
