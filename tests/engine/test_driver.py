@@ -115,7 +115,7 @@ def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
         text = json.dumps(data | {"partitions": [[second, *rest], [first, *more], *others]})
         db.execute("UPDATE event SET data = ? WHERE id = ?", (text, id))
     for _ in range(2):
-        with pytest.raises(UserError, match=f"round {number} would now be another one: the run was begun with other"):
+        with pytest.raises(UserError, match=f"round {number} would now differ: the run was started with other"):
             drive(path, FakePool(needs("wall", "beam"), 1))
 
 

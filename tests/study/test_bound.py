@@ -62,7 +62,7 @@ def test_who_knows_nothing_beforehand_has_to_show_it_too(models, iterations):
 
 
 def test_some_strategies_need_no_more():
-    """It is no empty promise: halving finds one model, and of all models each is left out in vain."""
+    """The bound can be reached: halving finds one model; if all are needed, each is left out without success."""
     assert least_to_show(1, 1, 3, 10) == least_to_find(1, 1, 3, 10) == 10 + 4
     assert least_to_show(4, 4, 1, 3) == least_to_find(4, 4, 1, 3) == 3 + 8
     assert least_to_show(16, 2, 3, 10) == 10 + 1 + 8

@@ -43,7 +43,7 @@ def test_a_file_is_refused(tmp_path):
 
 def test_a_folder_of_something_else_is_refused_and_not_touched(tmp_path):
     (tmp_path / "thesis.tex").touch()
-    assert "holds other files; give the name of a new or an empty folder" in refused(tmp_path)
+    assert "contains other files; give the name of a new or empty folder" in refused(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -59,7 +59,7 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
 
 def test_a_second_study_in_it_is_refused_until_the_first_one_is_over(tmp_path):
     with opened(tmp_path / "study"):
-        assert "another study works in this folder; wait for it" in refused(tmp_path / "study")
+        assert "another study is running in this folder; wait for it" in refused(tmp_path / "study")
     with opened(tmp_path / "study"):
         pass
 
@@ -87,7 +87,7 @@ DAMAGED = {
 @pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED.keys())
 def test_a_damaged_list_of_times_is_one_line(tmp_path, text):
     (tmp_path / ABOUT).write_text(text)
-    with pytest.raises(UserError, match=rf"{ABOUT}: makes no sense; delete it \(the runs beside it are not touched\)"):
+    with pytest.raises(UserError, match=rf"{ABOUT}: is damaged; delete it \(the runs are not affected\)"):
         sittings(tmp_path)
 
 

@@ -99,8 +99,8 @@ def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
 
 
 PROBLEMS = {
-    "begun": (lambda run: run.created(), "not at its end"),
-    "under way": (fake_run.mid_round, "not at its end"),
+    "begun": (lambda run: run.created(), "has not ended"),
+    "under way": (fake_run.mid_round, "has not ended"),
     "stopped": (
         lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
         "as you asked",

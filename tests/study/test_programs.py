@@ -79,7 +79,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     stands_at(6)
     second.send_signal(signal.SIGINT)
     said, complained = second.communicate(timeout=PATIENCE)
-    assert (second.returncode, complained) == (130, "interrupted; the same command goes on where it was\n")
+    assert (second.returncode, complained) == (130, "interrupted; the same command continues\n")
     assert "0 of 1 cell minimal; wrote study/study.html" in said
     assert (folder / "study.html").exists() and not engine_is_alive(run)
 

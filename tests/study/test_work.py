@@ -135,7 +135,7 @@ def test_terminated_it_writes_what_it_has_and_goes_on(tmp_path, lab, two_by_two,
         assert signal.getsignal(signal.SIGTERM) is mine
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert (code, capsys.readouterr().err) == (130, "interrupted; the same command goes on where it was\n")
+    assert (code, capsys.readouterr().err) == (130, "interrupted; the same command continues\n")
     assert not any(engine_is_alive(run_path(tmp_path, cell)) for cell in two_by_two.cells)
     minimal = [row["minimal"] for row in told(tmp_path)]
     assert "True" in minimal and "False" in minimal and (tmp_path / "study.html").exists()
@@ -167,7 +167,7 @@ def test_cells_that_come_to_no_end_are_told_and_the_others_are_made(tmp_path, la
     never, breaks, killed, fine = (read_cell(tmp_path / "study", cell) for cell in plan.cells)
     assert "reached its goal in all 3 baseline runs: there is no failure to reduce" in never.problem
     assert "25 tests in a row broke" in breaks.problem
-    assert "the engine was killed or crashed" in words and killed.problem == "not at its end"
+    assert "the engine was killed or crashed" in words and killed.problem == "has not ended"
     for problem in (never.problem, breaks.problem):
         assert problem in words
     for each in (never, breaks, killed):
@@ -279,9 +279,9 @@ def test_a_run_of_something_else_is_refused_in_one_line(tmp_path, lab):
     (folder / "study.lock").touch()
     told = "delete that file, or choose another folder with -o"
     leave = f"choose another folder with -o, or delete {folder}/runs"
-    assert other(folder, plan, epsilon=0.5) == f"{run}: was made of another scenario, or with other options; {leave}"
+    assert other(folder, plan, epsilon=0.5) == f"{run}: was made with another scenario, or with other options; {leave}"
     (tmp_path / "wall.sdf").write_text((tmp_path / "wall.sdf").read_text().replace("far_box", "far_bin"))
-    assert other(folder, plan) == f"{run}: was made of another world; {leave}"
+    assert other(folder, plan) == f"{run}: was made with another world; {leave}"
     with sqlite3.connect(run) as db:
         db.execute("DELETE FROM event")
     assert told in other(folder, plan)

@@ -32,7 +32,7 @@ def main() -> int:
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
-    parser.add_argument("--share", type=Path, help="folder of other runs; tests that they have made are taken over")
+    parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
     parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -78,7 +78,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         journal.record("engine_failed", reason=str(error))
         raise
     except Exception as error:
-        # A mistake of ours: the traceback goes to the log, and views show the reason.
+        # A bug in ddenv: the traceback goes to the log, and views show the reason.
         journal.record(
             "engine_failed", reason=f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
         )
@@ -90,7 +90,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
-    # First, since until the last event before it another engine worked.
+    # This event comes first: all events before it are another engine's.
     journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__, simulator=simulator())
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:

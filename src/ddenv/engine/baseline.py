@@ -1,4 +1,4 @@
-"""Fixes the failure f from runs of the whole world, and says how sure we can be of meeting it again."""
+"""Fixes the failure f from runs of the whole world, and computes how likely it is to show again."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def fix_failure(
 ) -> dict[str, Any] | str:
     """The data of the `baseline_finished` event: f is the medoid of the failing end positions.
 
-    `trajectories` are those of the failing tests, by id. Where no run failed, a line for the user that says so. The rate is
-    that of f, not of any failure.
+    `trajectories` are those of the failing tests, by id. If no run failed, returns a line that tells the user so. The rate
+    counts f only, not other failures.
     """
     failing = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
     if not failing:

@@ -1,6 +1,6 @@
-"""Where tests are made: the first in line on a free worker, the next ones ahead of time on the others; all is recorded.
+"""Makes the tests: the next one on a free worker, later ones ahead of time on the others. Records all of them.
 
-What the user tries by hand goes before all that.
+Tries of the user come first.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ Hand = tuple[Keep, int, int]
 
 
 def open_trials(journal: Journal) -> list[Trial]:
-    """Those without a verdict, in the order in which they were asked for."""
+    """The tries without a verdict, oldest first."""
     return [trial for trial in journal.state.trials if not trial.verdict]
 
 
 def judge_trials(journal: Journal) -> list[Hand]:
-    """Writes the verdicts that are due; returns the tests still needed as (models, run, trial), the first asked for first."""
+    """Writes the verdicts that are due; returns the tests still needed as (models, run, trial), oldest first."""
     wanted: list[Hand] = []
     iterations = journal.state.scenario["reduction"]["iterations"]
     for trial in open_trials(journal):
@@ -54,8 +54,8 @@ def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str, iterations:
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
 LIVE_PERIOD = 0.1
-# How many tests in a row may break: where the simulator itself is out of order (no licence, no display, a full disk), all of
-# them do, and the reduction would take it for the absence of f. In worlds that merely break a part of them, some do not.
+# Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
+# break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
 
 Wanted = list[tuple[Keep, int, int | None]]
@@ -86,10 +86,10 @@ class Bench:
         wanted: Callable[[], Wanted],
         meanwhile: Iterator[object] | None = None,
     ) -> None:
-        """Makes tests until none is wanted. While tests run, `meanwhile` goes on step by step: each takes some milliseconds.
+        """Makes tests until none is wanted. While tests run, advances `meanwhile`; each of its steps takes some milliseconds.
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is asked again at every look around. Raises Stopped, Steered, and UserError if nothing can be simulated or all
+        them; it is called again after every look. Raises Stopped, Steered, and UserError if nothing can be simulated or all
         tests break.
         """
         full = self._journal.is_full(phase)
@@ -99,7 +99,7 @@ class Bench:
             self.tick()
 
     def _start(self, tests: Wanted, phase: str, round: int | None) -> None:
-        # A step is the test that comes next in line; nothing runs ahead of it.
+        # A step is one test, the next in order; nothing runs ahead.
         free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
         full = self._journal.is_full(phase)
         for keep, run, candidate in tests[:free]:
@@ -111,13 +111,13 @@ class Bench:
             self._control.started()
 
     def finish_trials(self) -> None:
-        """Obeys what was asked last, and makes the tests that the user asked for. Raises as `work`."""
+        """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""
         self._control.poll()
         while self._control.holds or (self._journal.state.failures and open_trials(self._journal)):
             self.tick()
 
     def _serve_trials(self) -> None:
-        """They are made while the rounds are paused, too. Raises Stopped where the budget has none left for them."""
+        """Starts tests of tries, also while the rounds are paused. Raises Stopped if the budget is used up."""
         if not self._journal.state.failures or not open_trials(self._journal):
             return
         full = self._journal.is_full("hand")
@@ -139,10 +139,9 @@ class Bench:
         return True
 
     def tick(self) -> None:
-        """Obeys commands, takes in what has finished, shows the running robots. Raises as `work`.
+        """Obeys commands, records finished tests, shows the running robots. Raises as `work`.
 
-        Where the user has changed something nobody comes back from here: what the old search would make of a test that
-        ends now must not count.
+        Does not return if the user has changed something: the old search must not use a test that ends now.
         """
         self._look_around()
         while self._control.holds:
@@ -168,12 +167,12 @@ class Bench:
             self._show_live()
 
     def _give_up_if_all_break(self, result: RunResult | Broken) -> None:
-        """Raises UserError when nothing but broken tests has come for long."""
+        """Raises UserError after too many broken tests in a row."""
         self._broken = self._broken + 1 if result.outcome in ("error", "timeout") else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(
                 f"{self._broken} tests in a row broke, the last one: {result.failure}; "
-                f"mend that and go on with 'ddenv resume {self._journal.file.path}' (they count as without f)"
+                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (these tests count as without f)"
             )
 
     def _show_live(self) -> None:
@@ -200,7 +199,7 @@ class Bench:
         return self._failures
 
     def _numbered(self, times: dict[str, float]) -> list[list[float]]:
-        """`times` by name, s, as [number of the model, s] in the order of time; without what is no element."""
+        """`times` by name, s, as [number of the model, s] in order of time; only for elements."""
         numbers = {name: number for number, name in enumerate(self._journal.state.elements)}
         pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
         return [[number, seconds] for seconds, number in pairs]

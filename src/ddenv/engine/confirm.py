@@ -1,4 +1,4 @@
-"""Full runs of what is left, where the reduction rests on runs that were ended early because the robot seemed stuck for good."""
+"""Full runs of what is left, needed if the reduction used runs that ended early because the robot was stuck for good."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ AGAIN = "run again with --no-early-stop"
 
 
 class Confirmation:
-    """What of the end is shown by runs to their end: that f shows in `kept`, and not without any one of the models `tried`.
+    """What full runs show: whether f shows in `kept`, and whether it still shows without any one of the models `tried`.
 
-    As in a round, `1 + iterations` runs tell. A run that was not cut is a full one already. All follows from the journal. No more
-    than `enough` tests are looked for at a time.
+    As in a round, `1 + iterations` runs decide. A run that was not cut is a full run already. All follows from the journal. At most
+    `enough` tests are looked for at a time.
     """
 
     def __init__(self, journal: Journal, kept: Keep, tried: Sequence[str], iterations: int, enough: int) -> None:
@@ -25,15 +25,15 @@ class Confirmation:
         self._tried = tried
         self._runs = range(1 + iterations)
         self._enough = enough
-        # This many of `tried`, from the first on, are known to be needed.
+        # This many of `tried`, counted from the first, are known to be needed.
         self._sure = 0
 
     def wanted(self) -> Wanted:
-        """The full runs that are still needed, in the order in which one worker would make them; none once there is a doubt."""
+        """The full runs that are still needed, in the order in which one worker would make them; none after a contradiction."""
         return [] if self.doubt() else list(islice(self._open(), self._enough))
 
     def doubt(self) -> str:
-        """What a full run contradicts, in one line that says what to do; "" as far as there is nothing."""
+        """What a full run contradicts, in one line that says what to do; "" if nothing."""
         if not self._shows():
             if self._missing(self._kept):
                 return ""

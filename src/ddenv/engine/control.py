@@ -1,4 +1,4 @@
-"""Obeys what the user asks of a running engine: each command becomes an event, or the reason why it cannot."""
+"""Obeys what the user asks of a running engine: each command becomes an event, or a refusal with its reason."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.store import Event
 from ddenv.world.scenario import FailureSpec
 
-# Several decisions in a row make one new search of it, s.
+# Decisions within this time start one new search, not several, s.
 SETTLE = 0.5
-# What was meant for an engine that is gone must not hold the next one.
+# Commands sent to an earlier engine must not pause this one.
 OF_THE_MOMENT = (Stop, Pause, Step, AcceptMode)
 
 
@@ -32,7 +32,7 @@ class Stopped(Exception):
 
 
 class Steered(Exception):
-    """The user changed something that the search has to begin anew for."""
+    """The user changed something, so the search has to start again."""
 
 
 class Control:
@@ -70,7 +70,7 @@ class Control:
             self._obey(command)
             self._last = time.monotonic()
             if command.kind == Accept.kind:
-                # The reduction is made before anything else is decided.
+                # The reduction comes before any other decision.
                 return
 
     def search_begins(self) -> None:
@@ -79,12 +79,12 @@ class Control:
 
     @property
     def holds(self) -> bool:
-        """Whether the search that is on is over, since the user changed something."""
+        """Whether the current search is over because the user changed something."""
         return self._searches and self._journal.steered
 
     @property
     def may_search(self) -> bool:
-        """Whether a new search may begin: not while the run is paused, and not before the user has come to rest."""
+        """Whether a new search may begin: not while the run is paused, and not until the user has stopped making changes."""
         return not self._paused and time.monotonic() - self._last > SETTLE
 
     def may_start(self) -> bool:
@@ -111,13 +111,13 @@ class Control:
             self._pause()
 
     def _obey(self, event: Event) -> None:
-        """Once, whenever the engine is killed: the event that it becomes says which command it was."""
+        """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
         self._journal.command = event.id
         try:
             if why := self._why_not(event):
                 self._journal.record("command_refused", why=why)
         finally:
-            # A stop leaves by an exception, and must not be met again.
+            # A stop raises an exception, and must not be read again.
             self._journal.command = None
             if self._journal.state.last_command < event.id:
                 self._handled(event)
@@ -138,7 +138,7 @@ class Control:
     def _handled(self, event: Event) -> None:
         self._journal.record("command_handled", command=event.id)
 
-    # How fast.
+    # Speed.
 
     def _obey_pause(self, _: Pause) -> None:
         if not self._paused:
@@ -208,7 +208,7 @@ class Control:
             **self._judged((*state.failures, test.id)),
         )
 
-    # The way back, and other settings.
+    # Going back, and other settings.
 
     def _undo(self, _: Undo) -> None:
         here = self._journal.state.here
@@ -230,7 +230,7 @@ class Control:
         self._journal.record("went_back", node=node, rejected=rejected, **judged)
 
     def _judged(self, failures: tuple[int, ...]) -> dict[str, Any]:
-        """What all tests are where the ends of `failures` count as f."""
+        """The outcomes of all tests if the ends of `failures` count as f."""
         file, state = self._journal.file, self._journal.state
         spec = FailureSpec.model_validate(state.scenario["failure"])
         return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))

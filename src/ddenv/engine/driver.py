@@ -1,4 +1,4 @@
-"""Carries a reduction through: baseline, rounds, end. What is tested is the algorithm's choice, how is the bench's."""
+"""Carries a reduction through: baseline, rounds, end. The algorithm chooses what to test, the bench makes the tests."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from ddenv.schemas import split_pair
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
-# No machine has more idle workers than this: further candidates need not be looked at.
+# No machine has more idle workers than this, so later candidates need no look.
 ENOUGH = 2048
 
 
 class Driver:
-    """One engine's work on one run. Everything it decides follows from the journal: a resumed run takes the same way."""
+    """One engine's work on one run. All decisions follow from the journal, so a resumed run continues in the same way."""
 
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
         self._reduction = scenario.reduction
@@ -44,7 +44,7 @@ class Driver:
         self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
         self._pinned: Keep = frozenset()
-        # How many candidates of the round were judged as dissimilar, and how many refusals there were then.
+        # How many candidates of the round were dissimilar, and how many refusals there were at that time.
         self._judged = 0
         self._refusals = 0
 
@@ -57,7 +57,7 @@ class Driver:
             self._end(False, reason)
             return
         self._control.search_begins()
-        # Before this engine was started the user may have gone back, to pause there.
+        # The user may have gone back before this engine started; then it pauses there.
         with suppress(Steered):
             while self._journal.steered:
                 self._bench.tick()
@@ -69,7 +69,7 @@ class Driver:
                 continue
 
     def _search(self) -> None:
-        """From where the user left it to its end. Raises Steered where the user changes something."""
+        """Searches from the current environment to the end. Raises Steered if the user changes something."""
         leg = self._journal.begin_leg()
         self._reduction = Reduction.model_validate(leg.settings)
         self._pinned = leg.pinned
@@ -87,7 +87,7 @@ class Driver:
             self._finish(end.value | self._pinned)
 
     def _begin(self, asked: Reduction, elements: tuple[str, ...], n_partitions: int | None = None) -> Search:
-        """The algorithm and the schemas by name. Raises UserError where there are none of these names."""
+        """The algorithm and the schemas by name. Raises UserError for unknown names."""
         partitioning, prioritization = split_pair(asked.pair)
         self._elements, self._memory = elements, Memory()
         self._guide = make_guide(
@@ -104,19 +104,19 @@ class Driver:
         return search(asked.algorithm, elements, self._memory.of(self._guide))
 
     def _known(self) -> Evidence:
-        """What the schemas go by; only rounds ask for it, after the first similar run."""
+        """The evidence for the schemas; only rounds use it, after the first similar run."""
         assert self._evidence is not None
         return replace(self._evidence, trials=self._trials)
 
     def _keep(self, candidate: Candidate) -> Keep:
-        """All that is there when a candidate is tested."""
+        """All models that are in the world when a candidate is tested."""
         return candidate.models | self._pinned
 
     def _finish(self, kept: Keep) -> None:
-        # What they show counts, too.
+        # Their results count, too.
         self._bench.finish_trials()
         free = [name for name in self._journal.state.elements if name in kept - self._pinned]
-        # Each model must have been left out, in tests and without success; a veto or a reject leaves that open.
+        # Each model must have been left out in a test that lost f; a veto or a reject leaves this open.
         untried = [name for name in free if not self._is_dissimilar(kept - {name})]
         reason = self._reason(kept, free)
         if untried:
@@ -135,10 +135,10 @@ class Driver:
             return "f needs none of the models that can be removed"
         if len(free) == len(kept):
             return "no single model can be removed"
-        return f"no single model can be removed but those that are pinned ({len(kept) - len(free)})"
+        return f"no single model can be removed except pinned ones ({len(kept) - len(free)})"
 
     def _confirm(self, kept: Keep, tried: list[str]) -> str:
-        """Makes the full runs that the end still lacks; returns what they contradict, or ""."""
+        """Makes the full runs that are still missing at the end; returns what they contradict, or ""."""
         self._journal.record("confirm_started")
         confirmation = Confirmation(self._journal, kept, tried, self._reduction.iterations, ENOUGH)
         self._bench.work("confirm", None, confirmation.wanted)
@@ -146,7 +146,7 @@ class Driver:
 
     def _end(self, minimal: bool, reason: str) -> None:
         self._bench.finish_trials()
-        # What ran ahead of time is not needed any more.
+        # Tests that ran ahead of time are no longer needed.
         self._journal.lose_running()
         self._journal.record("finished", minimal=minimal, reason=reason)
 
@@ -189,7 +189,7 @@ class Driver:
         return None if winner is None else round.candidates[winner]
 
     def _announce(self, number: int, round: Round) -> None:
-        # The scores of such schemas are distances in m, which is worth showing.
+        # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
 
         def distance(candidate: Candidate) -> float | None:
@@ -215,7 +215,7 @@ class Driver:
                 self._journal.record_once("vetoed", number, index, verdict=verdict, again=True)
 
     def _moment(self, round: Round) -> Moment:
-        """Where the search stands as a round begins."""
+        """The state of the search when a round begins."""
         return Moment(
             self._reduction.algorithm,
             self._reduction.pair,
@@ -230,7 +230,7 @@ class Driver:
         )
 
     def _forecast(self, number: int, moment: Moment) -> Iterator[float]:
-        """Plays the search from `moment` on, and writes how many tests are left; once a round."""
+        """Simulates the search from `moment` on, and records how many tests are left; once a round."""
         if self._journal.has("forecast", number):
             return
         done, tests = self._journal.state.tests_done, []
@@ -245,7 +245,7 @@ class Driver:
 
         def wanted() -> Wanted:
             if self._refusals != self._journal.refusals:
-                # One that was passed over may be wanted after all.
+                # The user may want a candidate that was passed over after all.
                 self._refusals, self._judged = self._journal.refusals, 0
             now = self._standing(round)
             self._record_verdicts(number, round, now.verdicts)
@@ -255,13 +255,13 @@ class Driver:
         return self._standing(round).winner
 
     def _standing(self, round: Round) -> Standing:
-        """Of the candidates that have no verdict yet."""
+        """Tests of the candidates that have no verdict yet."""
         open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
         similar, refused = self._journal.is_similar, self._journal.refused
         return standing(open_ones, similar, self._reduction.iterations, refused, first=self._judged, enough=ENOUGH)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
-        """Records verdicts in the order of candidates: what was run ahead of time has to wait for its turn."""
+        """Records verdicts in the order of candidates: tests that ran ahead of time wait for their turn."""
         for verdict in verdicts:
             if not verdict:
                 return
@@ -277,9 +277,9 @@ class Driver:
             self._judged += 1
 
     def _learn(self, number: int, round: Round, winner: int | None) -> None:
-        """What the round's verdicts rest on, each test once, for schemas that learn.
+        """The tests behind the round's verdicts, each once, for schemas that learn.
 
-        Never what only ran ahead of time, and never what was refused in this round: a resumed run must see the same.
+        Excludes tests that only ran ahead of time or were refused in this round, so that a resumed run sees the same.
         """
         last = len(round.candidates) if winner is None else winner + 1
         journal = self._journal
@@ -296,7 +296,7 @@ class Driver:
         return Trial(self._journal.keep_of_test(test), self._journal.state.tests[test - 1].outcome == "similar")
 
     def _is_accepted(self, number: int, winner: int) -> bool:
-        """In accept mode `ask`, waits for the user, who may as well want one before it after all."""
+        """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
         journal, key = self._journal, (number, winner)
         if journal.has("reduced", number, winner):
             return True
@@ -311,7 +311,7 @@ class Driver:
         return journal.decisions.get(key, "accept") == "accept"
 
     def _take(self, number: int, round: Round, winner: int) -> None:
-        """The winner becomes the environment; its similar run is what the next rounds look at."""
+        """The winner becomes the environment; the next rounds use its similar run."""
         models = self._keep(round.candidates[winner])
         test = self._journal.tests_of(models, self._reduction.iterations)[-1]
         environment = self._numbers(models)
@@ -326,5 +326,5 @@ class Driver:
         )
 
     def _numbers(self, names: Iterable[str]) -> list[int]:
-        """In the order of the world, which is not always the algorithm's."""
+        """In the order of the world, which may differ from the algorithm's."""
         return sorted(self._number[name] for name in names)

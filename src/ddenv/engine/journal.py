@@ -1,4 +1,4 @@
-"""The engine's memory: it writes each event once, and knows every finished test again after a restart."""
+"""The engine's memory: writes each event once, and finds every finished test again after a restart."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ddenv.runfile.state import Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
-# After these the search begins anew from what the user left it.
+# After these events the search starts again from what the user left.
 STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back")
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A search from its beginning: the number of its first round, n there, and what the user and the rounds before have left it.
+    """The start of a search: the number of its first round, its n, and the environment that it starts from.
 
-    `n_partitions` None is the scenario's own. `tests` are those known before, for schemas that learn.
+    `n_partitions` is None for the scenario's value. `tests` are those known before, for schemas that learn.
     """
 
     first_round: int
@@ -33,23 +33,23 @@ class Leg:
 
 
 def other_way(round: int) -> str:
-    """What to tell where a resumed run would leave the way that it took before."""
+    """The error if a resumed run would not repeat the rounds that it made before."""
     return (
-        f"round {round} would now be another one: the run was begun with other versions of ddenv, scikit-learn or a "
-        "package of schemas; go on with those, or begin a new run"
+        f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
+        "package of schemas; continue with those, or start a new run"
     )
 
 
 class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
-    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again. What the algorithm asked
-    for is there with full False, what ran to its end with full True, most tests as both: `early_stop` only changes runs that
-    it cuts. What only confirms stays out of the algorithm's sight, so that a resumed run takes the same way.
+    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again. Tests that the algorithm
+    asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only changes runs that
+    it cuts. The algorithm does not see tests that only confirm, so a resumed run repeats its rounds.
     `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
-    they stay refused in later rounds, whatever is known of them; `refusals` counts how often that changed. `partitions` are those
-    of each round, as numbers of models. `leg` is the search that is on; once `steered`, a new one has to begin. While a user's
-    `command` is obeyed, events tell its number.
+    they stay refused in later rounds; `refusals` counts how often that changed. `partitions` are those
+    of each round, as numbers of models. `leg` is the current search; once `steered`, a new one has to start. While a user's
+    `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -65,7 +65,7 @@ class Journal:
         self.partitions: dict[int, list[list[int]]] = {}
         self._keeps: dict[int, Keep] = {}
         self._refused_in: dict[Keep, int | None] = {}
-        # How fine the last round in each node was.
+        # n of the last round in each node.
         self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         for event in file.events():
@@ -78,7 +78,7 @@ class Journal:
         self._take(self.file.append(kind, data, motions))
 
     def record_once(self, kind: str, round: int | None = None, candidate: int | None = None, **data: Any) -> None:
-        """Writes an event of a round or a candidate unless it was written before the engine was last stopped."""
+        """Writes an event of a round or a candidate, unless an earlier engine has written it."""
         if self.has(kind, round, candidate):
             return
         if candidate is not None:
@@ -86,18 +86,18 @@ class Journal:
         self.record(kind, round=round, **data)
 
     def is_similar(self, keep: Keep, run: int, full: bool = False) -> bool | None:
-        """Whether a finished test showed f; None where it is not made yet. With `full` only a run to the end counts."""
+        """Whether a finished test showed f; None if it is not made yet. With `full` only a run to the end counts."""
         test = self.ledger.get((keep, run, full))
         return None if test is None else self.state.tests[test - 1].outcome == "similar"
 
     def only_broke(self, keep: Keep, runs: Iterable[int]) -> bool:
-        """Whether the full runs of `keep` say nothing, since none of them came to its end."""
+        """Whether all full runs of `keep` broke, so that they show nothing."""
         tests = [self.ledger.get((keep, run, True)) for run in runs]
         outcomes = {self.state.tests[test - 1].outcome for test in tests if test is not None}
         return bool(outcomes) and outcomes <= {"error", "timeout"}
 
     def tests_of(self, keep: Keep, iterations: int) -> list[int]:
-        """The tests that the verdict on `keep` rests on, in the order of runs."""
+        """The tests behind the verdict on `keep`, in the order of runs."""
         tests = []
         for run in range(1 + iterations):
             tests.append(self.ledger[keep, run, False])
@@ -106,11 +106,11 @@ class Journal:
         return tests
 
     def keep_of_test(self, test: int) -> Keep:
-        """The models that were there in a test."""
+        """The models in a test's world."""
         return self._keeps[test]
 
     def begin_leg(self) -> Leg:
-        """The search that is on, or a new one where the user changed something. It begins as fine as the last one was here."""
+        """The current search, or a new one if the user changed something. It starts with the last n used here."""
         if self.steered:
             first = max(self.partitions, default=0) + 1
             self.record("leg_started", round=first, n_partitions=self._fineness.get(self.state.node))
@@ -127,7 +127,7 @@ class Journal:
         return Leg(first_round, n_partitions, state.environment, state.pinned, evidence, settings, known)
 
     def is_full(self, phase: str) -> bool:
-        """Whether tests of this phase run to the end even where the robot is stuck for good."""
+        """Whether tests of this phase run to the end even if the robot is stuck for good."""
         return phase not in ("round", "hand") or not self.state.scenario["failure"].get("early_stop", False)
 
     def start_test(
@@ -141,7 +141,7 @@ class Journal:
     ) -> int:
         """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise.
 
-        Raises UserError for a test of a round that is over: the file must not hold what makes no sense.
+        Raises UserError for a test of a round that is over, so that the file stays valid.
         """
         if round is not None and round != self.current.number:
             raise UserError(other_way(round))
@@ -158,20 +158,20 @@ class Journal:
         return test
 
     def lose_running(self) -> None:
-        """Writes of the tests that were started and never ended that they are lost."""
+        """Records tests that were started and never ended as lost."""
         for test in self.state.tests:
             if test.outcome == "running":
                 self.record("test_lost", test=test.id)
 
     @property
     def current(self) -> Round:
-        """The current round. Raises UserError where there is none yet."""
+        """The current round. Raises UserError before the first round."""
         if self.state.round is None:
             raise UserError("damaged run file: there is no round yet")
         return self.state.round
 
     def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
-        """Whether an event of a round or a candidate is written already."""
+        """Whether an event of a round or a candidate is already written."""
         return (kind, round, candidate) in self._seen
 
     def _take(self, event: Event) -> None:
@@ -211,11 +211,11 @@ class Journal:
         self._refuse(self._keep_of(data["candidate"]), data["verdict"], data.get("round"))
 
     def _unvetoed(self, data: dict[str, Any]) -> None:
-        """One of an earlier round was in the way of what came since: the search begins anew."""
+        """A refusal in an earlier round has blocked candidates since, so the search starts again."""
         keep, round = self._keep_of(data["candidate"]), data["round"]
         self.refused.pop(keep, None)
         self.decisions.pop((round, data["candidate"]), None)
-        # A rejected one was judged, and is judged again.
+        # A rejected candidate was judged, and is judged again.
         self._seen.discard(("candidate_judged", round, data["candidate"]))
         self.refusals += 1
         if self._refused_in.pop(keep, None) != round:
@@ -227,12 +227,12 @@ class Journal:
         self.refusals += 1
 
     def _changed(self, data: dict[str, Any]) -> None:
-        """A search goes the same way whatever its budget is."""
+        """The budget does not change the order of a search."""
         if set(data["settings"]) != {"budget"}:
             self.steered = True
 
     def _went_back(self, data: dict[str, Any]) -> None:
-        """What is undone is not to be taken again; what is gone to is wanted after all."""
+        """An undone reduction is not accepted again; an environment that the user goes to is wanted."""
         nodes = self.state.nodes
         wanted = frozenset(nodes[data["node"]].environment)
         self.refused.pop(wanted, None)

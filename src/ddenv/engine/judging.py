@@ -1,4 +1,4 @@
-"""What came out of a test as plain data, for the run file and for `--json`: every number in it is finite."""
+"""The result of a test as plain data, for the run file and for `--json`: every number in it is finite."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ddenv.world.scenario import FailureSpec
 def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) -> dict[str, Any]:
     """`outcome`, `failure`, `distance` to f's end (m), `end_pose`, `simulated_seconds` and `wall_seconds`.
 
-    `failures` are f, and what the user took for as good; the nearest one counts.
-    `first_sensed` and `first_touched` tell by name when a model first was, s, rounded to 1 ms.
-    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run does not have is None. `cut` says that it
-    was ended before its time because the robot was stuck for good, `taken` from which other run it was taken over.
+    `failures` are f and the failures that the user accepted as f; the nearest one counts.
+    `first_sensed` and `first_touched` are the first times by model name, s, rounded to 1 ms.
+    Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None. `cut` says that it
+    ended early because the robot was stuck for good, `taken` from which other run it was reused.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
@@ -50,7 +50,7 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
 
 
 def nearest(judgements: Sequence[Judgement]) -> Judgement:
-    """The one that counts: a similar one, or else the one that is nearest."""
+    """The judgement that counts: a similar one, else the nearest."""
     return min(judgements, key=lambda each: (each.outcome != "similar", each.distance))
 
 
@@ -86,7 +86,7 @@ def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> 
 
 
 def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> dict[str, dict[str, Any]]:
-    """What all failed tests so far are, seen from `failures`: their outcomes, and distances in m, by the test's id."""
+    """The outcomes of all failed tests so far, judged by `failures`, and their distances in m, by test id."""
     outcomes, distances = {}, {}
     for test in state.tests:
         if test.outcome not in ("similar", "other"):
@@ -97,5 +97,5 @@ def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> d
 
 
 def rows_of(file: RunFile, test: int) -> np.ndarray:
-    """The robot's trajectory in a test, shape (N, COLUMNS). Raises UserError where there is none."""
+    """The robot's trajectory in a test, shape (N, COLUMNS). Raises UserError if it is missing."""
     return np.array(file.trajectory(test)).reshape(-1, COLUMNS)

@@ -22,8 +22,8 @@ from ddenv.runfile.store import COLUMNS, Live
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
-# A simulated step makes a thousand small allocations: glibc is to keep more of them at hand (a step takes 59 us, not 75).
-# And a worker has one core: libraries that compute in threads would only take it from other workers.
+# A simulated step makes a thousand small allocations: with more of them cached by glibc, a step takes 59 us, not 75.
+# And a worker has one core: libraries that use threads would only slow down other workers.
 FOR_DRAKE = {
     "GLIBC_TUNABLES": "glibc.malloc.tcache_count=127",
     "OMP_NUM_THREADS": "1",
@@ -34,7 +34,7 @@ _one_at_a_time = threading.Lock()
 
 
 class _DrakeProcess(SpawnProcess):
-    """Is started with `FOR_DRAKE`: libraries read such variables before a line of Python runs."""
+    """A process started with `FOR_DRAKE`: libraries read these variables before any Python code runs."""
 
     @staticmethod
     def _Popen(process: SpawnProcess) -> object:  # type: ignore[override]  # a private part of the standard library
@@ -43,14 +43,14 @@ class _DrakeProcess(SpawnProcess):
 
 
 class DrakeContext(SpawnContext):
-    """Starts processes for the simulation with Drake, at first and in the place of those that died."""
+    """Starts processes for the simulation with Drake, also in place of those that died."""
 
     Process = _DrakeProcess
 
 
 @contextmanager
 def _environment(more: Mapping[str, str]) -> Iterator[None]:
-    """`more` in our own environment for a moment, as far as the user has not set it: it is what a new process is given."""
+    """Adds `more` to the environment for a moment, unless the user has set it: a new process inherits it."""
     with _one_at_a_time:
         added = [name for name in more if name not in os.environ]
         os.environ.update({name: more[name] for name in added})
@@ -61,9 +61,9 @@ def _environment(more: Mapping[str, str]) -> Iterator[None]:
                 del os.environ[name]
 
 
-# How often workers may die between two finished tests before the world is given up.
+# How often workers may die between two finished tests before the engine gives up.
 MOST_BREAKS = 3
-# How much longer than its time limit a test of an own simulator may take: its command is ended by its worker, which tells why, s.
+# How much longer than its time limit a test of the user's own simulator may take, s: its worker ends the command, and says why.
 MARGIN = 60.0
 
 
@@ -91,7 +91,7 @@ class Pool:
 
     def __init__(self, scenario: Scenario, world: World, robot: Model, jobs: int) -> None:
         self._jobs = jobs
-        # An own simulator gets the user's environment as it is.
+        # The user's own simulator gets the environment unchanged.
         self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
         self._progress = self._context.RawArray("d", jobs * COLUMNS)
         self._parts = (scenario, world, robot)
@@ -119,12 +119,12 @@ class Pool:
         return len(self._running)
 
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True) -> None:
-        """Starts a test on an idle worker. One that is not `full` ends as soon as the robot is stuck for good."""
+        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good."""
         job = Job(test, keep, seed, full, self._free.pop(0))
         try:
             self._schedule(job)
         except RuntimeError:
-            # A worker died while it had nothing to do.
+            # A worker died while idle.
             self._start_again([job])
 
     def _schedule(self, job: Job) -> None:
@@ -181,6 +181,6 @@ class Pool:
 
     def close(self) -> None:
         """Kills what runs."""
-        # pebble is not typed in full.
+        # pebble is only partly typed.
         self._pool.stop()  # type: ignore[no-untyped-call]
         self._pool.join()

@@ -1,7 +1,7 @@
-"""Tests that other runs have made already, of the same models with the same seed in the same simulator: they are taken over.
+"""Reuses tests that other runs have made of the same models, with the same seed, in the same simulator.
 
-A simulation is deterministic to the last bit, so that a test which is taken over is the test that would be made. Simulators and
-controllers that are not ours may not be, and nothing is taken over of them.
+A simulation is deterministic to the last bit, so a reused test is the test that would be made. The user's own simulators and
+controllers may not be deterministic, so their tests are not reused.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ Key = tuple[Keep, int, bool]
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a test is written down: a finished one of a run file."""
+    """A finished test of a run file."""
 
     path: Path
     test: Test
 
 
 def simulator() -> str:
-    """What a test is computed with, so far as its bits may depend on it."""
+    """The versions of everything that the bits of a test may depend on."""
     versions = []
     for name in PACKAGES:
         try:
@@ -51,7 +51,7 @@ def simulator() -> str:
 
 
 def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key, Place]:
-    """What the other runs in `folder` have tested, by models, seed, and whether it is a run to the end."""
+    """The tests of the other runs in `folder`, by models, seed, and whether they ran to the end."""
     if scenario.oracle is not None or scenario.controller.use not in OURS:
         return {}
     known: dict[Key, Place] = {}
@@ -62,7 +62,7 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
             with RunFile(path) as other:
                 known |= dict(_tests_of(other)) if _is_alike(run, other) else {}
         except UserError:
-            # What cannot be read is of no use.
+            # Files that cannot be read are skipped.
             continue
     return known
 
@@ -91,7 +91,7 @@ def _is_alike(run: RunFile, other: RunFile) -> bool:
 
 
 def _asked(scenario: Any) -> Any:
-    """A scenario without how its world is reduced, and without where its files are: what they hold is compared."""
+    """A scenario without its reduction settings and its paths: the contents of the files are compared."""
     if not isinstance(scenario, dict):
         return None
     kept = {
@@ -106,7 +106,7 @@ def _asked(scenario: Any) -> Any:
 
 
 class SharingPool:
-    """`pool` for what is new; what is `known` has its result at once, and takes no worker."""
+    """Runs new tests in `pool`; a `known` test has its result at once, and takes no worker."""
 
     def __init__(self, pool: Pool, known: dict[Key, Place]) -> None:
         self._pool = pool
@@ -123,7 +123,7 @@ class SharingPool:
         return self._pool.busy + len(self._ready)
 
     def submit(self, test: int, keep: Keep, seed: int, full: bool = True) -> None:
-        """Takes the test over, or starts it on an idle worker."""
+        """Reuses the test, or starts it on an idle worker."""
         result = _result(self._known.pop((keep, seed, full), None))
         if result is None:
             self._pool.submit(test, keep, seed, full)
@@ -145,7 +145,7 @@ class SharingPool:
 
 
 def _result(place: Place | None) -> RunResult | None:
-    """What came of a test; None where that cannot be read any more."""
+    """The result of a test; None if it can no longer be read."""
     if place is None:
         return None
     test = place.test

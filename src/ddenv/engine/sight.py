@@ -1,4 +1,4 @@
-"""What the schemas see of a run: where models are, what the last similar run was like, what all tests came to."""
+"""What the schemas see of a run: where models are, the last similar run, and the results of all tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def trajectory_of(rows: np.ndarray) -> np.ndarray:
 
 
 def traits_of(model: Model) -> Traits:
-    """What the learner knows about a model. Of several surfaces the most slippery one counts."""
+    """What the learner knows about a model. The most slippery of its surfaces counts."""
     box = model_bounds(model)
     size = 0.0 if box is None else float((box[1] - box[0]).max())
     friction = min((collision.mu for collision in model.collisions), default=1.0)
@@ -30,7 +30,7 @@ def traits_of(model: Model) -> Traits:
 
 
 def _end(state: RunState, run: Test) -> tuple[float, float, float]:
-    """Where f ended; of several failures that count as f the one that `run` showed."""
+    """Where f ended; if several failures count as f, the one that `run` showed."""
     ends = [known_failure(state).position, *(end_of(state.tests[test - 1]) for test in state.failures[1:])]
     if run.end_pose is None:
         return ends[0]
@@ -39,7 +39,7 @@ def _end(state: RunState, run: Test) -> tuple[float, float, float]:
 
 
 class Sight:
-    """The world's side of the evidence, which stays as it is through a run."""
+    """The part of the evidence that comes from the world and never changes in a run."""
 
     def __init__(self, world: World, elements: Sequence[str], delta: float, seed: int) -> None:
         models = {model.name: model for model in world.models}
@@ -50,7 +50,7 @@ class Sight:
         self._seed = seed
 
     def evidence(self, state: RunState, test: int, rows: np.ndarray, trials: Sequence[Trial]) -> Evidence:
-        """What is known when `test` was the last similar run; `rows` (N, 8) is its trajectory."""
+        """The evidence if `test` was the last similar run; `rows` (N, 8) is its trajectory."""
         run, f = state.tests[test - 1], known_failure(state)
         return Evidence(
             elements=self._elements,

@@ -20,7 +20,7 @@ from ddenv.world.scenario import Scenario
 
 @dataclass(frozen=True)
 class Subject:
-    """What is tried. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
+    """What to run. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
 
     scenario: Scenario
     world: World
@@ -35,7 +35,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Trial:
-    """One run to make: the models that are there, the seed, and the model that was left out on purpose, if any."""
+    """One run to make: the models in the world, the seed, and the model that was left out on purpose, if any."""
 
     keep: frozenset[str]
     seed: int
@@ -64,7 +64,7 @@ def plan(
     models = _models(subject, keep, minimal)
     for name in leave_out or []:
         if name not in models:
-            raise UserError(f"--leave-out: '{name}' is not among the {len(models)} models that are there")
+            raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
     models = tuple(name for name in models if name not in (leave_out or []))
     base = subject.scenario.reduction.seed if seed is None else seed
     keeps: list[tuple[frozenset[str], str | None]] = [(frozenset(models), None)]
@@ -87,7 +87,7 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[st
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
-    """Makes the runs in worker processes; yields what came out of each, in order, as plain data."""
+    """Makes the runs in worker processes; yields the result of each, in order, as plain data."""
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0

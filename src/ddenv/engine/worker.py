@@ -36,13 +36,13 @@ _progress: Any
 def prepare(scenario: Scenario, world: World, robot: Model, progress: Any) -> None:
     """Runs first in every worker. `progress` is shared memory, `COLUMNS` doubles a slot.
 
-    What is wrong with the world is kept, and told by every test: an exception here would only break the pool.
+    An error in the world is stored, and raised by every test: an exception here would only break the pool.
     """
     global _simulator, _progress
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Simulations take all cores: a screen on the same machine comes first, since it needs little and somebody waits for it.
+    # Simulations take all cores; a screen on the same machine needs little, and a user waits for it.
     os.nice(NICENESS)
-    # Whatever is printed here, also by native code, must not get into what our caller prints for programs to read.
+    # Output printed here, also by native code, must not mix with the caller's output, which programs read.
     os.dup2(2, 1)
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
     _progress = progress
@@ -57,7 +57,7 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
         from ddenv.robot.external.simulator import ExternalSimulator
 
         return ExternalSimulator(world, scenario)
-    # Drake takes a second to load, and is not there for those who have no use for it.
+    # Drake takes a second to load, and users of another simulator may not have it.
     from ddenv.robot.drake.template import Variants
 
     return Variants(world, robot, scenario)
@@ -76,7 +76,7 @@ def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResul
 
 
 def _follow_parent(parent: int) -> None:
-    """An engine that is killed takes its workers with it: they must not compute for nobody."""
+    """Ends the worker when its engine is killed: nobody would use its results."""
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)

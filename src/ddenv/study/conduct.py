@@ -1,4 +1,4 @@
-"""A study from start to end: what is left to do, what is shown meanwhile, and when it was worked on."""
+"""A study from start to end: makes the remaining cells, shows progress, and records when it was worked on."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ddenv.words import count, duration
 def seconds_left(
     running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work], worlds: dict[str, Size], jobs: int
 ) -> float | None:
-    """Until the last cell has ended, s; None where nothing tells."""
+    """Time until the last cell ends, s; None if unknown."""
     times = [_of_running(each) for each in running]
     times += [_of_waiting(cell, (*running, *ended), worlds) for cell in waiting]
     known = [each for each in times if each is not None]
@@ -40,7 +40,7 @@ def seconds_left(
 
 
 def _of_running(each: Work) -> float | None:
-    """What one worker would still need, s; None if nothing is known."""
+    """What one worker still needs, s; None if unknown."""
     left = remaining(each.state, True)
     if left is not None and left.seconds is not None:
         return left.seconds[1] * max(1, each.state.jobs)
@@ -49,7 +49,7 @@ def _of_running(each: Work) -> float | None:
 
 
 def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
-    """What one worker would need, s: what other cells of the scenario took, or what such a cell is expected to take."""
+    """What one worker would need, s: the time of other cells of the scenario, or an estimate."""
     same = [each for each in others if each.cell.scenario.name == cell.scenario.name]
     over = [_spent(each.state) for each in same if each.state.status == "finished"]
     if over:
@@ -75,7 +75,7 @@ def _expected(cell: Cell, models: int) -> int:
 
 
 def _spent(state: RunState) -> float:
-    """What a cell's tests took, s, one after another; those taken over from another cell cost nothing."""
+    """The time of a cell's tests, s, one after another; tests reused from another cell cost nothing."""
     return sum(test.wall_seconds for test in state.finished_tests if not test.taken)
 
 
@@ -84,11 +84,11 @@ def _of_a_test(state: RunState) -> float | None:
     return mean(tests) if tests else None
 
 
-# What is left takes a while to find, s.
+# Time between two estimates of the time left, which are slow, s.
 LOOK_PERIOD = 2.0
-# To the beginning of the line, and nothing on it any more.
+# To the start of the line, and clears it.
 CLEAR = "\r\x1b[K"
-# Logs and pipes get a line on what happens now so often, s.
+# Time between two lines of progress in logs and pipes, s.
 QUIET = 60.0
 # A shorter time left is not shown, s.
 LEAST = 5.0
@@ -108,7 +108,7 @@ class Progress:
         self._left: float | None = None
 
     def look(self, running: Sequence[Work], waiting: Sequence[Cell], ended: Sequence[Work]) -> None:
-        """Tells what is new."""
+        """Reports what is new."""
         for each in ended[self._reported :]:
             self._reported += 1
             seed = f", seed {each.cell.seed}" if self._seeds > 1 else ""
@@ -129,9 +129,9 @@ class Progress:
         return f"{self._before + self._reported}/{self._in_all}"
 
     def close(self) -> None:
-        """Takes the last line away."""
+        """Clears the last line."""
         if self._live:
-            # The terminal may be what is gone.
+            # The terminal may be gone.
             with contextlib.suppress(OSError):
                 print(CLEAR, end="", file=self._out, flush=True)
 
@@ -139,7 +139,7 @@ class Progress:
         print(f"{CLEAR if self._live else ''}{printable(line)}", file=self._out, flush=True)
 
     def _now(self, running: Sequence[Work], columns: int = 200) -> str:
-        """What happens, as fully as there is room."""
+        """The current state, as detailed as fits."""
         left = "" if self._left is None or self._left < LEAST else f" · about {duration(self._left)} left"
         for said in (_fully, _short):
             line = " · ".join((f"{self._done}{left}", *map(said, running)))
@@ -176,12 +176,12 @@ def _doing(each: Work) -> str:
     return f"{len(state.environment)} of {len(state.elements)} models, {state.tests_done} tests"
 
 
-# How often it is written how long the study took so far, s.
+# Time between two records of the study's time so far, s.
 WRITE_PERIOD = 10.0
 
 
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
-    """Makes what is left to do of a study, in `folder`, with `jobs` workers, and writes what came of it; returns the exit code.
+    """Makes the missing cells of a study in `folder` with `jobs` workers, and writes its results; returns the exit code.
 
     0 means that every cell is minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
     """
@@ -200,13 +200,13 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     minimal = sum(each.holds for each in found)
     print(printable(f"{minimal} of {count(len(found), 'cell')} minimal; wrote {page}"), file=out, flush=True)
     if interrupted:
-        print("interrupted; the same command goes on where it was", file=sys.stderr)
+        print("interrupted; the same command continues", file=sys.stderr)
         return 130
     return 0 if minimal == len(found) else 1
 
 
 def _make(plan: Plan, done: Set[str], folder: Path, jobs: int, worlds: dict[str, Size], out: TextIO) -> None:
-    """Makes the cells whose names are not among those that are `done`. Raises UserError, and KeyboardInterrupt."""
+    """Makes the cells whose names are not in `done`. Raises UserError, and KeyboardInterrupt."""
     began, earlier = time.monotonic(), sittings(folder)
     open_ones = [cell for cell in plan.cells if cell.name not in done]
     if not open_ones:
@@ -224,7 +224,7 @@ def _make(plan: Plan, done: Set[str], folder: Path, jobs: int, worlds: dict[str,
         nonlocal written
         cells[:] = (*running, *ended)
         progress.look(running, waiting, ended)
-        # Now and then: a study that is killed has lost the time since.
+        # Regularly: a killed study loses the time since the last record.
         if time.monotonic() > written + WRITE_PERIOD:
             written = time.monotonic()
             write()

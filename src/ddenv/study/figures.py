@@ -18,7 +18,7 @@ from ddenv.words import count
 
 HEIGHT = 320.0
 LINE, SAMPLE = 22.0, 30.0
-# How wide the lines are of those methods that have a look of their own: where some coincide, the first ones are seen beside them.
+# Widths of the lines of methods with their own colour: where lines coincide, the wider first ones stay visible.
 WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
 
 
@@ -46,7 +46,7 @@ def chart(group: Group) -> str:
 
 
 def _looks(group: Group) -> tuple[list[Row], list[Row]]:
-    """The rows with a look of their own, and all others: where there are many, the paper's and those of fewest tests."""
+    """The rows with their own colour, and all others: of many, the paper's methods and those with the fewest tests."""
     rows = [row for row in group.rows if row.minimal]
     if len(rows) <= len(WIDTHS):
         return rows, []
@@ -93,7 +93,7 @@ MOST_WORLDS, MOST_NAMES = 4, 12
 
 
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
-    """A map of each set of models that is left, those that most cells found first; `file` is part of the pictures' names."""
+    """A map of each set of models that is left, the most frequent first; `file` is part of the pictures' names."""
     sets: dict[tuple[str, ...], list[Found]] = {}
     for each in group.minimal:
         sets.setdefault(each.left, []).append(each)

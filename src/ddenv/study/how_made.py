@@ -1,4 +1,4 @@
-"""How a study was made: what it was asked, where and when it was worked on, what its words mean, and how to do it again."""
+"""How a study was made: its settings, when and on which machine it ran, what its columns mean, and how to repeat it."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from ddenv.study.results import Found
 from ddenv.study.study_folder import RUNS, Sitting
 from ddenv.world.scenario import Scenario
 
-# Each cell has its own.
+# These differ between cells.
 OF_A_CELL = ("algorithm", "pair", "seed", "budget")
 COLUMNS = (
     (
         "tests",
         "runs of the robot: the baseline, those behind each verdict, and the full runs at the end where tests were ended "
-        "early. Runs that idle workers made ahead of time and nobody needed are not among them.",
+        "early. Runs that idle workers made ahead of time and that were not needed do not count.",
     ),
     ("% reduction", "the part of the models that was removed."),
-    ("minutes", "what these tests took, one after another, as the paper's were made."),
-    ("re-runs", "the share of tests that run a candidate again which did not show f at first (the paper's deflaking)."),
+    ("minutes", "the time of these tests, one after another, as the paper made its tests."),
+    ("re-runs", "the share of tests that repeat a candidate whose first test did not show f (the paper's deflaking)."),
     ("f in the whole world", "runs of the whole world that ended as f did."),
     (
         "left out once more",
-        "when all was over: what is left, run again with seeds that no reduction had used, and again without each of its models.",
+        "after the reduction: what is left, run again with unused seeds, and again without each of its models.",
     ),
     (
         "least tests",
-        "what no method can do without: the baseline, f once in what is left, and each of its models left out in vain, with all "
-        "re-runs.",
+        "the minimum for any method: the baseline, f once in what is left, and each of its models left out without success, "
+        "with all re-runs.",
     ),
 )
 
 
 def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:
-    """The section on all that."""
+    """The section on how the study was made."""
     blocks: list[Block] = [
         *_settings(plan),
         *_sittings(sittings),
@@ -51,7 +51,7 @@ def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], fold
 
 
 def _settings(plan: Plan) -> list[Block]:
-    """What differs between scenarios has a column for each."""
+    """A table with a column for each scenario."""
     asked = [one for one in SETTINGS.values() if one.section != "simulation" and one.name not in OF_A_CELL]
     said = [(one.label, [_value(scenario, one) for scenario in plan.scenarios]) for one in asked if _is_used(plan, one)]
     said.append(("seeds", [", ".join(map(str, _seeds(plan, scenario))) for scenario in plan.scenarios]))
@@ -61,7 +61,7 @@ def _settings(plan: Plan) -> list[Block]:
 
 
 def _is_used(plan: Plan, one: Setting) -> bool:
-    """Whether any method of the study looks at it."""
+    """Whether any method of the study uses the setting."""
     return not one.used_by or any({method.algorithm, *method.parts} & set(one.used_by) for method in plan.methods)
 
 
@@ -93,22 +93,21 @@ def _sittings(sittings: Sequence[Sitting]) -> list[Block]:
 
 
 def _computed(found: Sequence[Found]) -> list[Block]:
-    """Names the versions: tests of several versions may differ."""
+    """The versions, since tests of different versions may differ."""
     drake = [each for each in found if each.simulator and each.cell.scenario.oracle is None]
     versions = sorted({f"ddenv {each.version}, {each.simulator}" for each in drake})
     taken = sum(each.taken for each in found)
     words = (
         f"Computed with {versions[0]}."
         if len(versions) == 1
-        else f"Not all of it was computed alike: {'; '.join(versions)}."
+        else f"Different versions computed parts of it: {'; '.join(versions)}."
     )
     blocks: list[Block] = [say(words, notice=len(versions) > 1)] if versions else []
     if taken:
         blocks.append(
             say(
-                f"{thousands(taken)} tests that another cell of the study had made, of the same models with the same seed, were "
-                "not made again: the simulation is deterministic to the last bit. They count in each cell all the same, with "
-                "their time."
+                f"{thousands(taken)} tests were reused from another cell with the same models and the same seed: the simulation is "
+                "deterministic to the last bit. They count in each cell, with their time."
             )
         )
     return blocks
@@ -119,6 +118,6 @@ def _again(plan: Plan, folder: Path) -> list[Block]:
     start = f"./{folder}" if str(folder).startswith("-") else folder
     example = plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv")
     return [
-        say("Each cell is a run: to watch, to go on with, to report on."),
+        say("Each cell is a run that can be watched, continued and reported:"),
         Code((f"ddenv open {shlex.quote(example)}", f"ddenv test {shlex.quote(example)} --minimal --leave-each-out")),
     ]

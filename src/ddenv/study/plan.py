@@ -1,4 +1,4 @@
-"""What a study consists of: cells, each one reduction of a scenario by an algorithm with a pair, from one seed."""
+"""The cells of a study: each is one reduction of a scenario by an algorithm with a pair, from one seed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCENARIOS = ("ditch", "rubble", "friction")
 PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
 # A seed is less.
 MOST_SEED = 2**31
-# What would not do in the name of a file.
+# Characters that must not stand in the name of a file.
 NO_NAME = re.compile(r"[^\w-]+")
 # Bytes of a scenario's name in the names of files.
 LONGEST_NAME = 80
@@ -27,26 +27,26 @@ LONGEST_NAME = 80
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """An algorithm with the parts of the pair that it looks at."""
+    """An algorithm with the parts of the pair that it uses."""
 
     algorithm: str
     pair: str
 
     @property
     def parts(self) -> tuple[str, str]:
-        """The partitioning and the prioritization, "" for what the algorithm does not look at."""
+        """The partitioning and the prioritization, "" for a part that the algorithm does not use."""
         parts = dict(zip(schemas.BOTH, self.pair.split("/"), strict=True))
         partitioning, prioritization = (parts[k] if k in schemas.uses(self.algorithm) else "" for k in schemas.BOTH)
         return partitioning, prioritization
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The names of those that it looks at."""
+        """The names of the parts that it uses."""
         return tuple(filter(None, self.parts))
 
     @property
     def label(self) -> str:
-        """In short: the pair of `ddenv`, or the algorithm's name with what it looks at."""
+        """In short: the pair of `ddenv`, or the algorithm's name with the parts that it uses."""
         words = "/".join(self.used)
         if self.algorithm == "ddenv":
             return words
@@ -55,7 +55,7 @@ class Method:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One reduction. `seed` is that of its first run; `scenario` has all that is asked for, the seed and the method included."""
+    """One reduction. `seed` is that of its first run; `scenario` has all settings, the seed and the method included."""
 
     scenario: Scenario
     method: Method
@@ -74,7 +74,7 @@ class Cell:
 
 
 def file_name(scenario: Scenario) -> str:
-    """A scenario's name as a part of files' names: as much of it as file systems take beside the rest."""
+    """A scenario's name as a part of files' names: cut to what file systems allow."""
     return NO_NAME.sub("-", scenario.name.encode()[:LONGEST_NAME].decode(errors="ignore"))
 
 
@@ -100,7 +100,7 @@ class Plan:
 def make_plan(
     scenarios: Sequence[str] = (), pairs: str = "paper", algorithms: str = "ddenv", seeds: int = 1, **options: Any
 ) -> Plan:
-    """The study that these words ask for; each may hold several names separated by commas. Raises UserError.
+    """The study of these words; each may hold several names separated by commas. Raises UserError.
 
     `options` are those of `ddenv.runs.scenarios.with_options` for all of it.
     """
@@ -155,7 +155,7 @@ def _all_if_asked(algorithm: str) -> tuple[str, ...]:
 
 
 def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method]:
-    """Each that differs in what it looks at."""
+    """Each method once: those that use the same parts are the same."""
     seen = set()
     for algorithm in algorithms:
         for pair in pairs:
@@ -166,26 +166,24 @@ def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method
 
 
 def _cell(scenario: Scenario, method: Method, number: int) -> Cell:
-    """Seeds are so far apart that no two cells of a scenario share a run but where they share all."""
+    """The seeds of a scenario: so far apart that two cells share either all runs or none."""
     reduction = scenario.reduction
     seed = reduction.seed + number * max(reduction.baseline_runs, 1 + reduction.iterations)
     if seed >= MOST_SEED:
-        raise UserError(
-            f"--seeds: the last seed of {scenario.name} would be {seed}; it has to be less than {MOST_SEED}"
-        )
+        raise UserError(f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}")
     asked = reduction.model_copy(update={"algorithm": method.algorithm, "pair": method.pair, "seed": seed})
     return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)
 
 
-# What a model that can move costs in a test, beside one that cannot: about as much as was measured of piles of boards.
+# The cost of a dynamic model in a test, relative to a static one: about what piles of boards cost when measured.
 MOVES = 4
-# Equal spans of time put most of a world into one part, which takes many rounds to come apart.
+# Equal spans of time put most of a world into one part, which takes many rounds to split.
 SLOW = ("timeseg/", "trajectoryseg/")
 
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """A scenario's world: how many models can be removed, and what a test of it costs, in models that do not move."""
+    """A scenario's world: how many models can be removed, and the cost of a test, in static models."""
 
     models: int
     cost: int

@@ -1,4 +1,4 @@
-"""What a cell came to: read from its run file, and from runs of what is left with seeds that its reduction never used."""
+"""The result of a cell: from its run file, and from runs of what is left with seeds that its reduction never used."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ APART = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Runs from `seed` on, `runs` of each: f showed in `shown` with all that is left, in `without[model]` without that one."""
+    """Runs from `seed` on, `runs` of each: f showed in `shown` runs with all that is left, in `without[model]` without that one."""
 
     seed: int
     runs: int
@@ -36,7 +36,7 @@ class Check:
 
     @property
     def holds(self) -> bool:
-        """Whether f showed, and without no model that is left."""
+        """Whether f showed, but never without one of the models that are left."""
         return self.shown > 0 and not any(self.without.values())
 
 
@@ -45,7 +45,7 @@ def start_check(run: Path, cell: Cell, jobs: int) -> tuple[subprocess.Popen[byte
     words = [sys.executable, "-m", "ddenv", "test", "--minimal", "--leave-each-out", "--json"]
     words += ["--seed", str(_seed(cell)), "--repeat", str(_runs(cell)), "--jobs", str(jobs), "--", str(run)]
     output = tempfile.TemporaryFile("w+")  # noqa: SIM115
-    # A ctrl+c is for the study, which ends its programs itself.
+    # A ctrl+c goes to the study, which ends its programs itself.
     program = subprocess.Popen(
         words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
     )
@@ -53,7 +53,7 @@ def start_check(run: Path, cell: Cell, jobs: int) -> tuple[subprocess.Popen[byte
 
 
 def write_check(folder: Path, cell: Cell, output: IO[str]) -> None:
-    """Keeps what a check that has ended came to. Raises UserError with its own words if it did not come to its end."""
+    """Stores the result of a check that has ended. Raises UserError with the check's own message if it failed."""
     output.seek(0)
     text = output.read()
     try:
@@ -62,14 +62,14 @@ def write_check(folder: Path, cell: Cell, output: IO[str]) -> None:
         names = dict.fromkeys(run["without"] for run in runs if run["without"] is not None)
         found = {"all": shown[None], "without": {name: shown[name] for name in names}}
     except (ValueError, TypeError, KeyError):
-        said = text.strip().rpartition("\n")[2] or "no word of why"
-        raise UserError(f"what is left could not be tried once more: {said}") from None
+        said = text.strip().rpartition("\n")[2] or "without a reason"
+        raise UserError(f"what is left could not be checked: {said}") from None
     kept = {"seed": _seed(cell), "runs": _runs(cell), **found}
     write_file(check_path(folder, cell), json.dumps(kept).encode())
 
 
 def read_check(folder: Path, cell: Cell, left: tuple[str, ...]) -> Check | None:
-    """What was kept of it; None where nothing is, or where it was of other models than those that are `left`."""
+    """The stored check; None if there is no check of the models that are `left`."""
     path = check_path(folder, cell)
     try:
         kept = json.loads(read_bytes(path))
@@ -91,7 +91,7 @@ def _runs(cell: Cell) -> int:
 
 
 def difference(file: RunFile, cell: Cell) -> str:
-    """What it was made of that the cell has not, "" if nothing. Raises UserError where that cannot be read."""
+    """How the run file differs from the cell, "" if it does not. Raises UserError if it cannot be read."""
     first = next(iter(file.events(most=1)), None)
     if first is None:
         raise UserError(f"{file.path}: damaged run file: it has no events")
@@ -104,7 +104,7 @@ def difference(file: RunFile, cell: Cell) -> str:
 
 
 def _compared(scenario: object) -> object:
-    """A scenario without its words, and without where its files are: a study may go on in another place."""
+    """A scenario without its description and paths: a study may continue in another folder."""
     if not isinstance(scenario, dict):
         return None
     kept = {key: value for key, value in scenario.items() if key not in ("description", "world", "folder")}
@@ -116,12 +116,12 @@ def _compared(scenario: object) -> object:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """`tests` are those that the result rests on: the baseline's, those behind each verdict, the full runs at the end; so many of
-    them are `reruns`. They do not depend on the number of workers, as do those that were made `ahead` of time and not needed.
+    """`tests` counts what the result rests on: the baseline, the tests behind each verdict, the full runs at the end; `reruns` of
+    them are re-runs. They do not depend on the number of workers; tests made `ahead` of time and not needed do.
 
-    `sizes` are (tests, models left) from the end of the baseline on. `seconds` is what the tests took, one after another.
-    `taken` of all tests were taken over from other cells, which had made them. `problem` says why there is no minimal
-    environment, "" where there is one.
+    `sizes` are (tests, models left) from the end of the baseline on. `seconds` is the time of the tests, one after another.
+    `taken` of all tests were reused from other cells. `problem` says why there is no minimal environment, "" if there
+    is one.
     """
 
     cell: Cell
@@ -144,29 +144,29 @@ class Found:
 
     @property
     def holds(self) -> bool:
-        """Whether it is minimal, and was so when it was tried once more."""
+        """Whether it is minimal, and the check agrees."""
         return self.minimal and self.check is not None and self.check.holds
 
     @property
     def trouble(self) -> str:
-        """Why it is not shown to be minimal; "" where it is."""
+        """Why it is not shown to be minimal; "" if it is."""
         if not self.minimal:
             return self.problem
         if self.check is None:
-            return "not tried once more yet"
+            return "not checked yet"
         if not self.check.shown:
-            return f"f did not show again in {count(self.check.runs, 'run')} of what is left, with other seeds"
+            return f"f did not show in {count(self.check.runs, 'run')} of what is left with other seeds"
         names = ", ".join(name for name, shown in self.check.without.items() if shown)
-        return f"with other seeds f showed also without {names}: it is a matter of chance there" if names else ""
+        return f"with other seeds f also showed without {names}: there it depends on chance" if names else ""
 
     @property
     def smaller(self) -> float:
-        """Which part of the models was removed."""
+        """The share of the models that was removed."""
         return 1 - len(self.left) / len(self.elements) if self.elements else 0.0
 
 
 def read_cell(folder: Path, cell: Cell) -> Found:
-    """What there is of a cell; one that cannot be read says so as its problem."""
+    """The result of a cell so far; if it cannot be read, `problem` says so."""
     path = run_path(folder, cell)
     if not path.exists():
         return Found(cell)
@@ -174,7 +174,7 @@ def read_cell(folder: Path, cell: Cell) -> Found:
         with RunFile(path) as file:
             state, needed, sizes = _story(file.events())
             if other := difference(file, cell):
-                return Found(cell, problem=f"its run was made of {other}")
+                return Found(cell, problem=f"its run was made with {other}")
     except UserError as error:
         return Found(cell, problem=str(error))
     if not all(0 < number <= len(state.tests) for number in needed):
@@ -206,11 +206,11 @@ def _problem(state: RunState) -> str:
         return ""
     if state.status == "finished":
         return state.reason
-    return state.reason if state.ended else "not at its end"
+    return state.reason if state.ended else "has not ended"
 
 
 def _story(events: Iterable[Event]) -> tuple[RunState, list[int], tuple[tuple[int, int], ...]]:
-    """The state at the end, the tests that the result rests on in their order, and the sizes of the environment."""
+    """The state at the end, the tests behind the result in order, and the sizes of the environment."""
     state = RunState()
     needed: dict[int, None] = {}
     sizes: list[tuple[int, int]] = []

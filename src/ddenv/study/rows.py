@@ -42,7 +42,7 @@ _ROWS = {
 
 
 def theirs(cell: Cell) -> Theirs | None:
-    """What the paper has for a cell; None where it has nothing."""
+    """The paper's numbers for a cell; None if it has none."""
     if cell.method.algorithm != "ddenv":
         return None
     return _ROWS.get(cell.scenario.name, {}).get(cell.method.pair)
@@ -50,19 +50,19 @@ def theirs(cell: Cell) -> Theirs | None:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What the cells of a method came to, in the order of their seeds."""
+    """The results of a method's cells, in the order of their seeds."""
 
     method: Method
     found: tuple[Found, ...]
 
     @property
     def minimal(self) -> tuple[Found, ...]:
-        """Those that have a minimal environment."""
+        """The cells with a minimal environment."""
         return tuple(each for each in self.found if each.minimal)
 
     @property
     def bound(self) -> float | None:
-        """The least tests that any method needs to show what it found, the median of the seeds; None where nothing is minimal."""
+        """The minimum of tests for any method to show this result, the median of the seeds; None if nothing is minimal."""
         bounds = [least_of(each, least_to_show) for each in self.minimal]
         return median(bounds) if bounds else None
 
@@ -86,7 +86,7 @@ class Group:
 
     @property
     def models(self) -> int:
-        """How many models of its world can be removed; 0 where no run has begun."""
+        """How many models of its world can be removed; 0 before the first run."""
         return max(len(each.elements) for row in self.rows for each in row.found)
 
 
@@ -115,20 +115,20 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
 
 
 def least_to_show(models: int, needed: int, iterations: int, baseline_runs: int) -> int:
-    """What it takes to show that `needed` of `models` models are minimal: no method needs less.
+    """The minimum of tests to show that `needed` of `models` models are minimal, for any method.
 
-    After the baseline f has to show in what is left, once, and each of its models has to be left out in vain, for which a candidate
-    is run `1 + iterations` times.
+    After the baseline, f has to show once in what is left, and each of its models has to be left out without success, with
+    `1 + iterations` tests each.
     """
     return baseline_runs + (1 if needed < models else 0) + needed * (1 + iterations)
 
 
 def least_to_find(models: int, needed: int, iterations: int, baseline_runs: int) -> int:
-    """What it takes on average to find them if each set of so many models is as likely to be the needed one.
+    """The minimum of tests to find them, on average, if each set of that size is equally likely.
 
-    A candidate without f costs 1 + iterations tests, one with f at least one. So a test tells log2(1/x) bits at most, where
-    x + x^(1 + iterations) = 1 (Kraft's inequality; a bit a test without re-runs), and log2 C(n, k) bits have to be told. A
-    method that knows more, as that models near f are likelier, may need less.
+    A candidate without f costs 1 + iterations tests, one with f at least one. So a test gives at most log2(1/x) bits, where
+    x + x^(1 + iterations) = 1 (Kraft's inequality; one bit a test without re-runs), and log2 C(n, k) bits are needed. A
+    method that knows more, such as that models near f are likelier, may need less.
     """
     least = math.log(math.comb(models, needed)) / -math.log(_root(1 + iterations))
     return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, iterations, baseline_runs))

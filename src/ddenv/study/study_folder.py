@@ -1,4 +1,4 @@
-"""The folder of a study: its run files, what is written of them, and who made them, when and where."""
+"""The folder of a study: its run files, its reports, and when and on which machine it was made."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from ddenv.version import __version__
 from ddenv.world.files.access import read_bytes, write_file
 
 RUNS, ABOUT, LOCK = "runs", "study.json", "study.lock"
-# What makes the numbers of a run: another version may come to another result.
+# The numbers of a run come from these: another version may give another result.
 PACKAGES = ("drake", "numpy", "scipy", "scikit-learn")
-# A machine's own name for itself may be anything.
+# A machine's name may be anything.
 LONGEST_NAME = 120
 
 
 @dataclass(frozen=True, slots=True)
 class Sitting:
-    """One time that the study was worked on. `begun` is Unix time, s; `seconds` and `tests` are what it took so far."""
+    """One session of work on the study. `begun` is Unix time, s; `seconds` and `tests` count this session so far."""
 
     begun: float
     seconds: float
@@ -45,37 +45,37 @@ def run_path(folder: Path, cell: Cell) -> Path:
 
 
 def check_path(folder: Path, cell: Cell) -> Path:
-    """Where it is written what came of leaving out each model that is left once more."""
+    """The file with the check of a cell: what is left, run again without each of its models."""
     return folder / RUNS / f"{cell.name}.check.json"
 
 
 @contextmanager
 def opened(folder: Path) -> Iterator[None]:
-    """Makes the folder if it is not there, and keeps other studies out of it. Raises UserError."""
+    """Creates the folder if needed, and locks it against other studies. Raises UserError."""
     try:
         if folder.exists() and not folder.is_dir():
             raise UserError(f"{folder}: is a file; give the name of a folder")
         if folder.is_dir() and any(folder.iterdir()) and not (folder / ABOUT).exists() and not (folder / LOCK).exists():
-            raise UserError(f"{folder}: holds other files; give the name of a new or an empty folder")
+            raise UserError(f"{folder}: contains other files; give the name of a new or empty folder")
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{folder}: cannot be written: {error.strerror}; choose another folder with -o") from None
     if not os.access(folder / RUNS, os.W_OK):
         raise UserError(f"{folder}: cannot be written: no permission; choose another folder with -o")
-    taken = f"{folder}: another study works in this folder; wait for it, or choose another folder with -o"
+    taken = f"{folder}: another study is running in this folder; wait for it, or choose another folder with -o"
     with held(folder / LOCK, taken, f"{folder}: cannot be written", "choose another folder with -o"):
         yield
 
 
 def sittings(folder: Path) -> tuple[Sitting, ...]:
-    """When the study was worked on so far. Raises UserError for a damaged file."""
+    """The sessions of work on the study so far. Raises UserError for a damaged file."""
     path = folder / ABOUT
     if not path.exists():
         return ()
     try:
         return tuple(_sitting(each) for each in json.loads(read_bytes(path))["sittings"])
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        raise UserError(f"{path}: makes no sense; delete it (the runs beside it are not touched)") from None
+        raise UserError(f"{path}: is damaged; delete it (the runs are not affected)") from None
 
 
 def _sitting(data: dict[str, Any]) -> Sitting:
@@ -90,13 +90,13 @@ def _sitting(data: dict[str, Any]) -> Sitting:
 
 
 def write_sittings(folder: Path, all_of_them: tuple[Sitting, ...]) -> None:
-    """Writes them, whole or not at all."""
+    """Writes them as a whole or not at all."""
     text = json.dumps({"sittings": [asdict(each) for each in all_of_them]}, indent=1)
     write_file(folder / ABOUT, text.encode())
 
 
 def versions() -> str:
-    """ddenv, Python and what computes, with their versions; nothing is imported for it."""
+    """The versions of ddenv, Python and the packages that compute; imports none of them."""
     found = [f"ddenv {__version__}", f"Python {platform.python_version()}"]
     for name in PACKAGES:
         try:

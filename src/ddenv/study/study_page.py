@@ -1,4 +1,4 @@
-"""What a study says: the claim in a few words, a section for each scenario, which method is best where, and how it was made."""
+"""The pages of a study: the result in a few words, a section for each scenario, a comparison of methods, how it was made."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
     lead = [
         say(
             "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
-            "models that make the robot fail: smaller and smaller parts of it are run, and kept while the same failure f shows, "
-            "until no single model can be left out."
+            "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, "
+            "and stops when no single model can be left out."
         )
     ]
     pairs = [(each, theirs(each.cell)) for each in minimal]
@@ -62,10 +62,10 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
         ours, hours = sum(each.seconds for each, _ in beside), sum(paper.minutes for _, paper in beside) / 60
         lead.append(
             say(
-                f"Beside the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
+                f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
                 f"tests in {fewer}. They took {hours:.0f} hours there; here their tests take {duration(ours)}, one after another. "
-                "The worlds follow the paper's descriptions but are not its worlds, and the simulator is another one: the methods "
-                "can be compared with each other, the minutes only roughly with the paper's."
+                "The worlds follow the paper's descriptions but are not its worlds, and the simulator differs: compare the methods "
+                "with each other, and the minutes only roughly with the paper's."
             )
         )
     if missing := len(found) - len(minimal):
@@ -94,7 +94,7 @@ def _figures(
 
 
 STEM = "study"
-# The columns of the table of all cells.
+# The columns of `study.csv`.
 HEADER = (
     *("scenario", "algorithm", "partitioning", "prioritization", "seed", "minimal", "problem"),
     *("models", "left", "reduction", "names", "tests", "reruns", "ahead", "taken_over", "seconds"),
@@ -113,7 +113,7 @@ HEADER = (
 
 
 def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[Path, tuple[Found, ...]]:
-    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and what it is of. Raises UserError."""
+    """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its cells. Raises UserError."""
     found = tuple(read_cell(folder, cell) for cell in plan.cells)
     report = content(plan, found, sittings, folder)
     texts = {f"{STEM}.csv": table(folder, found), **pictures(report, STEM)}
@@ -124,7 +124,7 @@ def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[
 
 
 def table(folder: Path, found: Sequence[Found]) -> str:
-    """All cells as CSV, a row each; what a cell does not have is empty."""
+    """All cells as CSV, a row each; missing values are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(HEADER)

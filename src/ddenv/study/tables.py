@@ -14,16 +14,16 @@ from ddenv.study.results import Found
 from ddenv.study.rows import TABLES, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
 from ddenv.words import count
 
-# So many models that are left are named.
+# The maximum number of models that are named.
 MOST_NAMES = 8
-# What is behind the numbers of more methods than this is told in a sentence for each set of models that is left.
+# With more methods than this, the details are not a table but a sentence for each set of models that is left.
 MOST_ROWS = 12
-# So many cells with the same problem are named.
+# The maximum number of cells with the same problem that are named.
 MOST_CELLS = 3
 
 
 def section(folder: Path, group: Group) -> Section:
-    """All about one scenario."""
+    """The section on one scenario."""
     name = plain(group.scenario.name)
     number = TABLES.get(name)
     models = f", {count(group.models, 'model')}" if group.models else ""
@@ -40,7 +40,7 @@ def section(folder: Path, group: Group) -> Section:
 
 
 def numbers(group: Group) -> Table:
-    """Tests, reduction and minutes, with the paper's where it has some."""
+    """Tests, reduction and minutes, beside the paper's if it has them."""
     beside = _has_theirs(group)
     head: tuple[str, ...] = ("partitioning, prioritization", "tests", "% reduction", "minutes")
     if beside:
@@ -74,13 +74,13 @@ def _has_theirs(group: Group) -> bool:
 
 
 def behind(group: Group) -> Table:
-    """What the numbers rest on: re-runs, how often the whole world fails, what is left, and what came of trying that again."""
+    """Details: re-runs, how often the whole world fails, what is left, and the check of it."""
     head = ("method", "re-runs", "f in the whole world", "models left", "left out once more", "least tests")
     return Table(head, tuple(_behind(row) for row in group.rows), frozenset({1, 2, 5}))
 
 
 def _in_short(group: Group) -> Iterator[Paragraph]:
-    """The same of many methods, a sentence for each set of models that is left."""
+    """The details of many methods, a sentence for each set of models that is left."""
     sets: dict[tuple[str, ...], list[Found]] = {}
     for each in group.minimal:
         sets.setdefault(each.left, []).append(each)
@@ -125,7 +125,7 @@ def _names(left: tuple[str, ...]) -> Iterator[Part]:
 
 
 def _again(minimal: tuple[Found, ...]) -> str:
-    """f with all that is left, and without each, with new seeds."""
+    """How often f shows with new seeds: with all that is left, and without each model."""
     checks = [each.check for each in minimal if each.check is not None]
     if not checks:
         return "–"
@@ -136,7 +136,7 @@ def _again(minimal: tuple[Found, ...]) -> str:
 
 
 def _problems(group: Group) -> Iterator[Paragraph]:
-    """What has no minimal environment, and why: said, not hidden."""
+    """The cells without a minimal environment, and why."""
     cells: dict[str, list[str]] = {}
     for row in group.rows:
         for each in row.found:
@@ -147,12 +147,12 @@ def _problems(group: Group) -> Iterator[Paragraph]:
         yield say(f"{which}: {problem}.", notice=True)
 
 
-# A comparison needs some methods; without it, the tables tell all.
+# A comparison needs at least this many methods.
 FEWEST = 4
 
 
 def best(groups: Sequence[Group]) -> Section | None:
-    """All methods, those that needed the fewest tests first; None where few were tried."""
+    """All methods, the fewest tests first; None if too few were tried."""
     methods = [row.method for row in groups[0].rows]
     if len(methods) < FEWEST or not any(group.minimal for group in groups):
         return None
@@ -162,21 +162,21 @@ def best(groups: Sequence[Group]) -> Section | None:
     shown, likely = (tuple(_bound(group, bound) for group in groups) for bound in (least_to_show, least_to_find))
     head = ("method", *(f"{plain(group.scenario.name)}, tests" for group in groups), "times the bound, mean")
     bounds = (
-        ("least to show that the end is minimal", *shown, "1.0"),
-        ("least to find it, if all is as likely", *likely, "–"),
+        ("minimum to show that what is left is minimal", *shown, "1.0"),
+        ("minimum to find it, if all sets are equally likely", *likely, "–"),
     )
     table = Table(head, (*bounds, *rows), frozenset(range(1, len(head))))
     return Section("Which is best where", (*_words(groups), table, _about_the_bound()))
 
 
 def _rank(entry: tuple[Method, tuple[Row, ...]]) -> tuple[bool, float]:
-    """By the mean of how many times the bound they took; what is not minimal everywhere comes last."""
+    """By the mean ratio of tests to bound; methods that are not minimal everywhere come last."""
     times = _times(entry[1])
     return times is None, times or 0.0
 
 
 def _times(rows: Sequence[Row]) -> float | None:
-    """The geometric mean, in which a scenario counts as much as another one however many tests it takes."""
+    """The geometric mean of tests to bound: each scenario has the same weight, whatever its number of tests."""
     ratios = [row.tests / row.bound for row in rows if row.tests is not None and row.bound]
     if len(ratios) < len(rows):
         return None
@@ -198,7 +198,7 @@ def _cell(row: Row, fewest: float | None) -> Cell:
 
 
 def _bound(group: Group, bound: Callable[[int, int, int, int], int]) -> str:
-    """It depends on how many models are left, and so on the cell: the range."""
+    """The bound as a range, since cells may differ in how many models are left."""
     bounds = sorted({least_of(each, bound) for each in group.minimal})
     if not bounds:
         return "–"
@@ -217,15 +217,19 @@ def _words(groups: Sequence[Group]) -> list[Block]:
             first, last = min(rows, key=_fewest), max(rows, key=_fewest)
             equal = sum(row.tests == first.tests for row in rows) - 1
             also = f" and {count(equal, 'other')}" if equal else ""
-            words = f": {first.method.label}{also} with {first.tests:g} tests; the most takes {last.method.label}, {last.tests:g}."
+            words = (
+                f": {first.method.label}{also} with the fewest tests, {first.tests:g}; "
+                f"{last.method.label} with the most, {last.tests:g}."
+            )
             lines.append(say(Strong(plain(group.scenario.name)), words))
     return lines
 
 
 def _about_the_bound() -> Block:
     return say(
-        "Ranked by how many times the first bound they took (geometric mean over the scenarios). No method needs less than that: "
-        "after the baseline f has to show in what is left, and each of its models has to be left out in vain, with all re-runs. "
-        "The second bound is for methods that know nothing: what it takes on average to tell which set of so many models it is, "
-        "if each is as likely. Who tries first what is near the failure may need less. A mark (◂) is on the fewest."
+        "Ranked by the ratio of tests to the first bound (geometric mean over the scenarios). No method needs fewer tests: after "
+        "the baseline, f has to show in what is left, and each of its models has to be left out without success, with all re-runs. The "
+        "second bound is for methods without any knowledge: the mean number of tests to find the needed set of models, if all "
+        "sets of that size are equally likely. A method that first tries models near the failure may need fewer. The mark (◂) "
+        "shows the fewest tests."
     )

@@ -1,4 +1,4 @@
-"""Runs the cells of a study, several at the same time, each with its own engine; goes on with run files that exist."""
+"""Runs the cells of a study, several at the same time, each with its own engine; continues existing run files."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from ddenv.study.results import difference, read_check, start_check, write_check
 from ddenv.study.study_folder import check_path, run_path
 
 POLL = 0.2
-# More workers than this mostly make tests that one reduction does not need.
+# With more workers, most of the additional tests are not needed.
 PER_CELL = 2
 
 
 @dataclass
 class Work:
-    """A cell in work, with so many `workers`. `engine` is None while one works on it that another study started.
+    """A cell in work, with this number of `workers`. `engine` is None while an engine of another study works on it.
 
-    `problem` says why it could not be brought to its end this time. Before, `made_before` tests were made, and its last event was
-    number `known`.
+    `problem` says why it did not end this time. Earlier studies made `made_before` tests, and its last event was number
+    `known`.
     """
 
     cell: Cell
@@ -51,7 +51,7 @@ Look = Callable[[Sequence[Work], Sequence[Cell], Sequence[Work]], None]
 
 
 def is_done(folder: Path, cell: Cell) -> bool:
-    """Whether nothing is left to do for a cell. Raises UserError where its run file is of something else."""
+    """Whether nothing is left to do for a cell. Raises UserError if its run file has other settings."""
     path = run_path(folder, cell)
     if not path.exists():
         return False
@@ -62,7 +62,7 @@ def is_done(folder: Path, cell: Cell) -> bool:
     except UserError as error:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
-        raise UserError(f"{path}: was made of {other}; choose another folder with -o, or delete {path.parent}")
+        raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
     if state.status != "finished" or _all_broke(state) or engine_is_alive(path):
         return False
     return not state.minimal or read_check(folder, cell, state.environment) is not None
@@ -72,18 +72,18 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
     """Makes `cells` with `jobs` workers in all; cells that take long should come first.
 
     `look(running, waiting, ended)` is called several times a second. On KeyboardInterrupt the engines are stopped, and it
-    is raised again. Raises UserError where a run file cannot be made; the engines are stopped then, too.
+    is raised again. Raises UserError if a run file cannot be created, and then stops the engines, too.
     """
     waiting = list(cells)
     running: list[Work] = []
     ended: list[Work] = []
-    # What is ignored stays so: a study under nohup outlives its terminal.
+    # Ignored signals stay ignored: a study under nohup outlives its terminal.
     asked = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) != signal.SIG_IGN]
     before = [(each, signal.signal(each, _interrupt)) for each in asked]
     try:
         while waiting or running:
             while waiting and (free := jobs - sum(each.workers for each in running)) > 0:
-                # What is left is shared out among the cells that are left.
+                # Free workers are shared among the waiting cells.
                 workers = max(min(PER_CELL, free), free // len(waiting))
                 running.append(_begin(folder, waiting.pop(0), workers))
             for each in tuple(running):
@@ -96,7 +96,7 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
                 time.sleep(POLL)
     finally:
         _stop(running)
-        # The terminal may be what is gone.
+        # The terminal may be gone.
         with contextlib.suppress(OSError):
             look(running, waiting, ended)
         for each in running:
@@ -117,7 +117,7 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
         if all_broke:
             path.unlink()
     if not path.exists():
-        # What an earlier run of this name came to is not this one's.
+        # A check of an earlier run with this name does not hold for this one.
         check_path(folder, cell).unlink(missing_ok=True)
         create_run(cell.scenario, path)
     each = Work(cell, path, workers, RunFile(path))
@@ -130,17 +130,17 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
 
 
 def _has_ended(folder: Path, each: Work) -> bool:
-    """Takes in what is new of a cell, and goes on to its check when its reduction has ended."""
+    """Reads a cell's new events, and starts its check when its reduction has ended."""
     if each.check is not None:
         return _check_has_ended(folder, each, *each.check)
-    # Asked before the events are read: what is written in between is not missed. An engine that a killed study has left may have
-    # begun just before ours, which then gave up.
+    # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours, and
+    # then ours gave up.
     at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
     each.state = fold(each.file.events(each.state.revision), each.state)
     if at_work:
         return False
     if each.state.status != "finished":
-        # An engine that died before it wrote anything has left the reason of the one before.
+        # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
         ended = each.state.ended and each.state.revision > each.known
         each.problem = each.state.reason if ended else last_words(each.path)
         return True
@@ -162,22 +162,22 @@ def _check_has_ended(folder: Path, each: Work, program: subprocess.Popen[bytes],
 
 
 def _all_broke(state: RunState) -> bool:
-    """Whether the simulator broke in all baseline runs: it may have been mended since."""
+    """Whether the simulator broke in all baseline runs: it may work now."""
     broke = all(test.outcome in ("error", "timeout") for test in state.finished_tests)
     return state.status == "finished" and state.baseline is None and broke
 
 
 def tests_made(state: RunState) -> int:
-    """How many tests were made in a run, and not taken over from another one."""
+    """How many tests were made in a run, and not reused from another one."""
     return state.tests_done - sum(test.taken for test in state.tests)
 
 
 def _stop(running: Sequence[Work]) -> None:
-    """Engines write down that they stop; the runs of a check are made again another time."""
+    """Stops engines, which record it, and checks, which are made again later."""
     for each in running:
         if each.check is not None:
             each.check[0].terminate()
-    # Those without one are worked on by an engine that an earlier, killed study has left.
+    # On cells without an engine of ours, the engine of an earlier, killed study works.
     left = [each for each in running if each.check is None and each.engine is None and engine_is_alive(each.path)]
     for each in left:
         with contextlib.suppress(UserError):
