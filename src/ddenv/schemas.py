@@ -1,6 +1,6 @@
 """Partitionings, prioritizations and algorithms by name: where each is implemented, and its explanation.
 
-Listing and explaining them imports nothing, so views know all of them without scikit-learn. Other packages add their own
+Listing and explaining them imports nothing, so views can show all of them without scikit-learn. Other packages add their own
 through entry points in the groups `ddenv.partitionings`, `ddenv.prioritizations` and `ddenv.algorithms`.
 """
 

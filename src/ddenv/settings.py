@@ -16,7 +16,7 @@ from ddenv.errors import printable
 
 Value = int | float | str | bool | None
 
-# What a world may have without being refused for it, if the user says so.
+# Kinds of elements that the user can have skipped instead of refusing the world.
 Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
 IGNORABLE: tuple[str, ...] = get_args(Ignorable)
 
@@ -29,10 +29,10 @@ Shown = Literal["method", "basic", "more", "scenario"]
 class Setting:
     """A setting and all that is known about it.
 
-    `meaning` is a short phrase for every place, without a full stop; `more` are sentences for those with room. `cost` says in a
-    sentence what the setting costs. A value is at least `least`, greater than `above`, at most `most`. `none` is the word for no
-    value, where there may be none. `printed` is the paper's value. `used_by` are the algorithms or partitionings that look at it,
-    where not all do. `stored` is False for what only stands for other settings. The last four come from the declaration.
+    `meaning` is a short phrase without a full stop; `more` has further sentences, shown if they fit. `cost` is a sentence on
+    the cost. A value is at least `least`, greater than `above`, at most `most`. `none` is the word for no value, if that is
+    allowed. `printed` is the paper's value. `used_by` are the algorithms or partitionings that use it, if not all do. `stored`
+    is False for a setting that only sets others. The last four come from the declaration.
     """
 
     default: Value
@@ -56,7 +56,7 @@ class Setting:
 
     @property
     def key(self) -> str:
-        """Its place in a scenario, such as `reduction.iterations`; "" where it has none."""
+        """Its place in a scenario, such as `reduction.iterations`; "" if it has none."""
         return f"{self.section}.{self.name}" if self.section else ""
 
     @property
@@ -76,7 +76,7 @@ class Setting:
 
     @property
     def range(self) -> str:
-        """The numbers that it may be, in words."""
+        """The allowed numbers, in words."""
         if self.least is not None:
             return f"{self.least:g} or more" if self.most is None else f"{self.least:.0f} to {self.most:.0f}"
         above = "any number" if self.above is None else f"more than {self.above:g}"
@@ -173,7 +173,7 @@ class Reduction:
     )
     skip: Literal["known", "implied"] = setting(
         "implied",
-        "what is not tested: sets judged before (known), or also all that lacks what was missed before (implied)",
+        "which candidates are skipped: sets judged before (known), or also sets without a group that was needed before (implied)",
         printed="known",
         used_by=("ddenv",),
     )
@@ -259,7 +259,7 @@ SETTINGS: dict[str, Setting] = {
 OPTIONS = tuple(each for each in SETTINGS.values() if each.option)
 CHANGEABLE = tuple(each.name for each in SETTINGS.values() if each.may_change)
 PRINTED: dict[str, Value] = {each.name: each.printed for each in SETTINGS.values() if each.printed is not None}
-# Not in a scenario: it changes nothing about the result.
+# Not in a scenario, since it does not change the result.
 JOBS = Setting(None, "tests at the same time", least=1, most=1024, shown="basic", name="jobs", kind=int)
 
 
@@ -280,7 +280,7 @@ def read(scenario: Mapping[str, Any], one: Setting) -> Value:
 
 
 def put(scenario: Mapping[str, dict[str, Any]], one: Setting, value: Value) -> None:
-    """Writes a setting to a scenario as plain data, as it is: whether it is allowed, the scenario's model says."""
+    """Writes a setting to a scenario as plain data, unchecked: the scenario's model checks it."""
     section = scenario[one.section]
     if one.stored:
         section[one.name] = value

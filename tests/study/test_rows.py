@@ -110,7 +110,7 @@ def test_which_is_best_where(tmp_path):
     """In the first scenario the last method needs the fewest tests, on the whole the second one does."""
     _, _, both = cells(tmp_path, 40, 20, 30, 90, 19, *(40, 20, 30, 90, 80))
     rows = ranking(best(both))
-    # The baseline's four, f once, and the model left out without success; log2(16) bits, of which a test that costs 1 or 4 gives 0.46.
+    # The baseline's four, f once, and the model left out without success; log2(16) bits: a test that costs 1 or 4 gives 0.46.
     assert [row[1:] for row in rows[:2]] == [("9", "9", "1.0"), ("13", "13", "–")]
     assert [row[0] for row in rows[2:]] == [
         *(

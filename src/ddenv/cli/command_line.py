@@ -36,7 +36,7 @@ from ddenv.version import __version__
 def app(context: click.Context, /, **reading: Any) -> None:
     """Finds the few models of a world that make a robot fail. Without a command: the workbench.
 
-    The options are on how the workbench reads worlds; commands that read worlds have them, too.
+    These options set how the workbench reads worlds; commands that read worlds have them, too.
     """
     if context.invoked_subcommand is None:
         from ddenv.workbench.launch import run_workbench
@@ -44,18 +44,18 @@ def app(context: click.Context, /, **reading: Any) -> None:
         if any(reading.values()):
             from ddenv.runs.scenarios import reading_of
 
-            # A mistake in them is reported before the screen is taken.
+            # Errors in them are reported before the screen opens.
             reading_of(**reading)
         context.exit(run_workbench(reading=reading))
     if any(reading.values()):
-        raise UserError(f"options on how to read worlds go behind the command: ddenv {context.invoked_subcommand} ...")
+        raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
 
 
 def _cannot_print(error: OSError) -> int:
-    """Whoever reads our output may be gone (as with `| head`), or its disk full. Raises anything else again."""
+    """Handles output that nobody reads any more (as with `| head`), or a full disk. Raises all other errors again."""
     if not isinstance(error, BrokenPipeError) and error.filename is not None:
         raise error
-    # What could not be written would be tried again at the end of the program.
+    # Otherwise Python tries to write the rest again at exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if isinstance(error, BrokenPipeError):
         return 1
@@ -81,7 +81,7 @@ for command in (
 
 
 def main() -> None:
-    # A terminal that lacks a letter of a model's name shows its number instead.
+    # A terminal without a letter of a model's name shows its code instead.
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

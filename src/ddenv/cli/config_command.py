@@ -1,4 +1,4 @@
-"""`ddenv config`: the file with a user's own keys and theme, and what can stand in it."""
+"""`ddenv config`: the file with a user's own keys and theme, and what it may contain."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import click
 
 
 @click.command("config")
-@click.option("--example", is_flag=True, help="Print a file with every action, to begin with.")
+@click.option("--example", is_flag=True, help="Print an example file with every action.")
 def config_command(example: bool) -> int:
-    """Shows where the file with your keys and your theme is, and lists all actions with their keys."""
+    """Shows the path of the file with your keys and theme, and lists all actions with their keys."""
     from ddenv.workbench.help.config import example_lines, lines
 
     print("\n".join(example_lines() if example else lines()))

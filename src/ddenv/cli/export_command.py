@@ -1,4 +1,4 @@
-"""`ddenv export`: the world that a run has left, as files."""
+"""`ddenv export`: the environment of a run, as files."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ LONGEST_URI = 80
 
 @click.command("export")
 @click.argument("run")
-@click.option("--sdf", type=Path, help="Write the environment that is left as an SDF world.")
+@click.option("--sdf", type=Path, help="Write the environment as an SDF world.")
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 def export_command(run: str, sdf: Path | None, scenario: Path | None) -> int:
-    """Writes the world that RUN has left."""
+    """Writes the environment of RUN, the models that are left, to files."""
     from ddenv.runs.export import export_world
     from ddenv.runs.folder import find_run
 
@@ -32,7 +32,7 @@ def export_command(run: str, sdf: Path | None, scenario: Path | None) -> int:
 
 
 def announce_needs(sdf: Path, uris: list[str]) -> None:
-    """Names the other files that a written world still needs: it keeps its text, and with it their names."""
+    """Lists the other files that a written world still needs, since it keeps their names."""
     from ddenv.map.names import shortened
     from ddenv.words import first_of
 

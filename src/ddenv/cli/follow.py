@@ -1,4 +1,4 @@
-"""Follows a run without a screen: plain lines, or on a terminal one that is drawn over; and the summary at its end."""
+"""Follows a run without a screen: plain lines, or on a terminal one line that is updated; and a summary at the end."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ddenv.runs.programs import last_words, stop_engines
 from ddenv.words import count, headline, news
 
 POLL = 0.2
-# Nobody reads more names than this in a line.
+# The maximum number of names in a line.
 MOST_NAMES = 12
 
 
@@ -32,7 +32,7 @@ class Interrupted(Exception):
 
 
 def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool) -> tuple[int, RunState]:
-    """Prints what happens and how it ended, as one JSON object if asked; returns the exit code and the last state."""
+    """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
     try:
         state = follow(path, engine, sys.stderr if as_json else sys.stdout)
         code = 0 if state.minimal else 1
@@ -41,7 +41,7 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
         state, code = interrupted.state, 0 if interrupted.state.minimal else 130
     print(json.dumps(summary(state, path)) if as_json else "\n".join(summary_lines(state, path)), flush=True)
     if code == 130:
-        print(f"interrupted; go on with: ddenv resume {path}", file=sys.stderr)
+        print(f"interrupted; continue with: ddenv resume {path}", file=sys.stderr)
     return code, state
 
 
@@ -65,7 +65,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState
             raise Interrupted(state) from None
         state = _update(file, state, view)
     view.close()
-    # An engine that said nothing at all did not start, unless there was nothing left to do.
+    # An engine without any output did not start, unless there was nothing left to do.
     silent = state.revision == before and engine.returncode != 0
     if silent or not state.ended:
         raise UserError(last_words(path))
@@ -87,7 +87,7 @@ def _update(file: RunFile, state: RunState, view: _Line | _Plain) -> RunState:
 
 
 class _Plain:
-    """For logs and pipes: one line for each event that is worth it."""
+    """For logs and pipes: one line for each important event."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -105,7 +105,7 @@ class _Plain:
 
 
 class _Line(_Plain):
-    """For terminals: the same lines, and below them one that is always the latest state."""
+    """For terminals: the same lines, and below them the latest state."""
 
     def happened(self, kind: str, before: RunState, after: RunState) -> None:
         line = news(kind, before, after)
@@ -159,7 +159,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
 
 
 def broken(state: RunState) -> list[str]:
-    """Why the last test that broke did, if one did: such tests count as tests without the failure."""
+    """Why the last broken test broke, if any did: broken tests count as tests without the failure."""
     tests = [test for test in state.tests if test.outcome in ("error", "timeout")]
     return [f"{count(len(tests), 'test')} broke, the last one: {tests[-1].failure}"] if tests else []
 

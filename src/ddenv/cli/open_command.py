@@ -7,9 +7,7 @@ import click
 
 @click.command("open")
 @click.argument("run")
-@click.option(
-    "--watch", is_flag=True, help="Only look: nothing is changed, and nothing is written, not even beside RUN."
-)
+@click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
 def open_command(run: str, watch: bool) -> int:
     """Attaches the workbench to RUN (a name or a file)."""
     from ddenv.runs.folder import find_run

@@ -1,4 +1,4 @@
-"""What several commands share: options, the scenario that they ask for, and how a longer wait is announced."""
+"""What several commands share: options, reading a scenario, and announcing slow steps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ddenv.settings import IGNORABLE, JOBS, OPTIONS, Setting
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
-    """Comma-separated finite numbers, at least and at most so many."""
+    """Comma-separated finite numbers, with a minimum and a maximum number of them."""
 
     def __init__(self, name: str, fewest: int, most: int) -> None:
         self.name, self.fewest, self.most = name, fewest, most
@@ -52,7 +52,7 @@ def _together(*options: Option) -> Option:
 
 
 def setting_options(*, only: Iterable[str] = (), without: Iterable[str] = ()) -> Option:
-    """An option for each setting that has one, in place of what the scenario says."""
+    """An option for each setting that has one, which replaces the scenario's value."""
     chosen = (one for one in OPTIONS if (not only or one.name in only) and one.name not in without)
     return _together(*map(_option, chosen))
 
@@ -78,29 +78,29 @@ def jobs_option(what: str = "Tests") -> Option:
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
 
-# Which scenario, and what is in it: for commands that take one.
+# For commands that take a scenario.
 scenario_options = _together(
     click.option(
         "--spawn", type=Numbers("x,y,z,yaw", 3, 4), help="Where the robot starts, m and rad (for an SDF world)."
     ),
-    click.option("--goal", type=Numbers("x,y", 2, 2), help="Where it has to go, m (for an SDF world)."),
+    click.option("--goal", type=Numbers("x,y", 2, 2), help="The robot's goal, m (for an SDF world)."),
     click.option("--world", type=Path, help="Another SDF world in place of the scenario's."),
 )
 
-# How the world's SDF is read where it names other files: for commands that read one.
+# For commands that read an SDF world with references to other files.
 reading_options = _together(
     click.option("--model-path", type=Path, multiple=True, help="A folder of models, searched first; may be repeated."),
     click.option(
         "--stand-in",
         multiple=True,
         metavar="URI=SHAPE",
-        help="A shape for what cannot be found there, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
+        help="A shape for a missing model or mesh, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
     ),
     click.option(
         "--ignore",
         multiple=True,
         type=click.Choice(IGNORABLE),
-        help="Leave such elements out instead of refusing the file; may be repeated.",
+        help="Skip such elements instead of refusing the file; may be repeated.",
     ),
 )
 
@@ -121,11 +121,11 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
     if spawn is None or goal is None:
         raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
     if world is not None:
-        raise UserError(f"--world: goes with a scenario; {name} is a world already")
+        raise UserError(f"--world: only for a scenario; {name} is a world")
     scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
     return with_options(scenario, reading=reading_of(**reading), **others)
 
 
 def announce(line: str) -> None:
-    """Says that something takes longer, without disturbing what is printed for programs."""
+    """Announces a slow step on stderr, so that programs can read stdout."""
     print(printable(line), file=sys.stderr, flush=True)

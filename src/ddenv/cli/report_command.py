@@ -20,7 +20,7 @@ import click
 )
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def report_command(run: str, file: Path, force: bool) -> int:
-    """Writes the result of RUN as one page to read, print or mail."""
+    """Writes a report on RUN: one page to read, print or mail."""
     from ddenv.report.report import write_report
     from ddenv.runs.folder import find_run
 

@@ -1,4 +1,4 @@
-"""`ddenv resume`: goes on with a reduction."""
+"""`ddenv resume`: continues a reduction."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def resume_command(run: str, jobs: int, as_json: bool) -> int:
 
     path = find_run(run)
     with RunFile(path) as file, engine_lock(path):
-        # A way back that was asked for while no engine worked ends in a pause, and nobody is here to end it.
+        # Going back while no engine works ends in a pause, and without a screen nobody can end it.
         if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
             file.send("resume")
-    # Nobody is here to ask.
+    # Without a screen there is nobody to ask.
     return follow_to_summary(path, start_engine(path, jobs, accept_mode="automatic"), as_json)[0]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @jobs_option()
 @click.option("--name", help="Name of the run.")
 @click.option(
-    "--output", type=Path, help="A .ddenv file or a folder for the run; or a .sdf file for the minimal world."
+    "--output", type=Path, help="A .ddenv file or a folder for the run; or an .sdf file for the minimal world."
 )
 @json_option
 def run_command(scenario: str, name: str | None, output: Path | None, jobs: int, as_json: bool, **options: Any) -> int:
@@ -53,7 +53,7 @@ def run_command(scenario: str, name: str | None, output: Path | None, jobs: int,
 
 
 def announce_notes(world: World, as_json: bool) -> None:
-    """Counts the parts of a world that were not read as they are written, if there are any."""
+    """Counts the parts of a world that were replaced or ignored, if any."""
     from ddenv.words import count
 
     if world.notes:

@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:
     if value is not None:
         raise UserError(
-            "--host: the workbench is served on 127.0.0.1 alone, since whoever reaches it acts as you; "
+            "--host: the workbench is only served on 127.0.0.1, since anybody who can open it acts as you; "
             "from another machine use ssh -L"
         )
 

@@ -42,7 +42,7 @@ from ddenv.cli.options import jobs_option, setting_options
     default=Path("study"),
     show_default=True,
     metavar="DIR",
-    help="Where the study is written; one that is there goes on.",
+    help="Folder of the study; an existing study continues.",
 )
 @setting_options(without=("pair", "algorithm", "seed", "budget", "timeout"))
 def study_command(
@@ -50,7 +50,7 @@ def study_command(
 ) -> int:
     """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
-    Stopped at any moment, the same command goes on where it was. Each reduction is a run in DIR/runs, for 'ddenv open'.
+    It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
     With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
     """
     from ddenv.study.conduct import conduct

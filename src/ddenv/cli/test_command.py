@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @setting_options(only=("timeout",))
 @reading_options
 @click.option("--keep", help="Only these models, by name, separated by commas.")
-@click.option("--minimal", is_flag=True, help="Only the models that the run has left.")
+@click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up.")
@@ -72,7 +72,7 @@ def test_command(
 
 
 def _subject(name: str, options: Mapping[str, Any]) -> Subject:
-    """A run where there is one of that name, else a scenario."""
+    """A run if there is one of that name, else a scenario."""
     from ddenv.engine.single_test import Subject, subject_of_run
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
@@ -82,7 +82,7 @@ def _subject(name: str, options: Mapping[str, Any]) -> Subject:
     if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
         if any(value is not None and value != () for value in options.values()):
             raise UserError(
-                "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore go with a scenario; "
+                "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore are only for scenarios; "
                 "a run keeps its own"
             )
         with RunFile(path) as file:

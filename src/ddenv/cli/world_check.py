@@ -1,4 +1,4 @@
-"""What was understood of a world: a table for people, plain data for programs."""
+"""How a world was read: a table for people, plain data for programs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NAMES: dict[type, str] = {
 }
 LONGEST_NAME, SHORTEST_NAME = 34, 10
 GAP = "  "
-# The notes of a model stand in a row twice: with what differs between models, and as mere numbers.
+# A row has the notes of a model twice: with details, and as numbers only.
 HEADER = ("model", "kind", "links", "shapes", "size, m", "centre x, y, z, m", "yaw", "notes", "notes")
 TO_THE_RIGHT = (2, 6)
 # Which columns are shown, from wide terminals to narrow ones.
@@ -47,7 +47,7 @@ CHOICES = (
     (0, 1, 4, 5, 6, 8),
     (0, 1, 4, 5, 8),
 )
-# So many of the models that must stay are named.
+# The maximum number of models that must stay to be named.
 MOST_ANCHORS = 5
 
 
@@ -97,7 +97,7 @@ def kind(model: Model) -> str:
 def lines(world: World, columns: int | None = None) -> list[str]:
     """The table: a line for each model, then the notes by number, then the totals.
 
-    No line is wider than `columns`, for which the table leaves out what matters least; with None nothing is left out.
+    No line is wider than `columns`, so the table leaves out the least important columns; with None it has all.
     """
     numbers = {text: number for number, text in enumerate(dict.fromkeys(map(_text, world.notes)), start=1)}
     by_model: dict[str, dict[str, str]] = {}
@@ -112,7 +112,7 @@ def lines(world: World, columns: int | None = None) -> list[str]:
 
 
 def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:
-    """The rows, with as many of their columns as there is room for, and names that are shortened for the last bit."""
+    """The rows, with as many columns as fit, and names shortened if needed."""
     widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
     wide = [sum(widths[i] for i in choice) + len(GAP) * (len(choice) - 1) for choice in CHOICES]
     fitting = (choice for choice, each in zip(CHOICES, wide, strict=True) if columns is None or each <= columns)
@@ -132,7 +132,7 @@ def _totals(world: World) -> str:
     counts = {which: sum(note.kind == which for note in world.notes) for which in ("replaced", "ignored")}
     said = ", ".join(f"{number} {which}" for which, number in counts.items() if number)
     models = f"{count(len(world.models), 'model')}, {len(world.elements())} can be removed"
-    return f"{models}{_staying(world)}; {said or 'everything was taken as it is written'}"
+    return f"{models}{_staying(world)}; {said or 'nothing was replaced or ignored'}"
 
 
 def _staying(world: World) -> str:

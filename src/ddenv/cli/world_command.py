@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @click.group("world")
 def world_group() -> None:
-    """Looks at SDF worlds: what was understood of them, and from above."""
+    """Shows how SDF worlds are read, draws their maps, and writes clean worlds."""
 
 
 @world_group.command()
@@ -28,7 +28,7 @@ def world_group() -> None:
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
-    """Shows what is read from FILE: each model, what was replaced or ignored, and why."""
+    """Shows how FILE is read: each model, what was replaced or ignored, and why."""
     from ddenv.cli.world_check import lines, report
 
     world = _read(file, reading)
@@ -40,8 +40,8 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 @world_group.command()
 @click.argument("file", type=Path)
 @reading_options
-@click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark where a robot starts, m and rad.")
-@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark where it has to go, m.")
+@click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
+@click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
 def show(
     file: Path, spawn: tuple[float, ...] | None, goal: tuple[float, float] | None, svg: Path | None, **reading: Any

@@ -17,7 +17,7 @@ from ddenv.map.raster import FINEST, View, arrow, extent
 from ddenv.words import count
 from ddenv.world.model import World
 
-# Columns of numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.
+# Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.
 NUMBERS, AXIS, AROUND = 6, 8, 4
 LEAST_COLUMNS, LEAST_ROWS = 40, 12
 LONGEST_NAME, SHORTEST_NAME = 28, 14
@@ -53,7 +53,7 @@ def terminal_map(
     """The world from above, without its ground: at most `rows` lines of at most `columns` characters (not less than 12 and 40).
 
     With `color` models are blocks of 24-bit colour; without, there is not one escape code, and models are areas of their letters.
-    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they are to be marked; all finite.
+    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they should be marked; all finite.
     """
     columns, rows = max(columns, LEAST_COLUMNS), max(rows, LEAST_ROWS)
     models = plan(world)
@@ -105,14 +105,14 @@ def _numbers(each: Drawn) -> tuple[str, str]:
 
 
 def _widths(entries: Sequence[Entry], columns: int) -> list[int]:
-    """Of the legend's columns: the names get what the numbers leave."""
+    """The widths of the legend's columns: the names get the rest."""
     own = [max(map(width, column)) for column in zip(HEADER, *entries, strict=True)]
     own[1] = max(SHORTEST_NAME, min(own[1], LONGEST_NAME, columns - own[0] - own[2] - own[3] - 3 * len(GAP)))
     return own
 
 
 def _legend(entries: Sequence[Entry], columns: int, most: int) -> list[str]:
-    """At most `most` lines with as many models as there is room for, from top to bottom and then from left to right."""
+    """At most `most` lines with as many models as fit, from top to bottom and then from left to right."""
     if not entries:
         return []
     widths = _widths(entries, columns)
@@ -142,11 +142,11 @@ def _cell(entry: Entry, widths: Sequence[int]) -> str:
     return f"{left}{GAP}{center:>{widths[2]}}{GAP}{size:>{widths[3]}}"
 
 
-# Where things stand.
+# The layout.
 
 
 def _layout(spans: np.ndarray, columns: int, rows: int, entries: Sequence[Entry]) -> _Layout:
-    """The one of both layouts in which the map is larger; `spans` is what it shows, m."""
+    """The layout with the larger map; `spans` is what it shows, m."""
     widths = _widths(entries, columns // 2)
     wide = sum(widths) + 3 * len(GAP)
     beside = _Layout(columns - AXIS - len(GAP) - wide, rows - AROUND, rows - 1, True)
@@ -164,7 +164,7 @@ def _scale(spans: np.ndarray, layout: _Layout) -> float:
 
 
 def _view(low: np.ndarray, high: np.ndarray, layout: _Layout) -> View:
-    """As many cells as the world needs, so that the frame fits tightly."""
+    """The number of cells that the world needs, so that the frame fits tightly."""
     scale = _scale(high - low, layout)
     x, y = ((low + high) / 2).tolist()
     columns = math.ceil((high[0] - low[0]) / scale - 1e-6)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ddenv.map.names import width
 
-# Nothing can be read in less, columns.
+# The minimum width for readable text, columns.
 LEAST = 8
 
 
@@ -30,7 +30,7 @@ def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:
 
 
 def cut(text: str, columns: int | None) -> str:
-    """`text` without its end, where it is wider than `columns`."""
+    """`text` without its end if it is wider than `columns`."""
     if columns is None or width(text) <= columns:
         return text
     text = text[:columns]

@@ -1,4 +1,4 @@
-"""What a report is made of, whatever it is written as: headings, sentences, tables, pictures. Plain frozen data."""
+"""The parts of a report in any format: headings, sentences, tables, pictures. Plain frozen data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Strong:
-    """Words that stand out."""
+    """Words in bold."""
 
     text: str
 
@@ -50,7 +50,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A drawing. `svg` takes its colours from the classes of `style.css`; `told` says it in words."""
+    """A drawing. `svg` takes its colours from the classes of `style.css`; `alternative` describes it in words."""
 
     name: str
     svg: str
@@ -59,7 +59,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Lines to type or to read as they are. With `folded`, they are shown when the reader asks for what it says."""
+    """Lines shown as they are, such as commands. With a `folded` title, they open on a click."""
 
     lines: tuple[str, ...]
     folded: str = ""
@@ -70,7 +70,7 @@ Block = Paragraph | Table | Picture | Code
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A heading with what is below it."""
+    """A heading with its blocks."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -78,7 +78,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A whole report: what it is of, the run in a few words, `figures` (number, what it counts), and all the rest."""
+    """A whole report: its name, the result in a few words, `figures` (number, what it counts), and its sections."""
 
     name: str
     verdict: str
@@ -89,12 +89,12 @@ class Report:
 
 
 def parts(cell: Cell) -> tuple[Part, ...]:
-    """What a cell consists of."""
+    """The parts of a cell."""
     return cell if isinstance(cell, tuple) else (cell,)
 
 
 def plain(text: object) -> str:
-    """`text` on one line without what would steer a terminal or turn the direction of the text around it."""
+    """`text` on one line without characters that control a terminal or change the direction of text."""
     return printable(" ".join(str(text).split()))
 
 
@@ -104,7 +104,7 @@ def say(*words: Part, notice: bool = False) -> Paragraph:
 
 
 def moment(time: float) -> str:
-    """Unix time, s, as date and time in UTC: a report is read anywhere. "" for what is no time."""
+    """Unix time, s, as date and time in UTC: a report is read anywhere. "" for an invalid time."""
     try:
         return f"{datetime.fromtimestamp(time, UTC):%Y-%m-%d %H:%M:%S}"
     except (OverflowError, OSError, ValueError):
@@ -123,6 +123,6 @@ def thousands(number: int) -> str:
 
 
 def section(data: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """A part of a scenario; an empty one where a damaged file has something else."""
+    """A part of a scenario; empty if a damaged file has something else."""
     value = data.get(key)
     return value if isinstance(value, dict) else {}

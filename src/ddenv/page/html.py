@@ -9,7 +9,7 @@ from pathlib import Path
 from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts, plain
 
 HERE = Path(__file__).parent
-# Nothing is fetched or run, whatever a name in a run file may try.
+# Nothing is fetched or run, whatever a run file contains.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 

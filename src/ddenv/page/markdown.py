@@ -26,7 +26,7 @@ from ddenv.page.blocks import (
 
 HERE = Path(__file__).parent
 _MARKUP = re.compile(r"([\\`*_\[\]<>|~$&])")
-# What would make a heading, a list or a quotation of a line that begins with it.
+# Characters that start a heading, a list or a quotation at the beginning of a line.
 _BEGINNING = re.compile(r"^(\d*)([#+=.)-])")
 
 
@@ -62,7 +62,7 @@ def _file(stem: str, picture: Picture) -> str:
 
 
 def _alone(svg: str, style: str) -> str:
-    """A picture that brings its colours along."""
+    """A picture that contains its own colours."""
     start = svg.index(">") + 1
     ground = '<rect width="100%" height="100%" style="fill: var(--page)"/>'
     return f"{svg[:start]}\n<style>\n{style}</style>\n{ground}{svg[start:]}\n"
@@ -118,7 +118,7 @@ def _part(part: Part) -> str:
 
 
 def _name(text: str) -> str:
-    """As code, in which nothing is markup and nobody is mentioned; a table's cell still ends at a bare bar."""
+    """As code, without markup and mentions; in a table a bar still needs an escape."""
     text = plain(text)
     fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
     space = " " if text.startswith("`") or text.endswith("`") else ""

@@ -11,7 +11,7 @@ from ddenv.words import count
 
 WIDTH, HEIGHT = 880.0, 300.0
 LEFT, TOP, RIGHT, BOTTOM = 52.0, 26.0, 24.0, 46.0
-# More steps cannot be told apart.
+# More steps cannot be seen.
 MOST_POINTS = 2000
 
 Steps = list[tuple[float, float]]
@@ -48,7 +48,7 @@ def chart(state: RunState) -> str:
 
 
 def _thinned(history: Sequence[Point]) -> list[Point]:
-    """So many of the points that the picture is the same."""
+    """As few of the points as give the same picture."""
     step = max(1, -(-len(history) // MOST_POINTS))
     return [*history[:-1:step], *history[-1:]]
 
@@ -81,7 +81,7 @@ def axes(at: At, last: int, most: int) -> Iterator[str]:
 
 
 def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
-    """The number at the end, and what the lower line is."""
+    """The number at the end, and the label of the lower line."""
     x, y = at(last, len(state.environment))
     yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'
     words = f"{count(len(state.environment), 'model')} left"

@@ -1,1 +1,1 @@
-"""What a run came to, as a report to read and to mail."""
+"""The result of a run, as a report to read or mail."""

@@ -1,4 +1,4 @@
-"""What the user's hand did in a run: decisions, selections that were tried, and the tree of reductions."""
+"""What the user did in a run: decisions, tries, and the tree of reductions."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ HOW = {"start": "", "reduced": "", "adopted": "adopted by hand", "accepted": "an
 
 
 def guiding(record: Record) -> Section | None:
-    """The section on decisions and the tree; None before there was either."""
+    """The section on decisions and the tree; None without both."""
     state = record.state
     blocks: list[Block] = []
     if state.decisions:
         blocks += _decisions(state)
     elif state.baseline is not None:
-        blocks.append(say("Nobody intervened: every reduction was the algorithm's own."))
+        blocks.append(say("The user changed nothing: every reduction is the algorithm's own."))
     blocks += _trials(state)
     blocks += _tree(state)
     return Section("Decisions and branches", tuple(blocks)) if blocks else None
@@ -32,7 +32,7 @@ def guiding(record: Record) -> Section | None:
 def _decisions(state: RunState) -> list[Block]:
     rows = [(moment(each.time), str(each.tests), str(each.node), plain(each.words)) for each in state.decisions]
     lead = say(
-        f"{count(len(rows), 'decision')} by hand, each with the tests made until then and the environment it was made in."
+        f"{count(len(rows), 'decision')} by hand, each with the number of tests and the environment at that time."
     )
     head = ("time", "tests", "at", "what the user did")
     return [lead, Table(head, _cut(rows, 3), frozenset({1, 2}))]
@@ -117,7 +117,7 @@ def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
 
 
 def _cut(rows: Sequence[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:
-    """The first and the last rows, with what is between them told in the column `words`."""
+    """The first and the last rows, with a count of those in between in the column `words`."""
     if len(rows) <= MOST:
         return tuple(rows)
     half = MOST // 2

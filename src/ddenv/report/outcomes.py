@@ -1,4 +1,4 @@
-"""How sure a run is of what it says: its baseline, and what its tests came to."""
+"""How sure the result of a run is: its baseline, and the outcomes of its tests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def interval(base: Baseline) -> str:
 
 
 MEANING = {
-    "similar": "f again: the goal was not reached, and the robot ended where it ended in f",
+    "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
     "other": "another failure",
     "pass": "the goal was reached",
     "error": "the simulation broke",
@@ -45,7 +45,7 @@ PHASES = (("baseline", "whole world"), ("round", "in rounds"), ("hand", "by hand
 
 
 def sureness(record: Record) -> Section | None:
-    """The section on baseline and tests; None where none has ended."""
+    """The section on baseline and tests; None before a test has ended."""
     state = record.state
     if not state.tests_done:
         return None
@@ -86,7 +86,7 @@ def _missed(state: RunState, base: Baseline) -> list[Block]:
 
 
 def _tests(state: RunState) -> list[Block]:
-    """A row for each outcome, with a column for each kind of test that there was."""
+    """A row for each outcome, with a column for each kind of test in the run."""
     finished = state.finished_tests
     counts = Counter((test.outcome, test.phase) for test in finished)
     phases = [(phase, words) for phase, words in PHASES if any(test.phase == phase for test in finished)]
@@ -99,7 +99,7 @@ def _tests(state: RunState) -> list[Block]:
     table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
     if not state.deflake_runs and not state.cut_tests and not state.tally["lost"]:
         return [table]
-    words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates that did not show f at first."
+    words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates whose first test did not show f."
     if state.cut_tests:
         words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
     if lost := state.tally["lost"]:

@@ -35,7 +35,7 @@ def settings(record: Record) -> Section:
 
 
 def _read(scenario: dict[str, Any], asked: dict[str, Any], one: Setting) -> str:
-    """The value of a setting, and what it was at first where that was changed during the run."""
+    """The value of a setting, with the first value if it was changed during the run."""
     now, first = (_value(read(each, one)) or one.none for each in (scenario, asked))
     return now if first == now else f"{now} (changed during the run; at first {first})"
 
@@ -49,7 +49,7 @@ def _value(value: Any) -> str:
 
 
 def _place(values: Any) -> str:
-    """x 1, y 2: what the file has of a place."""
+    """A place as in the file, such as x 1, y 2."""
     if not isinstance(values, dict):
         return ""
     units = {"yaw": "rad", "tolerance": "m", "x": "m", "y": "m", "z": "m"}
@@ -88,7 +88,7 @@ def repeat(record: Record) -> Section:
 
 
 def _is_bundled(record: Record) -> bool:
-    """Whether options can say all that was asked for: a bundled scenario with no other settings than these."""
+    """Whether options can repeat the run: a bundled scenario with no other changes."""
     from ddenv.world.load import bundled_names
 
     without = (one for one in SETTINGS.values() if one.section == "reduction" and not one.option)
@@ -98,7 +98,7 @@ def _is_bundled(record: Record) -> bool:
 
 
 def _command(record: Record, bundled: bool) -> str:
-    """`ddenv run` with the first settings, whatever the scenario's file says today."""
+    """`ddenv run` with the first settings, even if the scenario's file has changed since."""
     name = plain(record.asked.get("name", "scenario"))
     words = ["ddenv", "run", name if bundled else f"{name}.yaml"]
     for one in OPTIONS:

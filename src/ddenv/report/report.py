@@ -1,4 +1,4 @@
-"""What a report says: the run in a few words, and then everything on which they rest."""
+"""The report on a run: the result in a few words, then the details."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _verdict(state: RunState) -> str:
 
 def _damage(record: Record) -> list[Paragraph]:
     return [
-        say(Strong("Not all of this run could be read."), f" {plain(each)}.", notice=True) for each in record.troubles
+        say(Strong("Parts of this run could not be read."), f" {plain(each)}.", notice=True) for each in record.troubles
     ]
 
 
@@ -77,7 +77,7 @@ def _standing(record: Record) -> list[Paragraph]:
         return [say(Strong("Not minimal."), f" The run ended before that: {why or 'no reason is known'}.", notice=True)]
     if state.status == "stopped":
         return [
-            say(Strong("Stopped"), f"{f': {why}' if why else ''}. What follows is what was known then.", notice=True)
+            say(Strong("Stopped"), f"{f': {why}' if why else ''}. This report shows what was known then.", notice=True)
         ]
     if state.status == "failed":
         return [say(Strong("The engine could not go on"), f"{f': {why}' if why else ''}.", notice=True)]
@@ -85,15 +85,15 @@ def _standing(record: Record) -> list[Paragraph]:
         return [say(Strong("Not started yet:"), " no test has been made.", notice=True)]
     at = f" at {moment(state.updated_at)} UTC" if moment(state.updated_at) else ""
     if record.alive:
-        return [say(Strong("This run has not ended."), f" What follows is what was known{at}.", notice=True)]
-    gone = f" The engine is not there any more; its last word came{at}." if at else " The engine is not there any more."
+        return [say(Strong("This run has not ended."), f" This report shows what was known{at}.", notice=True)]
+    gone = f" The engine is gone; its last message came{at}." if at else " The engine is gone."
     return [say(Strong("This run has not ended."), gone, notice=True)]
 
 
 def _minimal(state: RunState) -> Paragraph:
     sure = " Full runs confirm it." if state.confirming else ""
     if not state.environment:
-        return say(Strong("Minimal."), f" Look at the robot, its goal, and what always stays.{sure}")
+        return say(Strong("Minimal."), f" Look at the robot, its goal, and the models that always stay.{sure}")
     them = "it" if len(state.environment) == 1 else "any one of them"
     return say(Strong("Minimal:"), f" without {them} the failure was not seen again.{sure}")
 
@@ -127,7 +127,7 @@ def _after(state: RunState, base: Baseline) -> str:
         return ""
     test = state.tests[number - 1]
     if test.cut:
-        return f"; this was sure after {test.simulated_seconds:.1f} s"
+        return f"; this was certain after {test.simulated_seconds:.1f} s"
     return f"; it had {test.simulated_seconds:.1f} s" if state.failure in ("stuck", "out of time") else ""
 
 
@@ -167,7 +167,7 @@ def files_of(file: Path) -> list[Path]:
 
 
 def write_report(run: Path, file: Path, force: bool = False) -> list[Path]:
-    """Writes what a run came to as an HTML page or as Markdown, by the ending of `file`; returns the files that were written.
+    """Writes the report on a run as an HTML page or as Markdown, by the ending of `file`; returns the files that were written.
 
     Markdown has its pictures in files beside it. Raises UserError, also for files that exist, unless `force`.
     """
@@ -187,7 +187,7 @@ def write_report(run: Path, file: Path, force: bool = False) -> list[Path]:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a file exists; of what cannot be known, writing it will tell."""
+    """Whether a file exists; False if that is unknown: then writing it reports the error."""
     try:
         return path.exists()
     except OSError:
@@ -195,7 +195,7 @@ def is_there(path: Path) -> bool:
 
 
 def _check(file: Path) -> None:
-    """Says what is wrong before anything is read."""
+    """Checks the file's name before anything is read. Raises UserError."""
     if file.suffix.lower() not in KINDS:
         raise UserError(f"{file}: a report's name ends in .html or .md")
     try:

@@ -1,4 +1,4 @@
-"""The map of a report: the world from above with what is left of it, what was removed, f, and the robot's ways.
+"""The map of a report: the world from above with what is left of it, what was removed, f, and the robot's paths.
 
 Its colours are classes of `style.css`, so that it follows the reader's light or dark page.
 """
@@ -41,8 +41,8 @@ WORDS = {
     "gone": "removed",
     "still": "always there",
     "whole": "can be removed",
-    "way": "way in f",
-    "last": "way, last similar run",
+    "way": "path in f",
+    "last": "path, last similar run",
     "start": "start",
     "goal": "goal",
     "end": "end of f",
@@ -50,7 +50,7 @@ WORDS = {
 
 
 def legend_height(shown: Sequence[str], width: float) -> float:
-    """Of the legend of these signs below a map that is so wide, pixels."""
+    """The height of the legend of these signs below a map of this width, pixels."""
     return LINE * len(_lines(shown, width)) + 6
 
 
@@ -81,7 +81,7 @@ def _wide(name: str) -> float:
 
 
 def _room(name: str) -> float:
-    """For a sign, up to its word."""
+    """The width of a sign with the space before its word."""
     return 25.0 if name in MARKS else 33.0
 
 
@@ -93,13 +93,13 @@ def _sign(name: str) -> str:
     return f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
 
 
-# Pixels: the drawing's own width, the highest map and close-up, the lowest map, and what stands around it.
+# Pixels: the drawing's own width, the highest map and close-up, the lowest map, and the margins.
 WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
 LEFT, TOP, RIGHT, AXIS = 52.0, 10.0, 14.0, 46.0
 CORNERS = 32
-# At least so much of the world is drawn along each axis, of a close-up, and how many times larger that has to be, m.
+# The minimum drawn along each axis: of the world and of a close-up, m; and the minimum magnification of a close-up.
 LEAST, CLOSE, CLOSER = 4.0, 2.0, 3.0
-# The maximum number of labels, their length, and how many of the models drawn last they must not hide.
+# The maximum number of labels, their maximum length, and how many of the models drawn last they must not hide.
 MOST_LABELS, LONGEST_LABEL, MOST_AVOIDED = 24, 26, 1000
 # The maximum number of points on a path.
 MOST_POINTS = 500
@@ -109,13 +109,13 @@ CROSS = 4.0
 
 
 def picture(record: Record, models: Sequence[Drawn], name: str = "all") -> str:
-    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` tells maps of one page apart."""
+    """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` is different for each map of a page."""
     points = [point for point in _places(record) if point is not None]
     return _picture(record, models, _frame(models, points, LEAST), name)
 
 
 def close_up(record: Record, models: Sequence[Drawn]) -> str:
-    """A map of what is left and of f's end alone; "" where it would show little that the whole map does not."""
+    """A map of only what is left and f's end; "" if it would add little to the whole map."""
     kept = [each for each in models if each.model.name in record.kept]
     end = _places(record)[2]
     if end is None or not kept:
@@ -128,7 +128,7 @@ def close_up(record: Record, models: Sequence[Drawn]) -> str:
 
 
 def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str) -> str:
-    """`name` tells pictures of one page apart."""
+    """`name` is different for each picture of a page."""
     start, goal, end = (point if frame.holds(point) else None for point in _places(record))
     points = [point for point in (start, goal, end) if point is not None]
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
@@ -174,7 +174,7 @@ def _point(place: dict[str, Any]) -> tuple[float, float] | None:
 
 
 def _sort(record: Record, name: str) -> str:
-    """The class of a model: kept, gone, or what was always there."""
+    """The class of a model: kept, gone, or always there."""
     state = record.state
     if name not in record.elements:
         return "still"
@@ -191,14 +191,14 @@ def _frame(
     low, high = low - margin, high + margin
     across = WIDTH - LEFT - RIGHT
     scale = float(min(across / (high[0] - low[0]), most / (high[1] - low[1])))
-    # The map is as wide as the page, and never a mere strip.
+    # The map is as wide as the page, and never too flat.
     sides = np.maximum(high - low, np.array([across, LEAST_HIGH]) / scale)
     center = (low + high) / 2
     return Frame(center - sides / 2, center + sides / 2, scale, LEFT, TOP)
 
 
 def _axes(frame: Frame) -> Iterator[str]:
-    """Grid lines with their numbers, and what the axes are."""
+    """Grid lines with their numbers, and the names of the axes."""
     left, top, right, bottom = frame.box
     step = tick_step(float(max(frame.high - frame.low)), 12)
     for value in ticks(frame.low[0], frame.high[0], step):
@@ -234,18 +234,18 @@ def _closed(corners: np.ndarray) -> str:
 
 
 def _way(samples: array[float] | None, frame: Frame) -> str:
-    """The robot's way, or "" where none is known."""
+    """The robot's path, or "" if unknown."""
     if not samples:
         return ""
     points = np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS)[:, 1:3]
     step = max(1, -(-len(points) // MOST_POINTS))
-    # The end is what matters.
+    # The end matters most.
     chosen = np.vstack([points[::step], points[-1:]])
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in frame.pixels(chosen))
 
 
 def _near(record: Record, frame: Frame, goal: Any, end: Any) -> Iterator[str]:
-    """Around the goal where it is reached, and around f's end where a similar run ends, seen from above."""
+    """Circles: where the goal counts as reached, and where similar runs end, from above."""
     scenario = record.state.scenario
     pairs = [(goal, section(scenario, "goal").get("tolerance", 0.5), "reach")]
     pairs += [(end, section(scenario, "failure").get("epsilon", 0.33), "around")]
@@ -258,8 +258,8 @@ def _near(record: Record, frame: Frame, goal: Any, end: Any) -> Iterator[str]:
 def _labels(
     models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence[tuple[float, float]]
 ) -> Iterator[str]:
-    """Names of the models that are left, the largest first; of a world that is whole, of all."""
-    # What was removed is so faint that a name may stand on it.
+    """Names of the models that are left, the largest first; of a whole world, all names."""
+    # Removed models are so faint that a name may cover them.
     seen = [each for each in models if sorts[each.model.name] != "gone"][-MOST_AVOIDED:]
     spots = [_spot(each, frame) for each in seen]
     names = [shortened(each.model.name, LONGEST_LABEL) for each in seen]

@@ -1,4 +1,4 @@
-"""How a run got where it is: the chart of its models, and a table of its rounds."""
+"""The progress of a run: the chart of its models, and a table of its rounds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.state import Candidate, Round, RunState
 from ddenv.words import count
 
-# The maximum number of rounds in the table, first of all those that reduced; the others are summed up.
+# The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60
 
 
@@ -27,7 +27,7 @@ class _Row:
 
     @property
     def tried(self) -> int:
-        """Its candidates that were judged, or have tests."""
+        """The number of its candidates that were judged or have tests."""
         return sum(one.verdict in ("similar", "dissimilar") or bool(one.tests) for one in self.round.candidates)
 
     @property
@@ -36,7 +36,7 @@ class _Row:
 
 
 def way(record: Record) -> Section | None:
-    """The section on the rounds; None before there was one."""
+    """The section on the rounds; None before the baseline is done."""
     state = record.state
     if state.baseline is None:
         return None
@@ -72,14 +72,14 @@ def _table(judged: list[_Row]) -> list[Block]:
             rows.append(_summed(judged[first:last]))
     head = ("round", "parts n", "tried", "first similar", "models left", "tests")
     table = Table(head, tuple(rows), frozenset({0, 1, 2, 4, 5}))
-    explained = "A round tries one set of models after the other; the first one that shows f is what is left then."
+    explained = "A round tries one set of models after the other; the first one that shows f becomes the environment."
     if any(each.tried and not each.tests for each in judged):
-        explained += " What was judged before is not tested again."
+        explained += " Sets judged before are not tested again."
     return [say(explained), table]
 
 
 def _shown(judged: list[_Row]) -> frozenset[int]:
-    """Which rounds have a row of their own: of very many those that reduced, the first and the last of them."""
+    """Which rounds have a row of their own: if there are too many, those that reduced, the first and the last of these."""
     numbers = range(len(judged))
     if len(judged) <= MOST_ROUNDS:
         return frozenset(numbers)
@@ -116,7 +116,7 @@ def _first_similar(row: _Row) -> str:
         return f"{row.won.label}{', taken back' if row.undone else ''}{words}"
     if row.on:
         return f"under way{words}"
-    return f"left before its end{words}" if verdicts[""] else f"none{words}"
+    return f"not finished{words}" if verdicts[""] else f"none{words}"
 
 
 def _summed(judged: list[_Row]) -> tuple[Cell, ...]:

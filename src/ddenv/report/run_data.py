@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A run: its `state`, its `rounds` as they ended, what it was asked for first, and its world if that can be read.
+    """A run: its `state`, its `rounds` as they ended, its first settings, and its world if that can be read.
 
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
@@ -44,13 +44,13 @@ class Record:
 
 
 def read_run(path: Path) -> Record:
-    """What a run file holds. Of a damaged one as much as makes sense is told. Raises UserError for what is no run file."""
+    """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run file."""
     alive = engine_is_alive(path)
     with RunFile(path) as file:
         events = file.events()
         state, rounds, trouble = _story(events)
         if not state.nodes:
-            raise UserError(trouble or f"{path}: damaged run file: there is nothing in it to report on")
+            raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
         world = _world(file, troubles)
         first = None if state.baseline is None else state.baseline.failure_test
@@ -74,7 +74,7 @@ def read_run(path: Path) -> Record:
 
 
 def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
-    """The state at the end or before the first event that makes no sense, every round as it ended, and what is wrong."""
+    """The state at the end or before the first damaged event, every round as it ended, and what is wrong."""
     state = RunState()
     rounds: dict[int, Round] = {}
     trouble = ""
@@ -82,9 +82,9 @@ def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
         try:
             after = apply(state, event)
         except UserError as error:
-            trouble = f"{error}; what was before it is told"
+            trouble = f"{error}; the report shows what came before it"
             break
-        # Between two rounds the old one does not change any more.
+        # A round does not change after its end.
         if event.kind == "round_started" and state.round is not None:
             rounds[state.round.number] = state.round
         state = after

@@ -14,7 +14,7 @@ from ddenv.world.model import is_ground
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
-# Nobody reads a table of more models than this; and the maximum number of names listed for others.
+# The maximum number of models in the table, and of names in a list.
 MOST_MODELS, MOST_NAMES = 200, 12
 
 
@@ -46,7 +46,7 @@ def _alternative(state: RunState) -> str:
         return "The world from above."
     return (
         f"The world from above: {count(len(state.environment), 'model')} left, drawn solid; what was removed is faint. "
-        "The robot's way in f, and its way on the last similar run."
+        "The robot's paths in f and in the last similar run."
     )
 
 
@@ -83,7 +83,7 @@ def _touched(state: RunState) -> dict[str, float]:
 
 
 def _stay(record: Record) -> list[Block]:
-    """What is no element, and so was always there."""
+    """The models that are no elements, and so always stay."""
     elements = frozenset(record.state.elements)
     models = () if record.world is None else record.world.models
     others = [model for model in models if model.name not in elements]

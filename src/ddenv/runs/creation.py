@@ -22,7 +22,7 @@ RESOURCE = "resource "
 def create_run(scenario: Scenario, path: Path, announce: Callable[[str], None] | None = None) -> World:
     """Writes a new run file with everything a reduction needs; returns its world. Raises UserError, with nothing written.
 
-    `announce` is called with a line of text before slow steps.
+    Calls `announce` with a line of text before slow steps.
     """
     world, _ = load_parts(scenario, announce)
     documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}

@@ -116,7 +116,7 @@ def _folders(scenario: Scenario, asked: _Asked, robot: bytes, stored: Stored) ->
 
 
 def _leans_on(folder: Path, uri: str, base: Path) -> bool:
-    """Whether `uri`, in a file of the folder `base`, is found relative to `folder`."""
+    """Whether `uri`, in a file of the folder `base`, can be found relative to `folder`."""
     if "://" not in uri:
         return base == folder and not uri.strip().startswith("/")
     folder = folder.resolve()

@@ -82,7 +82,7 @@ def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, 
     for name in values:
         if name not in SETTINGS:
             raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
-    # What stands for several settings comes first: each of them may be given as well.
+    # A setting that sets several others comes first, so that each of these may be given, too.
     for name in sorted(values, key=lambda each: SETTINGS[each].stored):
         put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])
     return data
@@ -91,7 +91,7 @@ def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, 
 def load_parts(scenario: Scenario, announce: Callable[[str], None] | None = None) -> tuple[World, Model]:
     """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
 
-    `announce` is called with a line before something that takes longer. Raises UserError.
+    Calls `announce` with a line before slow steps. Raises UserError.
     """
     if scenario.oracle is not None:
         command_words(scenario)
@@ -111,5 +111,5 @@ def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
         if name not in known:
             raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
     if not world.elements(frozenset(scenario.protected)):
-        raise UserError(f"{scenario.world}: has no model that could be removed")
+        raise UserError(f"{scenario.world}: has no model that can be removed")
     check_spawn(world, robot, scenario.robot.spawn)

@@ -18,7 +18,8 @@ SCALE = {
     "probdd": (8.0, 0.25),
     "splitting": (6.2, 0.25),
 }
-# Most candidates are without f, and re-run in full. Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
+# Most candidates do not show f, and get all their re-runs.
+# Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
 RERUN, FEWER, MORE = 0.75, 0.35, 2.3
 
 
@@ -31,8 +32,8 @@ class Remaining:
 
 
 def remaining(state: RunState, at_work: bool) -> Remaining | None:
-    """What is left of a run. None where that is not known: before the first round, where more tests were made than the engine
-    expected, while what is left is confirmed, and at the end.
+    """What is left of a run. None if unknown: before the first round, after more tests than the engine expected, while
+    the result is confirmed, and at the end.
 
     Without an engine `at_work` nothing runs, and the time is not known.
     """
@@ -61,7 +62,7 @@ def _seconds_of_a_test(state: RunState) -> float | None:
 
 
 def rough_tests(models: int, algorithm: str, iterations: int, as_printed: bool = False) -> tuple[int, int, int]:
-    """Tests of a reduction of so many `models`, as (low, likely, high), without the baseline's: nothing of the world is known."""
+    """Tests of a reduction of this number of `models`, as (low, likely, high), without the baseline, for an unknown world."""
     key = "ddenv as printed" if algorithm == "ddenv" and as_printed else algorithm
     factor, power = SCALE.get(key, SCALE["ddenv"])
     likely = factor * models**power * (1 + RERUN * iterations)

@@ -228,8 +228,8 @@ def _words(groups: Sequence[Group]) -> list[Block]:
 def _about_the_bound() -> Block:
     return say(
         "Ranked by the ratio of tests to the first bound (geometric mean over the scenarios). No method needs fewer tests: after "
-        "the baseline, f has to show in what is left, and each of its models has to be left out without success, with all re-runs. The "
-        "second bound is for methods without any knowledge: the mean number of tests to find the needed set of models, if all "
+        "the baseline, f has to show in what is left, and each of its models has to be left out without success, with all re-runs. "
+        "The second bound is for methods without any knowledge: the mean number of tests to find the needed set of models, if all "
         "sets of that size are equally likely. A method that first tries models near the failure may need fewer. The mark (◂) "
         "shows the fewest tests."
     )

@@ -1,1 +1,1 @@
-"""The workbench: a terminal screen on one run file. It watches, and asks; the engine works in a process of its own."""
+"""The workbench: a terminal screen on one run file. It shows the run and sends commands; the engine is a separate process."""

@@ -1,4 +1,4 @@
-"""The workbench as an app: which screen comes first, which takes whose place, and what concerns the terminal."""
+"""The workbench as an app: the first screen, switching between screens, and the terminal."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ddenv.workbench.wording import plain
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """The user's own wishes: `theme` is "" where the terminal decides, `keys` are Textual's names of keys by action ids."""
+    """The user's own settings: `theme` is "" if the terminal decides, `keys` are Textual's names of keys by action ids."""
 
     theme: str = ""
     keys: Mapping[str, str] = field(default_factory=dict)
@@ -38,9 +38,9 @@ def _commands() -> type[Provider]:
 
 
 class Workbench(App[int]):
-    """Begins at the setup screen, or attached to a run. Raises UserError for a file that is no run.
+    """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
-    `reading` holds the command line's options on how to read worlds. With `watch` the run is looked at, and never guided.
+    `reading` holds the command line's options on how to read worlds. With `watch` the run is only watched, never guided.
     """
 
     TITLE = "ddenv"
@@ -49,14 +49,20 @@ class Workbench(App[int]):
     COMMANDS: ClassVar[set[type[Provider] | Callable[[], type[Provider]]]] = {_commands}
     BINDINGS: ClassVar = [
         Binding(
-            "ctrl+q", "leave", "quit", id="app.leave", tooltip="leave; an engine goes on", show=False, priority=True
+            "ctrl+q",
+            "leave",
+            "quit",
+            id="app.leave",
+            tooltip="quit; an engine keeps running",
+            show=False,
+            priority=True,
         ),
         Binding(
             "ctrl+z",
             "suspend_process",
             "suspend",
             id="app.suspend",
-            tooltip="suspend; type fg to come back",
+            tooltip="suspend; fg brings it back",
             show=False,
         ),
         Binding(
@@ -64,12 +70,12 @@ class Workbench(App[int]):
             "command_palette",
             "commands",
             id="app.commands",
-            tooltip="find any command by its words; themes; models by name",
+            tooltip="find any command, theme or model by name",
             show=False,
             priority=True,
         ),
         Binding(
-            "ctrl+t", "change_theme", "theme", id="app.theme", tooltip="choose the colours, until you leave", show=False
+            "ctrl+t", "change_theme", "theme", id="app.theme", tooltip="choose the colours for this session", show=False
         ),
         Binding(
             "f12",
@@ -101,7 +107,7 @@ class Workbench(App[int]):
         if run is not None:
             from ddenv.workbench.run.observed import Observed
 
-            # Opened before the screen is taken, so that a wrong file is one line in the terminal.
+            # Opened before the screen, so that an error in the file is one line in the terminal.
             Observed(run, strictly=watch).close()
 
     def compose(self) -> ComposeResult:
@@ -111,12 +117,12 @@ class Workbench(App[int]):
 
     def get_css_variables(self) -> dict[str, str]:
         variables = super().get_css_variables()
-        # Widgets draw with Rich, which has other names for the terminal's own colours.
+        # Widgets draw with Rich, whose names for the terminal's own colours differ.
         self.theme_variables = for_rich(self.theme_variables)
         return variables
 
     def on_mount(self) -> None:
-        # After ctrl+z and fg the terminal is blank, and nothing would be drawn before it changes.
+        # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
         self.app_resume_signal.subscribe(self, lambda _: self._redraw())
         self._write("\x1b[22;2t")
         self.set_keymap(dict(self._own_keys))
@@ -131,7 +137,7 @@ class Workbench(App[int]):
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
 
-    # Which screen is shown.
+    # The screens.
 
     def _screen_for(self, asked: ShowRun | ShowSetup) -> Screen[Any]:
         if isinstance(asked, ShowRun):
@@ -169,7 +175,7 @@ class Workbench(App[int]):
             self.push_screen(RunsScreen())
 
     def action_leave(self) -> None:
-        """Leaves at once. An engine goes on, and the terminal shows how to come back to it."""
+        """Quits at once. An engine keeps running, and the terminal shows how to attach again."""
         detach = next((screen.action_detach for screen in self.screen_stack if hasattr(screen, "action_detach")), None)
         if detach is None:
             self.exit(0)
@@ -195,7 +201,7 @@ class Workbench(App[int]):
         self._write("\x1b[23;2t")
 
     def watch_title(self, title: str) -> None:
-        """The terminal's own title; saved before and given back after."""
+        """The terminal's title; saved before and restored after."""
         self._write(f"\x1b]2;{plain(title)}\x07")
 
     def _write(self, sequence: str) -> None:

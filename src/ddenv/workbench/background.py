@@ -1,4 +1,4 @@
-"""From a thread back to the screen that started it, which may have been closed meanwhile."""
+"""Calls from a thread back to the screen that started it, if it is still open."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from textual.dom import DOMNode
 
 
 def is_open(node: DOMNode) -> bool:
-    """Whether a widget is still there with all its children: a screen that is being closed loses them one by one."""
+    """Whether a widget still exists with all its children: a screen that is being closed loses them one by one."""
     return node.is_attached and node.screen.display
 
 
 def call_if_open(node: DOMNode, callback: Callable[..., object], *words: object) -> None:
-    """Calls `callback(*words)` in the app's own thread, from another one, unless `node` is closed."""
+    """Calls `callback(*words)` in the app's thread, from another thread, unless `node` is closed."""
 
     def call() -> None:
         if is_open(node):

@@ -1,4 +1,4 @@
-"""Starts the workbench: the user's config, whether there is a terminal that can show a screen, then the app."""
+"""Starts the workbench: reads the user's config, checks the terminal, runs the app."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.config import read_config
 from ddenv.workbench.terminal.themes import fitting
 
-# One of each kind of sign that is drawn.
+# One character of each kind that is drawn.
 SIGNS = "╭▶●⠒█…"
 
 
 def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None, *, watch: bool = False) -> int:
-    """Runs the workbench until it is left; returns the exit code. Raises UserError without a run file or a terminal."""
+    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
     config = read_config()
     app = Workbench(run, reading, watch=watch, config=config)
     check_terminal()
@@ -29,9 +29,9 @@ def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = N
 
 
 def check_terminal() -> None:
-    """Raises UserError where no screen can be shown."""
+    """Raises UserError if no screen can be shown."""
     if os.environ.get("TEXTUAL_DRIVER"):
-        # Something other than a terminal shows it, such as a browser.
+        # Something else than a terminal shows it, such as a browser.
         return
     output = sys.__stderr__
     if output is None or sys.__stdin__ is None or not (output.isatty() and sys.__stdin__.isatty()):
@@ -39,10 +39,10 @@ def check_terminal() -> None:
             "the workbench needs a terminal; 'ddenv run', 'ddenv resume' and 'ddenv report' work without one"
         )
     if os.environ.get("TERM") == "dumb":
-        raise UserError("TERM=dumb: this terminal can show no screen; 'ddenv run' and 'ddenv resume' need none")
+        raise UserError("TERM=dumb: this terminal cannot show a screen; 'ddenv run' and 'ddenv resume' need none")
     try:
         SIGNS.encode(output.encoding)
     except (UnicodeEncodeError, LookupError):
         raise UserError(
-            f"this terminal's text is {output.encoding}, which has no signs to draw with; type: export LANG=C.UTF-8"
+            f"this terminal's encoding is {output.encoding}, which cannot draw the screen; type: export LANG=C.UTF-8"
         ) from None

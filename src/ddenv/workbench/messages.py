@@ -1,4 +1,4 @@
-"""What screens ask the app for: to show another screen in their place."""
+"""Messages from a screen to the app: show another screen in its place."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class ShowRun(Message):
-    """Attach to `run`; only `watch` it, without guiding it. `engine` is the one that was just started on it."""
+    """Attach to `run`; only `watch` it, without guiding it. `engine` has just been started on it."""
 
     run: Path
     watch: bool = False

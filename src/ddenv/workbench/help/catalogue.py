@@ -20,7 +20,7 @@ from ddenv.workbench.terminal.themes import nearest
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """What `keys` (by Textual's names) do; `owner` is the name of the screen or widget that has them."""
+    """An action with its `keys` (Textual's names); `owner` is the name of its screen or widget."""
 
     id: str
     keys: tuple[str, ...]
@@ -41,7 +41,7 @@ def actions() -> dict[str, Action]:
 
 
 def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
-    """The keymap for Textual that gives the actions these keys. Raises UserError, which begins with `where`."""
+    """Textual's keymap with these keys for the actions. Raises UserError with a message that begins with `where`."""
     keymap = {id: textual_keys(keys, f"{where}: keys: {id}") for id, keys in wanted.items()}
     known = actions()
     for id in keymap:
@@ -53,7 +53,7 @@ def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
 
 
 def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) -> None:
-    """No two actions of one screen may have the same key, if the user gave it to one of them."""
+    """Raises UserError if a key of the user's belongs to two actions of one screen."""
     holders: dict[str, str] = {}
     everywhere = _bindings(Workbench) if issubclass(owner, Screen) else ()
     for id in dict.fromkeys(binding.id for binding in (*_bindings(owner), *everywhere) if binding.id):
@@ -75,7 +75,7 @@ def _keys_of(owner: type[DOMNode], id: str) -> tuple[str, ...]:
 
 @cache
 def _owners() -> tuple[type[DOMNode], ...]:
-    """The app, and all screens and widgets of the workbench that have keys."""
+    """The app, and all screens and widgets with keys."""
     home = import_module("ddenv.workbench")
     names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
     classes = (value for name in names for value in vars(import_module(name)).values())

@@ -1,4 +1,4 @@
-"""What ctrl+p offers: every action of the screen in its own words, the themes, and the models of a run by name."""
+"""The list of ctrl+p: every action of the screen, the themes, and the models of a run by name."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ddenv.workbench.wording import plain, shorten
 # The maximum number of models that are offered: typing more letters finds others.
 MOST_MODELS = 12
 LONGEST_NAME = 60
-# How well the words of a command have to match what is typed, 0 to 1.
+# How well a command has to match the typed text, 0 to 1.
 ENOUGH = 0.1
 
 
 class Commands(Provider):
-    """Reads the screen's bindings again at each question, so that it is never out of date."""
+    """Reads the screen's bindings again for each search, so that it is never out of date."""
 
     async def discover(self) -> Hits:
         for shortcut in commands(self.screen):
@@ -46,7 +46,7 @@ class Commands(Provider):
         return partial(self.app.run_action, shortcut.action, shortcut.node)
 
     def _models(self, query: str) -> list[str]:
-        """The run's models whose names contain what was typed."""
+        """The run's models whose names contain the typed text."""
         wanted = query.strip().casefold()
         if not wanted:
             return []

@@ -26,12 +26,12 @@ def config_path() -> Path:
 
 
 def read_config() -> Config:
-    """Reads the file, if there is one. Raises UserError, which says what is wrong, and where."""
+    """Reads the file if it exists. Raises UserError with the place of the error."""
     path = config_path()
     data = _load(path) if path.exists() else {}
     if not data:
         if os.environ.get("DDENV_CONFIG") and not path.exists():
-            raise UserError(f"{path}: no such file; make it, or unset DDENV_CONFIG")
+            raise UserError(f"{path}: no such file; create it, or unset DDENV_CONFIG")
         return Config()
     for key in data:
         if key not in KNOWN:
@@ -62,7 +62,7 @@ def _load(path: Path) -> dict[Any, Any]:
     except RecursionError:
         raise UserError(f"{path}: is nested too deeply") from None
     except ValueError as error:
-        # A date that no calendar has.
+        # An invalid date.
         raise UserError(f"{path}: is no YAML: {error}; put it in quotes") from None
     if data is not None and not isinstance(data, dict):
         raise UserError(f"{path}: expected lines such as 'theme: ddenv-light'; 'ddenv config --example' prints some")
@@ -78,13 +78,15 @@ def _wanted(keys: Any, path: Path) -> dict[str, str]:
     for id, value in keys.items():
         # A digit is a number in YAML, and a key here.
         if not isinstance(value, str) and (isinstance(value, bool) or not isinstance(value, int)):
-            raise UserError(f"{path}: keys: {id}: expected a key such as p, in quotes if it is a sign; found {value!r}")
+            raise UserError(
+                f"{path}: keys: {id}: expected a key such as p, in quotes if it is punctuation; found {value!r}"
+            )
     return {str(id): str(value) for id, value in keys.items()}
 
 
-# Before the sections of an example.
+# The head of the example.
 INTRODUCTION = """# Settings of the ddenv workbench: {path}
-# Remove the '# ' in front of a line to change it. '?' and other signs go in quotes.
+# Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
 
 # {themes}
 # theme: {theme}
@@ -94,7 +96,7 @@ keys:"""
 
 
 def lines() -> list[str]:
-    """The file, the theme, and every action with its keys. Raises UserError for a file that is wrong."""
+    """The file, the theme, and every action with its keys. Raises UserError for an invalid file."""
     config, path = read_config(), config_path()
     chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
     found = [
@@ -116,7 +118,7 @@ def lines() -> list[str]:
 
 
 def example_lines() -> list[str]:
-    """A file that changes nothing, with every action as a comment."""
+    """An example file that changes nothing: every action is a comment."""
     begin = INTRODUCTION.format(path=config_path(), themes=f"One of {', '.join(theme_names())}.", theme=DARK.name)
     found = begin.splitlines()
     section = ""

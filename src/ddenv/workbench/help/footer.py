@@ -1,4 +1,4 @@
-"""The footer: the most important keys, as many as there is room for."""
+"""The footer: the most important keys that fit."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Entry:
 
 
 class KeyFooter(Widget):
-    """Shows bindings by id. `shown` is their order on the screen, `first` the order in which they are given room.
+    """Shows bindings by id. `shown` is their order on the screen, `first` their priority if not all fit.
 
-    A click on a key presses it. It is one widget: the focus moves often, and the keys change with it.
+    A click on a key presses it. It is one widget, since the focus moves often and the keys change with it.
     """
 
     ALLOW_SELECT = False

@@ -10,10 +10,10 @@ from ddenv.errors import UserError
 
 _MODIFIERS = ("ctrl", "shift", "alt", "meta", "super", "hyper")
 _NAMED = {key.value for key in Keys}
-# Signs that every keyboard has, by names such as question_mark.
+# Punctuation of every keyboard, by names such as question_mark.
 _SIGNS = {_character_to_key(sign): sign for sign in string.punctuation}
 _ARROWS = {"up": "↑", "down": "↓", "left": "←", "right": "→"}
-# Terminals send the same for both keys of such a pair.
+# Terminals send the same code for both keys of a pair.
 _SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+h": "backspace", "ctrl+left_square_bracket": "escape"}
 
 
@@ -37,7 +37,7 @@ def written(key: str) -> str:
 
 
 def textual_keys(keys: str, where: str) -> str:
-    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError, which begins with `where`."""
+    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError with a message that begins with `where`."""
     names = [keys] if keys == "," else [key.strip() for key in keys.split(",")]
     return ",".join(_textual_key(key, where) for key in names)
 

@@ -1,4 +1,4 @@
-"""What the keys do on a screen at this moment, with the user's own keys: for the footer, the help and the list of commands."""
+"""What the keys do on a screen now, with the user's own keys: for the footer, the help and the list of commands."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from textual.widgets import Static
 from ddenv.workbench.help.key_names import shown
 from ddenv.workbench.wording import plain
 
-_FOCUS = "to the next pane, field or button, or to the previous one"
+_FOCUS = "to the next or previous pane, field or button"
 _LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"
-_TAKE = "take the one under the cursor"
+_TAKE = "choose the line under the cursor"
 # Textual's own actions that are worth a line in the help.
 TEXTUAL_WORDS = {
     "app.focus_next": _FOCUS,
@@ -63,7 +63,7 @@ class Group:
 def offered(screen: Screen[Any]) -> list[ActiveBinding]:
     """The keys that a screen offers now, those of the focused widget first.
 
-    An action whose `check_action` returns False is left out; one with None is there, but not enabled.
+    An action whose `check_action` returns False is left out; one with None is shown, but not enabled.
     """
     return list(screen.active_bindings.values())
 
@@ -123,7 +123,7 @@ def _words(active: ActiveBinding) -> str:
 
 
 def _pane(focused: DOMNode | None) -> tuple[str, tuple[str, ...]]:
-    """The focused pane's title, and what it says about itself beside its keys."""
+    """The focused pane's title, and the hints below its keys."""
     if focused is None:
         return "Here", ()
     nodes = focused.ancestors_with_self

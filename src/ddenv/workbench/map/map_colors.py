@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from textual.app import App
 
 KEPT, FLOOR, LEFT_OUT, FLOOR_OUT, PROTECTED, REMOVED, PINNED, SELECTED = range(8)
-# How many colours the terminal has.
+# The number of colours of the terminal.
 MANY, SIXTEEN, NONE = 24, 4, 0
 # A full cell of each kind. Where there are many colours, all but the protected ones look solid.
 SOLID = "█░▓░▒ ██"
-# Where hues repeat: a full cell of parts 1 to 8, 9 to 16 and so on.
+# If hues repeat: a full cell of parts 1 to 8, 9 to 16 and so on.
 PATTERNS = "█╱─╲│╳"
 # The strength of a part's hue on the background.
 STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.62, REMOVED: 0.0}
@@ -62,12 +62,12 @@ class Palette:
 
     @property
     def hues(self) -> int:
-        """How many parts have a colour of their own."""
+        """The number of parts with their own colour."""
         return {MANY: len(HUES), SIXTEEN: len(NUMBERS)}.get(self.colors, 1)
 
     @property
     def tones(self) -> int:
-        """How many parts look different from each other."""
+        """The number of parts with different looks."""
         return self.hues * len(PATTERNS)
 
     def tone(self, kind: int, part: int) -> Tone:
@@ -98,7 +98,7 @@ class Palette:
         return packed(blend(unpacked(fill), unpacked(self.back), 0.5))
 
     def _sparse(self, kind: int, part: int) -> Tone:
-        """Few colours or none: dots of one colour stand for a weaker one."""
+        """For few colours or none: dots of one colour replace a weaker one."""
         color = self._color(part)
         if kind == REMOVED:
             return Tone(" ", self.back, self.back, self.back)
@@ -130,7 +130,7 @@ def unpacked(color: int) -> RGB:
 
 
 def mixed(back: RGB, fore: RGB, *, accent: RGB = (255, 215, 80), marks: tuple[RGB, RGB, RGB] | None = None) -> Palette:
-    """For a terminal of many colours. `marks` are those of start, goal and f."""
+    """For a terminal with many colours. `marks` are those of start, goal and f."""
     ground, text = packed(back), packed(fore)
     accent = _seen(accent, back, fore)
     start, goal, failure = marks or ((31, 111, 235), (26, 127, 55), (207, 34, 46))
@@ -151,7 +151,7 @@ def mixed(back: RGB, fore: RGB, *, accent: RGB = (255, 215, 80), marks: tuple[RG
 
 
 def _seen(color: RGB, back: RGB, fore: RGB) -> RGB:
-    """`color`, or nearer to the text's where it is too near to the background's."""
+    """`color`, moved towards the text's if it is too near to the background's."""
     for part in (0.0, 0.25, 0.5):
         found = blend(color, fore, part)
         if abs(luminance(packed(found)) - luminance(packed(back))) > 90:
@@ -166,14 +166,14 @@ def sixteen(back: int = PLAIN, fore: int = PLAIN) -> Palette:
         grey, cyan, yellow, white = (NUMBERED | number for number in (8, 6, 3, 15))
     else:
         grey, cyan, yellow, white = 0x555555, 0x00AAAA, 0xAA5500, 0xFFFFFF
-    # On hues of their own, start, goal and f could be taken for models of a part.
+    # With their own hues, start, goal and f would look like models of a part.
     marks = dict.fromkeys(("start", "goal", "failure"), white)
     lines = {"path": fore, "original": cyan, "live": yellow, "dull": fore}
     return Palette(SIXTEEN, back, fore, faint=grey, selected=fore, native=native, **lines, **marks)
 
 
 def plain(back: int = PLAIN, fore: int = PLAIN) -> Palette:
-    """For a terminal without colours: letters and fillings say everything."""
+    """For a terminal without colours: letters and fillings show everything."""
     native = back == PLAIN
     faint = fore if native else packed(blend(unpacked(back), unpacked(fore), 0.4))
     names = ("path", "original", "live", "dull", "selected", "start", "goal", "failure")
@@ -181,7 +181,7 @@ def plain(back: int = PLAIN, fore: int = PLAIN) -> Palette:
 
 
 def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
-    """The one for a widget's background and text colour in the app's theme and terminal."""
+    """The palette for a widget's background and text colour in the app's theme and terminal."""
     native = app.native_ansi_color
     ground, text = (PLAIN, PLAIN) if native else (packed(back.rgb), packed(fore.rgb))
     system = "truecolor" if app.is_headless else app.console.color_system
@@ -195,7 +195,7 @@ def palette_of(app: App[Any], back: Color, fore: Color) -> Palette:
 
 
 def _variable(app: App[Any], name: str) -> RGB | None:
-    """A colour of the theme, where it is one."""
+    """A colour of the theme, if it is one."""
     try:
         return Color.parse(app.theme_variables.get(name, "")).rgb
     except ColorParseError:

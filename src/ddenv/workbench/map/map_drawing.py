@@ -1,4 +1,4 @@
-"""Draws the map of a world and its run: whatever stays the same is kept between frames."""
+"""Draws the map of a world and its run, and reuses what has not changed since the last frame."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ DASH = 5
 
 
 class Remembered(Generic[T]):
-    """A value with the things that it was made from.
+    """A value with the objects that it was made from.
 
-    These are compared by identity: to compare the names of thousands of models would take too long in each frame.
+    These are compared by identity: comparing the names of thousands of models takes too long for each frame.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class Remembered(Generic[T]):
         self._value: T
 
     def get(self, made_of: tuple[object, ...], make: Callable[[], T]) -> T:
-        """The value, made again only if one of the things is another one."""
+        """The value, made again only if one of the objects changed."""
         before = self._made_of
         if (
             before is None
@@ -51,11 +51,11 @@ class Remembered(Generic[T]):
 
 
 class MapDrawing:
-    """Makes one frame after another from what is `Shown`."""
+    """Draws frames of what is `Shown`."""
 
     def __init__(self) -> None:
         self._trails: dict[int, list[Point]] = {}
-        # Each is kept for what it was made from.
+        # Each is reused until its inputs change.
         self._evidence: Remembered[np.ndarray] = Remembered()
         self._original: Remembered[np.ndarray] = Remembered()
         self._same_paths: Remembered[bool] = Remembered()
@@ -66,7 +66,7 @@ class MapDrawing:
         self._picture: Remembered[Picture] = Remembered()
 
     def fitting(self, shown: Shown, columns: int, rows: int) -> View:
-        """A view of all that matters."""
+        """A view of all important places."""
         path = _path(self._evidence, shown.snapshot.evidence)
         points = path[np.isfinite(path).all(axis=1)].tolist()
         points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
@@ -77,12 +77,12 @@ class MapDrawing:
         self._trails = follow(self._trails, snapshot)
 
     def same_paths(self, snapshot: Snapshot) -> bool:
-        """Whether the last similar run went as f did: it is f before the first reduction."""
+        """Whether the last similar run has the same path as f: before the first reduction it is f."""
         original, evidence = snapshot.original, snapshot.evidence
         return self._same_paths.get((original, evidence), lambda: original is None or original == evidence)
 
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
-        """A new frame, and the picture below its robots and its crosshair. Without a `cursor` it has no crosshair."""
+        """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         still = self._still(shown, view, palette)
         canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
         robots(canvas, view, still.written, shown.snapshot, trails, palette)
@@ -115,7 +115,7 @@ class MapDrawing:
         place, state, candidate, layers = shown.place, shown.snapshot.state, shown.candidate, shown.layers
         looked_at: tuple[object, ...] = (candidate,)
         if isinstance(candidate, Candidate):
-            # Another object after each of its tests, with the same models.
+            # The object changes after each of its tests, the models do not.
             looked_at = (candidate.split, candidate.kind, candidate.partition)
         split = state.round.split if state.round else None
         made_of = (state.elements, state.environment, split, state.pinned, *looked_at, state.evidence_test)

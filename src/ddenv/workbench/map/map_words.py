@@ -31,9 +31,9 @@ LONGEST_NAME = 40
 
 
 def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
-    """One line that says what the signs on the map mean, as many as fit in `width`.
+    """One line with the meanings of the signs on the map, as many as fit in `width`.
 
-    With `same_paths`, the last similar run went as f did.
+    With `same_paths`, the last similar run has the same path as f.
     """
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
@@ -53,7 +53,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
 
 
 def sensed_order(state: RunState) -> dict[str, int]:
-    """The models that the last similar run sensed, numbered from 1 in the order in which it first did."""
+    """The models that the last similar run sensed, numbered from 1 by the first time."""
     return {name: number for number, (name, _) in enumerate(_sensed(state), start=1)}
 
 
@@ -65,7 +65,7 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
-    """Name, part, size, distance to f and when it was first sensed, as much as fits in `columns`, or all. Names are shortened."""
+    """Name, part, size, distance to f and when it was first sensed, as much as fits in `columns` (None: all). Names are shortened."""
     words = [_standing(state, each.name), _size(each)]
     if state.baseline is not None:
         words.append(f"{each.distance(state.baseline.position[:2]):.1f} m from f")
@@ -103,7 +103,7 @@ def _standing(state: RunState, name: str) -> str:
 
 
 class MapLines(Widget):
-    """One line on what is shown, one of signs; drawn again only if they changed."""
+    """One line on what is shown, and one of signs; drawn again only after changes."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)

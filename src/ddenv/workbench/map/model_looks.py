@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
 
 GONE = ord("·")
-# A model this many times larger than the median is a floor that others stand on.
+# A model this many times larger than the median counts as a floor under others.
 FLOOR_FACTOR = 8.0
 
 
@@ -49,7 +49,7 @@ class Looks:
 
     @property
     def labels(self) -> Sequence[str]:
-        """What stands on each model, "" for nothing."""
+        """The sign on each model, "" for none."""
         return self.signs.texts
 
 
@@ -80,7 +80,7 @@ def looks(prints: Sequence[Footprint], who: Kept, back: RGB, fore: RGB, palette:
     names, floor = _known(tuple(prints))
     kinds = _kinds(names, floor, who)
     parts = np.array([who.parts.get(name, -1) for name in names], dtype=int)
-    # Few of many parts look different, and only those are mixed.
+    # Only some of many parts look different, and only these colours are mixed.
     short = np.where(parts < 0, -1, parts % palette.tones)
     found, tones = np.unique(kinds * (palette.tones + 1) + short + 1, return_inverse=True)
     mixes = [divmod(value, palette.tones + 1) for value in found.tolist()]
@@ -90,7 +90,7 @@ def looks(prints: Sequence[Footprint], who: Kept, back: RGB, fore: RGB, palette:
 
 @lru_cache(maxsize=4)
 def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
-    """The names of models, and which are floors: what stays the same in all rounds."""
+    """The names of models, and which are floors: the same in all rounds."""
     areas = np.array([each.area for each in prints])
     return [each.name for each in prints], areas > FLOOR_FACTOR * (float(np.median(areas)) if len(areas) else 0.0)
 
@@ -120,7 +120,7 @@ def _label(kind: int, part: int) -> str:
 
 
 def _kinds(names: Sequence[str], floor: np.ndarray, who: Kept) -> np.ndarray:
-    """What each model is; the last rule that applies counts."""
+    """The kind of each model; the last rule that applies counts."""
     kinds = np.where(floor, FLOOR, KEPT)
     if who.shown is not None:
         out = ~_among(names, who.shown)
@@ -152,20 +152,20 @@ def fill(canvas: Canvas, grid: np.ndarray, how: Looks) -> None:
     halves = np.array([*(each.halves for each in how.looks), True])
     top, bottom = grid[0::2], grid[1::2]
     upper, lower = tone[top], tone[bottom]
-    # What has no half takes the whole cell; the model that is drawn later wins.
+    # A look without halves takes the whole cell; the model that is drawn later wins.
     whole = (upper == lower) | ~halves[upper] | ~halves[lower]
     upper = np.where(whole, tone[np.maximum(top, bottom)], upper)
     canvas.chars[:] = np.where(whole, glyphs[upper], ord("▀"))
     canvas.fore[:] = np.where(whole, inks[upper], fills[upper])
     canvas.back[:] = np.where(whole, fills[upper], fills[lower])
-    # The terminal's own colour can only be behind a block.
+    # The terminal's own colour can only be the background of a block.
     under = ~whole & (top == EMPTY)
     canvas.chars[under], canvas.fore[under], canvas.back[under] = ord("▄"), fills[lower[under]], ground
     _seams(canvas, grid, tone, how)
 
 
 def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> None:
-    """Lines between neighbours that look alike and are not one model."""
+    """Lines between neighbours that look alike but are different models."""
     pixels, many = tone[grid], how.palette.colors == MANY
     beside, above = np.zeros(grid.shape, dtype=bool), np.zeros(grid.shape, dtype=bool)
     beside[:, :-1] = (pixels[:, :-1] == pixels[:, 1:]) & (grid[:, :-1] != grid[:, 1:])
@@ -175,7 +175,7 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     fills = np.array([*(each.fill for each in how.looks), 0], dtype=np.int32)
     upper, lower = pixels[0::2], pixels[1::2]
     full = solid[upper] & (upper == lower)
-    # Behind a full block nothing is seen: with one style for all, a row is few pieces of text.
+    # The background of a full block is invisible: one style for all makes a row of few pieces of text.
     block = full & (canvas.chars == ord("█"))
     canvas.back[block] = seams[upper[block]]
     for where, fine, coarse in ((above[0::2], "▇", "▄"), (beside[0::2] | beside[1::2], "▉", "▌")):
@@ -192,7 +192,7 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
 
 
 def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, color: int) -> np.ndarray:
-    """Dots where removed models stood: `removed` is their owner grid. Of what is kept they hide only floors.
+    """Dots at removed models: `removed` is their owner grid. Of the kept models they hide only floors.
 
     Returns which cells have dots, shape (rows, columns).
     """

@@ -1,4 +1,4 @@
-"""The picture of a map: what stays while robots drive, then the robots, the paths behind them, and the crosshair."""
+"""The picture of a map: the background, then the robots, their paths, and the crosshair."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A letter at a place, m, on a ground of its own, so that it is found at once."""
+    """A letter at a place, m, with its own background, so that it is easy to find."""
 
     point: Point
     text: str
@@ -54,8 +54,8 @@ class Mark:
 class Picture:
     """A canvas for `view`, with the looks of the models and the owner of each pixel: kept ones in `grid`, removed ones in `gone`.
 
-    `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where the sign of each model begins
-    that has one.
+    `dotted` cells show removed models, `written` ones bear a letter or a mark. `cells` is where each model's sign begins, if it
+    has one.
     """
 
     view: View
@@ -92,7 +92,7 @@ def picture(
     lines: Sequence[Line],
     marks: Sequence[Mark],
 ) -> Picture:
-    """All that stays as it is while robots drive. Letters stand on paths, and marks on letters."""
+    """All that does not change while robots drive. Letters cover paths, and marks cover letters."""
     view = models.view
     canvas = Canvas(view.rows, view.columns, how.palette.back)
     grid = owners(models.spans, view, np.flatnonzero(how.kinds != REMOVED))
@@ -117,7 +117,7 @@ def picture(
 
 
 def follow(trails: Mapping[int, list[Point]], snapshot: Snapshot) -> dict[int, list[Point]]:
-    """Where the robots that drive now have been, by test, m: those of before and where they are now."""
+    """The paths of the robots that drive now, by test, m: the earlier ones with the current places."""
     grown = {}
     for live in snapshot.live:
         trail = trails.get(live.test, [])
@@ -136,7 +136,7 @@ def robots(
     trails: Mapping[int, list[Point]],
     palette: Palette,
 ) -> None:
-    """The robots as arrows and the paths behind them, which hide no letter; those of the candidate in focus stand out."""
+    """The robots as arrows with their paths, which hide no letter; those of the candidate in focus stand out."""
     focus = snapshot.focus
     ids = {test.id for test in snapshot.running if focus is not None and test.candidate == focus.index}
     colors = {live.test: palette.live if live.test in ids or not ids else palette.dull for live in snapshot.live}
@@ -150,7 +150,7 @@ def robots(
 
 
 def crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:
-    """Marks a cell by four arms; a letter in it stays to be read."""
+    """Marks a cell by four arms; a letter in it stays readable."""
     rows, columns = canvas.chars.shape
     row, column = min(cell[0], rows - 1), min(cell[1], columns - 1)
     for (down, right), sign in ARMS:

@@ -1,4 +1,4 @@
-"""What a map shows: a place, read in a thread since worlds can be large, and a run as it is now."""
+"""What a map shows: a place, read in a thread since worlds can be large, and the current state of a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # The layers of the map, which can be hidden.
 LAYERS = ("partitions", "removed", "pinned", "sensed", "path", "original", "failure")
 Point = tuple[float, float]
-# How long a run file that another program keeps locked is tried again, s.
+# How long to retry a run file that another program has locked, s.
 PATIENCE = 10.0
 
 
@@ -38,7 +38,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """All that a map shows: a world, its run as it is now, and the `candidate` whose models stand out.
+    """All that a map shows: a world, the current state of its run, and the `candidate` whose models stand out.
 
     `layers` are from LAYERS; `selection` are the names of the models that the user selected.
     """
@@ -85,7 +85,7 @@ def place_of_run(path: Path) -> Place:
                 scenario, world, _ = read_parts(run)
             return place_of(world, scenario)
         except Busy:
-            # The world is read only once, and other programs soon finish their writing.
+            # The world is read only once, and other programs finish writing soon.
             if time.monotonic() > until:
                 raise
             time.sleep(0.1)

@@ -1,4 +1,4 @@
-"""Which part of the plane a map shows, and the crosshair that goes from cell to cell."""
+"""The part of the plane that a map shows, and the crosshair, which moves from cell to cell."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ddenv.map.raster import View
 class Viewport:
     """A `view` (None before the map has a size) and a `cursor` (row, column) in it.
 
-    While it is `fitted`, the view shows all that matters; zooming and panning end that.
+    While `fitted`, the view shows everything important; zooming and panning end that.
     """
 
     def __init__(self) -> None:
@@ -20,16 +20,16 @@ class Viewport:
         self.fitted = True
 
     def resize(self, columns: int, rows: int, fitting: Callable[[int, int], View]) -> None:
-        """Another size, or other things that matter: `fitting` returns a view of these for a size."""
+        """Changes the size or the important places: `fitting` returns a view of these for a size."""
         view = self.view
         if view is None or self.cursor == (view.rows // 2, view.columns // 2):
-            # Until it is moved the crosshair is in the middle.
+            # The crosshair is in the middle until the user moves it.
             self.cursor = rows // 2, columns // 2
         else:
             self.cursor = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
         keep = view if not self.fitted else None
         new = View(keep.x, keep.y, keep.scale, columns, rows) if keep else fitting(columns, rows)
-        # Drawings are kept for a view: an equal one stays the same object.
+        # Drawings are reused for a view, so an equal view stays the same object.
         self.view = view if new == view else new
 
     def zoom(self, factor: float, about: Cell | None) -> None:
@@ -38,7 +38,7 @@ class Viewport:
             self._look(self.view.zoomed(factor, self.view.point(about) if about else None))
 
     def pan(self, columns: float, rows: float) -> None:
-        """Shows what is this number of cells to the right and upwards."""
+        """Moves the view by this number of cells to the right and upwards."""
         if self.view is not None:
             self._look(self.view.panned(columns, rows))
 

@@ -1,4 +1,4 @@
-"""The map of a run: the world from above, where a crosshair, keys and the mouse point at models and places."""
+"""The map of a run: the world from above, with a crosshair to choose models and places by keys or mouse."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from ddenv.workbench.wording import plain
 if TYPE_CHECKING:
     from ddenv.runfile.state import Candidate, Trial
 
-# Each turn of the wheel comes closer by this factor, or goes farther away.
+# One step of the wheel zooms by this factor.
 WHEEL = 1.25
 
 
 class WorldMap(Widget, can_focus=True):
-    """Top-down map. Give it a `Place`, then snapshots. While it is `picking`, enter and clicks choose places, not models."""
+    """Top-down map. It takes a `Place`, then snapshots. While `picking`, enter and clicks choose places, not models."""
 
-    HELP = "click: select a model or not   wheel: closer, farther   drag: move the map"
+    HELP = "click: select or unselect a model   wheel: zoom   drag: move the map"
     BINDINGS: ClassVar = [
         Binding("left", "move(-1, 0)", "move", show=False, id="map.left", tooltip="crosshair to the left"),
         Binding("right", "move(1, 0)", "move", show=False, id="map.right", tooltip="crosshair to the right"),
@@ -47,7 +47,7 @@ class WorldMap(Widget, can_focus=True):
         Binding("shift+right", "pan(1, 0)", "pan", show=False, id="map.pan_right", tooltip="move the map to the right"),
         Binding("shift+up", "pan(0, 1)", "pan", show=False, id="map.pan_up", tooltip="move the map up"),
         Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
-        Binding("enter", "pick", "select", id="map.pick", tooltip="select the model under the crosshair, or no longer"),
+        Binding("enter", "pick", "select", id="map.pick", tooltip="select or unselect the model under the crosshair"),
         Binding("left_square_bracket", "neighbour(-1)", show=False, id="map.previous", tooltip="to the previous model"),
         Binding("right_square_bracket", "neighbour(1)", show=False, id="map.next", tooltip="to the next model"),
     ]
@@ -60,7 +60,7 @@ class WorldMap(Widget, can_focus=True):
 
     @dataclass
     class SelectionChanged(Message):
-        """Other models are selected by hand."""
+        """The selection changed."""
 
         models: frozenset[str]
 
@@ -83,16 +83,16 @@ class WorldMap(Widget, can_focus=True):
         self._strips: dict[int, Strip] = {}
         self._due = False
         self._picking = False
-        # Where the mouse has hold of the map, and whether it moved since.
+        # Where the mouse button went down on the map, and whether the mouse has moved since.
         self._grabbed: tuple[int, int] | None = None
         self._dragged = False
         self._numbers: dict[str, int] = {}
-        # The model that the crosshair was sent to, with where it was then: it may be hidden by another one.
+        # The model that the crosshair moved to, and the position: another model may hide it.
         self._aim: tuple[str, Cell, View] | None = None
         self._pointed: str | None = None
         self._subtitle_of: tuple[object, ...] = ()
 
-    # What is shown.
+    # The content.
 
     @property
     def place(self) -> Place:
@@ -104,7 +104,7 @@ class WorldMap(Widget, can_focus=True):
 
     @property
     def candidate(self) -> Candidate | Trial | None:
-        """The one whose models stand out."""
+        """The candidate whose models stand out."""
         return self.shown.candidate
 
     @property
@@ -132,7 +132,7 @@ class WorldMap(Widget, can_focus=True):
         return self.has_focus or self._picking
 
     def set_place(self, place: Place, notice: str = "") -> None:
-        """Another world. `notice` is shown instead of a map when there is none."""
+        """Shows another world, or `notice` if there is none."""
         self.notice = notice
         self.shown = replace(self.shown, place=place)
         self._numbers = {each.name: number for number, each in enumerate(place.prints)}
@@ -141,12 +141,12 @@ class WorldMap(Widget, can_focus=True):
         self.refresh()
 
     def set_marks(self, spawn: tuple[float, float, float] | None, goal: Point | None) -> None:
-        """Other start (x, y, yaw) and goal in the same world."""
+        """Changes start (x, y, yaw) and goal in the same world."""
         self.shown = replace(self.shown, place=replace(self.place, spawn=spawn, goal=goal))
         self._refit()
 
     def show(self, snapshot: Snapshot, candidate: Candidate | Trial | None) -> None:
-        """The run as it is now; `candidate` is the one whose models stand out."""
+        """Shows the current state of the run; the models of `candidate` stand out."""
         before = self.snapshot
         if self.selection and snapshot.state.environment is not before.state.environment:
             self.select(self.selection.intersection(snapshot.state.environment))
@@ -163,7 +163,7 @@ class WorldMap(Widget, can_focus=True):
         self.draw()
 
     def legend(self, width: int) -> Text:
-        """One line that says what the signs on the map mean, as many as fit."""
+        """One line with the meanings of the signs on the map, as many as fit."""
         return legend(self.shown, width, same_paths=self._drawing.same_paths(self.snapshot))
 
     # Models.
@@ -180,7 +180,7 @@ class WorldMap(Widget, can_focus=True):
         return None if owner == EMPTY else self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
-        """What is known of a model, on one line of at most `columns`; empty for a name that no model has."""
+        """A description of a model in one line of at most `columns`; empty for an unknown name."""
         number = self._numbers.get(name)
         return Text() if number is None else describe(self.snapshot.state, self.place.prints[number], columns)
 
@@ -202,7 +202,7 @@ class WorldMap(Widget, can_focus=True):
         return True
 
     def select(self, names: Iterable[str]) -> None:
-        """These models instead of those selected so far."""
+        """Selects these models instead."""
         selection = frozenset(names)
         if selection != self.selection:
             self.shown = replace(self.shown, selection=selection)
@@ -210,7 +210,7 @@ class WorldMap(Widget, can_focus=True):
             self.draw()
 
     def clear_selection(self) -> None:
-        """No model is selected any more."""
+        """Clears the selection."""
         self.select(())
 
     def action_neighbour(self, step: int) -> None:
@@ -225,7 +225,7 @@ class WorldMap(Widget, can_focus=True):
             self.go_to(names[0 if step > 0 else -1])
 
     def action_pick(self) -> None:
-        """Chooses the place under the crosshair, or else its model."""
+        """While picking, chooses the place under the crosshair; otherwise selects its model."""
         name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
         if self._picking and port.view is not None:
             self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
@@ -237,22 +237,22 @@ class WorldMap(Widget, can_focus=True):
             why = "removed already" if name in state.elements else "protected: it always stays"
             self.notify(f"{plain(name)} is {why}", severity="warning", markup=False)
 
-    # Which part of the world.
+    # The view.
 
     def zoom(self, factor: float) -> None:
-        """Closer by `factor`, about the crosshair where there is one, else about the middle."""
+        """Zooms in by `factor`, about the crosshair if shown, else about the middle."""
         self.viewport.zoom(factor, self.viewport.cursor if self.aims else None)
         self._draw_soon()
 
     def fit(self) -> None:
-        """Shows all that matters again."""
+        """Shows everything important again."""
         self.viewport.fitted = True
         self._refit()
 
     def _refit(self) -> None:
-        """Another size, or other things that matter."""
+        """Changes the size or the important places."""
         columns, rows = self.size
-        # Without a world there is nothing to see, and what draws it need not be loaded.
+        # Without a world there is nothing to draw, and the drawing code is not loaded.
         if columns and rows and (not self.notice or self.place.prints):
             self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
             self.draw()
@@ -313,10 +313,10 @@ class WorldMap(Widget, can_focus=True):
         self.draw()
 
     def notify_style_update(self) -> None:
-        """Another theme: every colour is mixed with its background."""
+        """Redraws in another theme, since every colour is mixed with its background."""
         super().notify_style_update()
         palette = self._mixed() if self.is_attached else None
-        # A move of the focus comes here, too, and changes no colour.
+        # A move of the focus comes here, too, but changes no colour.
         if palette != self._palette:
             self._palette, self._canvas = palette, None
             self.draw()
@@ -325,7 +325,7 @@ class WorldMap(Widget, can_focus=True):
         return palette_of(self.app, self.background_colors[1], self.colors[3])
 
     def _draw_soon(self) -> None:
-        """Draws once for all that is asked for until then."""
+        """Draws once for all requests until then."""
         if not self._due:
             self._due = True
             self.call_later(self._draw_due)
@@ -364,12 +364,12 @@ class WorldMap(Widget, can_focus=True):
         return self._strips[y]
 
     def _show_pointed(self, view: View) -> None:
-        """The model under the crosshair in the panel's lower border, else how wide the map is."""
+        """The model under the crosshair in the panel's lower border, else the width of the map."""
         model = self.model_at_cursor if self.aims else None
         if model != self._pointed:
             self._pointed = model
             self.post_message(self.Pointed(model))
-        # Words take their time: only when something that they mention changed.
+        # Texts are slow to make: only after a change in what they mention.
         where = self.viewport.cursor if self._picking else self.snapshot.state.evidence_test
         made_of = (model, self.picture and self.picture.how, view, where, self.notice)
         if made_of != self._subtitle_of:
