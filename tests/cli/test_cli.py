@@ -232,7 +232,7 @@ MISTAKES = {
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
     "world twice": (
         ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],
-        "--world: goes with a scenario",
+        "--world: only for a scenario",
     ),
     "output": (["run", WALL, "--output", "x.txt"], "neither a folder nor"),
 }

@@ -132,7 +132,7 @@ def test_the_commands(tmp_path):
     wall = DATA / "wall.sdf"
     table = ddenv("world", "check", wall)
     assert table.returncode == 0
-    assert table.stdout.rstrip().endswith("7 models, 6 can be removed; everything was taken as it is written")
+    assert table.stdout.rstrip().endswith("7 models, 6 can be removed; nothing was replaced or ignored")
     assert len(json.loads(ddenv("world", "check", wall, "--json").stdout)["models"]) == 7
     drawn = ddenv("world", "show", wall)
     assert drawn.returncode == 0 and "wall" in drawn.stdout and "\x1b" not in drawn.stdout

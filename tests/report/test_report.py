@@ -164,7 +164,7 @@ def test_settings_that_were_changed_on_the_way(run):
     ("made", "told"),
     [
         (lambda run: run, "Not started yet"),
-        (lambda run: run.created(), "The engine is not there any more"),
+        (lambda run: run.created(), "The engine is gone"),
         (
             lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
             "Stopped: as you asked.",
@@ -182,14 +182,14 @@ def test_a_run_that_has_not_come_to_an_end_says_so(run, tmp_path, made, told):
 def test_a_run_that_is_still_on_says_so(run, tmp_path):
     fake_run.mid_round(run).hold()
     text = page(run, tmp_path).text
-    assert "This run has not ended. What follows is what was known at" in text
+    assert "This run has not ended. This report shows what was known at" in text
     assert "6 of 11 models are enough to make the robot fail so far" in text
 
 
 def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
     fake_run.finished(run).write("reduced", candidate=99, environment=[77], evidence_test=1)
     text = page(run, tmp_path).text
-    assert "Not all of this run could be read." in text and "is invalid here" in text
+    assert "Parts of this run could not be read." in text and "is invalid here" in text
     assert "2 of 11 models" in text
 
 

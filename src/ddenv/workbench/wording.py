@@ -1,4 +1,4 @@
-"""Numbers and names as the screen words them."""
+"""Numbers and names as the screen shows them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ddenv.words import count as count
 from ddenv.words import duration as duration
 from ddenv.words import percent as percent
 
-# Every status and verdict has a sign of its own, so that nothing depends on colour alone.
+# Every status and verdict has its own sign, so that nothing depends on colour alone.
 STATUS = {
     "created": ("○", "not started"),
     "starting": ("◌", "engine starts"),
@@ -45,13 +45,13 @@ VERDICT = {
 
 
 def outcome(test: Test) -> str:
-    """How a test ended, with the failure's own word where there is one."""
+    """How a test ended, with the kind of failure if known."""
     words = OUTCOME.get(test.outcome, "")
     return f"{words[0]} {test.failure}" if words and test.failure in DEEDS else words
 
 
 def plain(text: Any) -> str:
-    """`text` on one line without control characters: names come from files, and must not steer the terminal."""
+    """`text` on one line without control characters: names come from files, and must not control the terminal."""
     return "".join(char if char.isprintable() else "�" for char in " ".join(str(text).split()))
 
 
@@ -70,7 +70,7 @@ def brief(seconds: float) -> str:
 
 
 def about(low: float, middle: float, high: float) -> str:
-    """A time in s with its interval, rounded as far as it is uncertain: 2 min (1 to 5)."""
+    """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
     low, middle, high = (_rounded(each / unit) for each in (low, middle, high))
     interval = f" ({low} to {high})" if low < high else ""
@@ -84,7 +84,7 @@ def _rounded(number: float) -> int:
 
 
 def metres(value: Any, digits: int = 1) -> str:
-    """A distance in m, or nothing where there is none."""
+    """A distance in m, or "" for None."""
     if not isinstance(value, (int, float)) or not math.isfinite(value):
         return ""
     return f"{value:.{digits}f} m"

@@ -206,7 +206,7 @@ def _home(path: Path) -> Path:
     try:
         return path.expanduser()
     except RuntimeError:
-        raise UserError(f"{path}: there is no such user here") from None
+        raise UserError(f"{path}: unknown user") from None
 
 
 def _here() -> Path:

@@ -37,7 +37,7 @@ def written(key: str) -> str:
 
 
 def textual_keys(keys: str, where: str) -> str:
-    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError with a message that begins with `where`."""
+    """Keys from the settings file, separated by commas, by Textual's names. Raises UserError that begins with `where`."""
     names = [keys] if keys == "," else [key.strip() for key in keys.split(",")]
     return ",".join(_textual_key(key, where) for key in names)
 

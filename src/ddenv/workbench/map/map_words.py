@@ -65,7 +65,7 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 
 
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
-    """Name, part, size, distance to f and when it was first sensed, as much as fits in `columns` (None: all). Names are shortened."""
+    """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
     words = [_standing(state, each.name), _size(each)]
     if state.baseline is not None:
         words.append(f"{each.distance(state.baseline.position[:2]):.1f} m from f")

@@ -19,7 +19,7 @@ from ddenv.workbench.wording import STATUS
 SHOWN = 40
 # What SQLite says about a file that another program has locked.
 LOCKED = "database is locked"
-# The number of events that are read at a time: other threads have their turn after that.
+# The number of events read at a time, before other threads get their turn.
 BATCH = 500
 # The endings of files beside a run file that are deleted with it.
 BESIDE = ("-wal", "-shm", ".lock", ".log", ".scene.log")
@@ -74,7 +74,7 @@ class Recent:
 
 @dataclass(slots=True)
 class _Read:
-    """A file's run when the file had this `stamp`; with its `state` to go on from while an engine works on it."""
+    """A file's run when the file had this `stamp`; while an engine works on it, also its `state`, to read on from there."""
 
     stamp: tuple[int, ...]
     recent: Recent
@@ -82,14 +82,14 @@ class _Read:
 
 
 class RunsFolder:
-    """A folder of runs that is read again and again: only files that changed, and only what is new in them."""
+    """A folder of runs, read repeatedly: each time only changed files, and only their new events."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._read: dict[Path, _Read] = {}
 
     def look(self, patience: float = float("inf"), most: int | None = None) -> list[Recent]:
-        """The runs that were changed last, at most `most`. After `patience` s the rest waits for the next look: `status` "".
+        """The last changed runs, at most `most`. After `patience` s the rest waits for the next call, with `status` "".
 
         Not for the screen's thread.
         """
@@ -113,19 +113,19 @@ class RunsFolder:
         if not recent.trouble and recent.status not in ("created", "finished", "stopped", "failed"):
             alive = engine_is_alive(path)
             if not alive:
-                # A run that no engine works on needs no state to go on from.
+                # A run without an engine does not change, so its state is not kept.
                 read.state = None
             return recent if alive else replace(recent, status="lost")
         return recent
 
 
 def recent_runs(folder: Path) -> list[Recent]:
-    """The newest runs in `folder`; damaged ones are listed with what is wrong."""
+    """The newest runs in `folder`; damaged ones are listed with their error."""
     return RunsFolder(folder).look(most=SHOWN)
 
 
 def delete_run(path: Path) -> None:
-    """Deletes a run file and all that lies beside it. Raises UserError while an engine works on it, or if it cannot be."""
+    """Deletes a run file and its files beside it. Raises UserError while an engine works on it, or if it cannot be deleted."""
     with engine_lock(path):
         for each in (path, *(path.with_name(f"{path.name}{ending}") for ending in BESIDE)):
             try:
@@ -189,7 +189,7 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
 
 
 def _unread(path: Path, stamp: tuple[int, ...], error: UserError) -> _Read:
-    """A run that cannot be read. What another program keeps locked is read again at the next look."""
+    """A run that cannot be read. A file locked by another program is read again at the next call."""
     locked = isinstance(error, Busy) or LOCKED in str(error)
     return _Read(() if locked else stamp, Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3], trouble=str(error)))
 

@@ -1,4 +1,4 @@
-"""The runs screen: every run of the runs folder, its state, and what can be done with it."""
+"""The runs screen: every run of the runs folder, its state, and actions on it."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from ddenv.workbench.runs.runs_table import RunTable, about
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain
 
-# The time between two looks at the folder, and the maximum time of one before it shows what it has, s.
+# The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
 
 
 class RunsScreen(Screen[None]):
-    """The folder is read in a thread, again and again; only what the user asks for is written."""
+    """Reads the folder repeatedly in a thread; writes only on the user's command."""
 
     CSS_PATH = "runs.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = [
-        Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it: look only, and change nothing"),
+        Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it without changing anything"),
         Binding("c", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
-        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it, after a question"),
-        Binding("slash", "filter", "filter", id="runs.filter", tooltip="only runs with these letters in the name"),
+        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it (asks first)"),
+        Binding("slash", "filter", "filter", id="runs.filter", tooltip="filter by letters of the name"),
         Binding("question_mark,f1", "app.help", "help", id="runs.help", tooltip="show every key", key_display="?"),
-        Binding("escape,q,R", "back", "back", id="runs.back", tooltip="back to where you were", key_display="esc"),
+        Binding("escape,q,R", "back", "back", id="runs.back", tooltip="back to the previous screen", key_display="esc"),
     ]
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class RunsScreen(Screen[None]):
     def _chosen(self) -> Recent | None:
         return self.query_one(RunTable).chosen
 
-    # What can be done with a run.
+    # Actions on a run.
 
     @on(DataTable.RowSelected)
     def _open(self) -> None:
@@ -138,7 +138,7 @@ class RunsScreen(Screen[None]):
             self.post_message(ShowSetup(like=run.path))
 
     def _readable(self) -> Recent | None:
-        """The run under the cursor, if it can be read; says why not."""
+        """The run under the cursor if it can be read; otherwise shows why not."""
         run = self._chosen
         if run is None:
             self._complain("there is no run here")
@@ -155,7 +155,7 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             self._complain("its engine is at work: open the run and stop it first")
         else:
-            words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log goes, too."
+            words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log is deleted, too."
             self.app.push_screen(Question(words, final=True), lambda yes: self._answered(bool(yes), run.path))
 
     def _answered(self, yes: bool, path: Path) -> None:
@@ -195,7 +195,7 @@ class RunsScreen(Screen[None]):
         self.query_one(RunTable).focus()
 
     def action_back(self) -> None:
-        """First out of the filter, then out of the screen."""
+        """Closes first the filter, then the screen."""
         if not self.has_class("-filtering"):
             self.dismiss()
             return

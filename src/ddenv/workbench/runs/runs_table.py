@@ -1,4 +1,4 @@
-"""The list of recent runs, and the table of all runs with as many columns as there is room for."""
+"""The list of recent runs, and the table of all runs with as many columns as fit."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class RunList(OptionList):
         self._folder: RunsFolder | None = None
 
     def run_of(self, option_id: str | None) -> Recent:
-        """The run that an option stands for."""
+        """The run of an option."""
         return self._runs[option_id or ""]
 
     @work(thread=True, group="runs", exclusive=True)
     def read(self) -> None:
-        """Lists what is in the folder now."""
+        """Reads the folder again."""
         from ddenv.runs.folder import runs_folder
 
         self._folder = self._folder or RunsFolder(runs_folder())
@@ -54,7 +54,7 @@ class RunList(OptionList):
 
 
 def about(run: Recent, width: int) -> Text:
-    """All that is known about a run, for a column of that `width`."""
+    """All details of a run, for a column of that `width`."""
     text = Text(shortened(plain(run.path.stem), width), "bold").append("\n")
     if run.trouble:
         return text.append(f"\n{plain(run.trouble)}", "not bold")
@@ -77,7 +77,7 @@ def about(run: Recent, width: int) -> Text:
     return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
 
 
-# All but the name, which takes the rest: title, columns, whether it is a number, and its text.
+# All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
@@ -85,14 +85,14 @@ FIRST: tuple[_Column, ...] = (
     ("tests", 5, True, lambda run: str(run.tests) if run.total else ""),
     ("changed", 11, True, lambda run: moment(run.changed)),
 )
-# Each comes only when there is room for it, in this order.
+# Columns are added in this order while they fit.
 MORE: tuple[_Column, ...] = (
     ("scenario", 16, False, lambda run: plain(run.scenario)),
     ("started", 11, True, lambda run: moment(run.started)),
     ("size", 8, True, lambda run: size(run.size)),
 )
 NARROWEST_NAME = 18
-# Beside its words each column has a space at the right and at the left.
+# Each column has a space at both sides of its text.
 AROUND = 2
 
 
@@ -102,19 +102,19 @@ def size(number: int) -> str:
 
 
 def moment(time: float) -> str:
-    """A Unix time, s: the clock if it was today, else the date."""
+    """A Unix time, s: the time of day if it is today, else the date."""
     if not time:
         return ""
     try:
         then, today = datetime.fromtimestamp(time), datetime.fromtimestamp(poll.now()).date()
     except (ValueError, OverflowError, OSError):
-        # File systems allow years that no calendar has.
+        # File systems allow years beyond the calendar.
         return "?"
     return f"{then:%H:%M:%S}" if then.date() == today else f"{then.day} {then:%b %Y}"
 
 
 class RunTable(DataTable[Text]):
-    """One row a run; only cells that changed are drawn again."""
+    """One row per run; only changed cells are drawn again."""
 
     BINDINGS: ClassVar = [
         Binding("enter", "select_cursor", "open", id="runs.open", tooltip="open the run under the cursor"),

@@ -1,4 +1,4 @@
-"""What was chosen on the setup screen: a scenario, a world or a run, read in a thread since worlds can be large."""
+"""The choice on the setup screen: a scenario, a world or a run, read in a thread since worlds can be large."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from ddenv.world.model import Model, World
     from ddenv.world.scenario import Reading, Scenario
 
-# A robot starts this far above the ground, m: wheels that begin inside it would throw the robot.
+# A robot starts this far above the ground, m: wheels that start inside it would throw the robot.
 GAP = 0.02
-# The height of a robot's frame where its file cannot be read, m; Start complains about the file.
+# The height of a robot's frame if its file cannot be read, m; Start then reports the file's error.
 SOME_HEIGHT = 0.2
 
 
@@ -25,7 +25,7 @@ class Choice:
     """A world, how it was read, and its scenario unless a bare world was chosen.
 
     `settings` has the options that the form starts with: the scenario's own, or the defaults. `clearance` is how far the robot's
-    frame is above the ground, m. With `run`, all of it was in the run file `path`.
+    frame is above the ground, m. With `run`, all comes from the run file `path`.
     """
 
     path: Path
@@ -55,14 +55,14 @@ class Choice:
             return f"{models} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
         if self.scenario is not None:
             return f"{models} {plain(self.scenario.description)}"
-        return f"{models} A world without a scenario: give the robot a spawn and a goal, on the map or in numbers."
+        return f"{models} A world without a scenario: set the robot's spawn and goal, on the map or as numbers."
 
     @property
     def _removable(self) -> str:
         if self.models == 0:
             return "None of its models can be removed: there is nothing to reduce."
         if self.models == 1:
-            return "1 model: a run can only find whether the failure needs it."
+            return "1 model: a run can only show whether the failure needs it."
         return f"{self.models} models."
 
 
@@ -94,7 +94,7 @@ def _read_run(path: Path) -> Choice:
     return Choice(path, world, scenario.reading, scenario, scenario, clearance, run=True)
 
 
-# How high a robot starts.
+# The height of the spawn.
 
 
 def spawn_height(world: World, clearance: float, x: float, y: float) -> float | None:
@@ -121,7 +121,7 @@ def _ground(world: World, x: float, y: float) -> float | None:
 
 
 def _clearance(world: World, settings: Scenario, placed: bool) -> float:
-    """As the scenario has it, or else as the robot's shapes need."""
+    """The scenario's clearance, or else the clearance that the robot's shapes need."""
     from ddenv.world.read import read_model
 
     above = _scenario_clearance(world, settings) if placed else None

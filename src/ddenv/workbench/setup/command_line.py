@@ -32,7 +32,7 @@ def command(
     """The words of the command, to be joined by `shlex.join`.
 
     `source` is a scenario's name or file, or a world; `own` is the scenario in it, None for a world, which starts with `standard`.
-    `reading` are the options on how to read worlds, `name` is the run's where it is not the next free one.
+    `reading` are the options for reading worlds, `name` is the run's name if it is not the next free one.
     """
     before, after = (own or standard).model_dump(mode="json"), asked.model_dump(mode="json")
     words = ["ddenv", "run", source]
@@ -53,7 +53,7 @@ def command(
 
 
 def source_of(path: Path, bundled: Path) -> str:
-    """What `ddenv run` takes for a file: the name of a bundled scenario, or its whole path."""
+    """A file as an argument of `ddenv run`: the name of a bundled scenario, or the whole path."""
     if path.parent == bundled and path.suffix == ".yaml":
         return path.stem
     return _path(path)

@@ -17,7 +17,7 @@ from ddenv.workbench.wording import count, duration
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-# The maximum number of runs to look at, and how many of the same scenario are enough.
+# The maximum number of runs to read, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
 UNKNOWN_TIME = "the time is known after the baseline"
 
@@ -31,7 +31,7 @@ class Past:
 
 
 def past_of(scenario: Scenario, folder: Path) -> Past:
-    """What is known from the newest runs in `folder` with the same name, timeout and files, wherever these are."""
+    """The cost in the newest runs in `folder` with the same name, timeout and files, in any folder."""
     try:
         paths = sorted(folder.glob("*.ddenv"), key=lambda path: -path.stat().st_mtime)
     except OSError:
@@ -70,7 +70,7 @@ def _positive(value: Any) -> float | None:
 
 
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
-    """The line with the tests and the time that all of a reduction may take."""
+    """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
     rough = rough_tests(models, reduction.algorithm, reduction.iterations, reduction.growth == "paper")
     low, middle, high = (tests + reduction.baseline_runs for tests in rough)

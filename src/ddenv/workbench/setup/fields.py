@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 class SchemaSelect(Select[str]):
     """All names of a kind; its id is the kind."""
 
-    # Here, not on the screen: the form around it would take these keys for itself.
+    # These keys are bound here, not on the screen: otherwise the form around it would handle them.
     BINDINGS: ClassVar = [
         Binding("pagedown", "screen.scroll(1)", "more", id="schema.more", tooltip="scroll an explanation", show=False),
         Binding("pageup", "screen.scroll(-1)", "back", id="schema.back", tooltip="scroll it back", show=False),
     ]
 
     class Looked(Message):
-        """The user looks at this name: the chosen one, or in the open list the highlighted one."""
+        """The explained name changed: the chosen one, or in the open list the highlighted one."""
 
         def __init__(self, kind: Kind, name: str) -> None:
             super().__init__()
@@ -67,7 +67,7 @@ class SchemaSelect(Select[str]):
 
 
 class Explained(VerticalScroll):
-    """What the field means that has the focus, in a few lines that scroll."""
+    """The meaning of the focused field, in a few lines that scroll."""
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, can_focus=False)
@@ -113,7 +113,7 @@ class OptionsForm(Vertical):
         super().__init__(id=id, classes=classes)
         self._name_given = False
         self._suggested = ""
-        # What stands in fields that were not opened yet: most never are, and the screen is up sooner without them.
+        # The texts of fields that were not opened yet: most never are, and the screen opens faster without them.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
         self.seconds: float | None = None
         self.border_title = "Settings"
@@ -139,7 +139,7 @@ class OptionsForm(Vertical):
         self.query_one("#jobs", Input).value = _default_jobs()
         self.show_message("")
 
-    # What stands in it.
+    # The content.
 
     @property
     def method(self) -> tuple[str, str]:
@@ -149,7 +149,7 @@ class OptionsForm(Vertical):
 
     @property
     def texts(self) -> dict[str, str]:
-        """What stands in the fields, by id."""
+        """The texts of the fields, by id."""
         shown = {id: _text(self.query_one(f"#{id}")) for id in FIELDS if id not in self._unopened}
         return self._unopened | shown
 
@@ -164,9 +164,9 @@ class OptionsForm(Vertical):
         return name if self._name_given and name != self._suggested else ""
 
     def show_settings(self, scenario: Scenario, placed: bool, keep_places: bool = False) -> None:
-        """Fills in what the scenario says, in place of what another one said or was mistyped.
+        """Fills in the scenario's settings, in place of all earlier texts.
 
-        Where it is not `placed`, spawn and goal are left empty, or as they are.
+        If it is not `placed`, spawn and goal stay as they are.
         """
         texts = form.texts_of(scenario)
         if not placed:
@@ -196,7 +196,7 @@ class OptionsForm(Vertical):
                 field.value = text
 
     def show_fields(self, show: bool) -> None:
-        """All of it, or without the settings only their outcome, the name and Start."""
+        """The whole form; without the settings only the cost, the command, the name and Start."""
         self.query_one("#fields").display = self.query_one("#explained").display = show
 
     def suggest_name(self, name: str) -> None:
@@ -207,7 +207,7 @@ class OptionsForm(Vertical):
             with field.prevent(Input.Changed):
                 field.value = name
 
-    # What it says.
+    # The texts.
 
     def circumstances(self) -> Circumstances:
         pair, algorithm = self.method
@@ -243,7 +243,7 @@ class OptionsForm(Vertical):
         self.query_one(Explained).show(field.label, words, not_used(field, now))
 
     def _dim(self, algorithm: str = "") -> None:
-        """What the algorithm does not use stays a choice, for the next algorithm."""
+        """Parts that the algorithm does not use can still be chosen, for the next algorithm."""
         algorithm = algorithm or self.method[1]
         used, now = uses(algorithm), Circumstances(algorithm, self.method[0])
         for select in self.query(SchemaSelect):
@@ -253,16 +253,16 @@ class OptionsForm(Vertical):
                 self.query_one(f"#{field.id}").set_class(bool(not_used(field, now)), "-unused")
 
     def show_cost(self, words: str) -> None:
-        """Tests and time that the settings come to."""
+        """Shows the tests and the time that the settings need."""
         self.query_one("#cost", Static).update(Text(words, no_wrap=True, overflow="ellipsis"))
 
     def tell_command(self, words: str, typed: bool = True) -> None:
-        """The command that does the same, or where it is not to be `typed`, why there is none."""
+        """Shows the command that does the same; if it is not `typed`, why there is none."""
         line = Text("$ " if typed and words else "", "bold", no_wrap=True, overflow="ellipsis")
         self.query_one("#command", Static).update(line.append(plain(words), "not bold"))
 
     def complain(self, error: UserError) -> None:
-        """One line below the fields; the wrong field is marked and gets the cursor."""
+        """Shows an error below the fields; the wrong field is marked and gets the cursor."""
         self.show_message(f"{MARK}{error}")
         id = form.field_of(error)
         if id is None:
@@ -281,7 +281,7 @@ class OptionsForm(Vertical):
         line.display = bool(words)
         line.update(Text(plain(words)))
 
-    # What is done in it.
+    # Actions.
 
     @on(Button.Pressed, "#more")
     def toggle_more(self) -> None:

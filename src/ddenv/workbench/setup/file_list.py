@@ -15,12 +15,12 @@ from textual.widgets.option_list import Option
 from ddenv.errors import UserError
 from ddenv.workbench.wording import plain
 
-# The maximum number of recent files: more would hide the one that is looked for.
+# The maximum number of recent files: in a longer list files are hard to find.
 KEPT = 12
 
 
 def recent_file() -> Path:
-    """Where the recent files are listed: in `$DDENV_HOME`, or in the user's state folder."""
+    """The path of the list of recent files: in `$DDENV_HOME`, or in the user's state folder."""
     import platformdirs
 
     home = os.environ.get("DDENV_HOME")
@@ -29,12 +29,12 @@ def recent_file() -> Path:
 
 
 def recent_files() -> list[Path]:
-    """The recent files that still exist; none where the list is missing or damaged."""
+    """The recent files that still exist; none if the list is missing or damaged."""
     return [path for path in _listed() if is_file(path)]
 
 
 def remember(path: Path) -> None:
-    """Puts a file at the head of the recent ones, if the list can be written; bundled scenarios are listed anyway."""
+    """Puts a file first in the recent ones, if the list can be written; bundled scenarios are always listed."""
     from ddenv.world.files.access import write_file
     from ddenv.world.load import SCENARIOS
 
@@ -61,7 +61,7 @@ def _listed() -> list[Path]:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file, and it can be read."""
+    """Whether the file exists and can be read."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -69,7 +69,7 @@ def is_file(path: Path) -> bool:
 
 
 class FileList(OptionList):
-    """Scenarios by their names, worlds by their files' names; a run stands for its own scenario and world."""
+    """Scenarios by their names, worlds by their files' names; a run gives its own scenario and world."""
 
     class Looked(Message):
         """The cursor is on this file."""
@@ -86,7 +86,7 @@ class FileList(OptionList):
         self._looked: str | None = None
 
     def offer(self, bundled: list[Path], recent: list[Path], like: Path | None = None) -> None:
-        """Shows all that there is to choose from; the cursor is on `like`, a run, or else on the first."""
+        """Shows all choices; the cursor is on `like`, a run, or else on the first."""
         self._bundled, self._like = bundled, like
         self._recent = [path for path in recent if path not in bundled]
         self._fill()
@@ -94,7 +94,7 @@ class FileList(OptionList):
             self.highlighted = 0
 
     def add(self, path: Path) -> None:
-        """A file that was just opened: first of the recent ones, and under the cursor."""
+        """Adds a file that was just opened: first of the recent ones, and under the cursor."""
         if path not in self._bundled:
             self._recent = [path, *(each for each in self._recent if each != path)]
         self._looked = None

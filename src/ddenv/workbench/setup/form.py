@@ -1,4 +1,4 @@
-"""What the setup screen asks for, as texts to values, with complaints that name the field. Pure."""
+"""The fields of the setup screen: turns texts into values, with errors that name the field. Pure."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ ON, OFF = "on", "off"
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """`id` is the field's name on the screen, `label` what stands before it, `kind` int, float, str or bool.
+    """`id` is the field's name on the screen, `label` the text before it, `kind` int, float, str or bool.
 
-    `key` is the scenario's key for it, "" where a scenario has none. `choices` are the words it may be, if these are few. A field
-    may be empty where `empty` says so: it is shown in its place. `meaning` is a sentence. `setting` is the setting that the field
-    is for, if any.
+    `key` is the scenario's key for it, "" if a scenario has none. `choices` are the allowed words, if there are few. A field
+    with `empty` may be empty, and then shows it. `meaning` is a sentence. `setting` is the field's setting, if any.
     """
 
     id: str
@@ -88,7 +87,7 @@ class FieldError(UserError):
 
 
 def value(field: Field, text: str) -> Value:
-    """What `text` stands for. Raises FieldError."""
+    """The value of `text`. Raises FieldError."""
     text = text.strip()
     if field.kind is bool:
         return text == ON
@@ -126,7 +125,7 @@ def are_jobs(text: str) -> bool:
 
 
 def text_of(value: Value) -> str:
-    """How a value is written in a field."""
+    """A value as the text of a field."""
     if isinstance(value, bool):
         return ON if value else OFF
     if isinstance(value, float):
@@ -136,7 +135,7 @@ def text_of(value: Value) -> str:
 
 
 def read_key(data: Mapping[str, Any], key: str) -> Any:
-    """The value of a scenario's key such as `robot.spawn.x`; None where it is not there."""
+    """The value of a scenario's key such as `robot.spawn.x`; None if missing."""
     found: Any = data
     for part in key.split("."):
         found = found.get(part) if isinstance(found, Mapping) else None
@@ -144,7 +143,7 @@ def read_key(data: Mapping[str, Any], key: str) -> Any:
 
 
 def texts_of(scenario: Scenario) -> dict[str, str]:
-    """What a scenario's own settings are, as texts for the fields."""
+    """A scenario's settings as texts for the fields."""
     data = scenario.model_dump(mode="json")
     values = {field.id: read(data, field.setting) for field in ALL if field.key and field.setting}
     places = {field.id: read_key(data, field.key) for field in PLACES}
@@ -152,7 +151,7 @@ def texts_of(scenario: Scenario) -> dict[str, str]:
 
 
 def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
-    """`base` with what stands in the fields. Raises UserError, a FieldError where a text is no number."""
+    """`base` with the values of the fields. Raises UserError, or FieldError if a text is not a number."""
     from ddenv.runs.scenarios import with_values
     from ddenv.world.load import validate
 
@@ -167,7 +166,7 @@ def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str
 
 
 def place(what: str, texts: Mapping[str, str]) -> tuple[float, ...] | None:
-    """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m); None while any of them is no number."""
+    """The numbers of "spawn" (x, y, z m, yaw rad) or "goal" (x, y m); None while one of them is not a number."""
     try:
         numbers = values(tuple(field for field in PLACES if field.id.startswith(what)), texts)
     except FieldError:
@@ -176,7 +175,7 @@ def place(what: str, texts: Mapping[str, str]) -> tuple[float, ...] | None:
 
 
 def field_of(error: UserError) -> str | None:
-    """The field that a complaint about a scenario's key belongs to, if it has one."""
+    """The field for an error about a scenario's key, if there is one."""
     if isinstance(error, FieldError):
         return error.field
     message = str(error)

@@ -1,4 +1,4 @@
-"""What the value in a field of the setup screen costs, and where the field has no effect. Pure."""
+"""The cost of a field's value on the setup screen, and why a field has no effect. Pure."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def not_used(field: Field, now: Circumstances) -> str:
 
 
 def cost(field: Field, texts: Mapping[str, str], now: Circumstances) -> str:
-    """What the value that stands in a field costs, or ""."""
+    """The cost of a field's value, or ""."""
     number = _number(texts.get(field.id, ""))
     match field.id:
         case "iterations" if number is not None:
             return f"A candidate without f costs {count(1 + int(number), 'test')}."
         case "baseline_runs" if number is not None:
-            return f"Costs {count(int(number), 'test')}; more make the failure rate surer."
+            return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
         case "timeout" if number is not None:
             real = f", here about {now.seconds:.1f} s of real time" if now.seconds else ""
             return f"A test without success takes {number:g} simulated s{real}."

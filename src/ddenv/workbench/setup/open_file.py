@@ -72,7 +72,7 @@ class OpenFile(ModalScreen[Path | None]):
     def _typed(self, event: Input.Submitted) -> None:
         path = Path(event.value.strip())
         with suppress(RuntimeError):
-            # Nobody knows every user's home; then the path as it is does not exist.
+            # The home of ~user may be unknown; then the path itself does not exist.
             path = path.expanduser()
         self._take(path)
 

@@ -1,4 +1,4 @@
-"""The chosen world on the setup screen: its map, the places that are picked on it, and what it is about."""
+"""The chosen world on the setup screen: its map, picking places on it, and its description."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from ddenv.workbench.wording import plain, shorten
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {
     "start": "the start: move the crosshair and press enter, or click",
-    "heading": "the heading: pick a place that the robot looks at",
+    "heading": "the heading: pick a place for the robot to look at",
     "goal": "the goal: move the crosshair and press enter, or click",
 }
 MORE = " …"
 
 
 class Preview(Vertical):
-    """The panel with the world. `choice` is what was read last, None while something is read or where that failed."""
+    """The panel with the world. `choice` is the last one read, None while reading or after an error."""
 
     @dataclass
     class Read(Message):
@@ -52,13 +52,13 @@ class Preview(Vertical):
 
     @dataclass
     class PastRead(Message):
-        """What earlier runs of the choice took was read, too."""
+        """The cost of earlier runs of the choice was read, too."""
 
         choice: Choice
         past: Past
 
     def __init__(self, form: OptionsForm, reading: Mapping[str, Any], *, id: str) -> None:
-        """`reading` holds the command line's options on how to read worlds."""
+        """`reading` holds the command line's options for reading worlds."""
         super().__init__(id=id, classes="panel")
         self._reading = reading
         self.map = WorldMap(id="map")
@@ -78,7 +78,7 @@ class Preview(Vertical):
         self._read(path, opened)
 
     def show_nothing(self, why: str) -> None:
-        """Shows `why` there is no world."""
+        """Shows `why` the world cannot be shown."""
         self._choose(None)
         self.picker.pick("")
         self.query_one(About).show("")
@@ -143,7 +143,7 @@ class PlacePicker(Static):
         self.picked_next = ""
 
     def pick(self, what: str) -> None:
-        """The next place on the map is "start", "heading" or "goal"; "" ends that."""
+        """Starts picking "start", "heading" or "goal" on the map; "" ends it."""
         if what == "heading" and self.spawn is None:
             what = "start"
         self.picked_next = what
@@ -151,7 +151,7 @@ class PlacePicker(Static):
         self._show_words()
 
     def take(self, x: float, y: float) -> None:
-        """A place on the map was picked, m: fills in the form, and goes on to what is not placed yet."""
+        """A place on the map was picked, m: fills in the form, and continues with the next missing place."""
         if self.choice is None or not self.picked_next:
             return
         if self.picked_next == "start":
@@ -181,18 +181,18 @@ class PlacePicker(Static):
 
     @property
     def spawn(self) -> tuple[float, float, float] | None:
-        """x and y, m, and yaw, rad, as the form has them; None while one of them is no number."""
+        """x and y, m, and yaw, rad, from the form; None while one of them is not a number."""
         numbers = form.place("spawn", self._form.texts)
         return (numbers[0], numbers[1], numbers[3]) if numbers and all(map(math.isfinite, numbers)) else None
 
     @property
     def goal(self) -> tuple[float, float] | None:
-        """x and y, m, as the form has them; None while one of them is no number."""
+        """x and y, m, from the form; None while one of them is not a number."""
         numbers = form.place("goal", self._form.texts)
         return (numbers[0], numbers[1]) if numbers and all(map(math.isfinite, numbers)) else None
 
     def show_places(self) -> None:
-        """Shows start and goal as the form has them, on the map and in words."""
+        """Shows the form's start and goal, on the map and in words."""
         if self.choice is not None:
             self._map.set_marks(self.spawn, self.goal)
             self._show_words()
@@ -212,7 +212,7 @@ class PlacePicker(Static):
 
 
 class About(Static):
-    """A text of at most `max-height` lines; an ellipsis says that there is more."""
+    """A text of at most `max-height` lines; an ellipsis marks a longer text."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__("", id=id, markup=False)

@@ -24,7 +24,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 def scenario_path(text: str) -> Path:
-    """The file that a user names, with .yaml if it has no ending. Raises UserError for a name that no file can have."""
+    """The path of a file name, with .yaml if it has no ending. Raises UserError for an invalid name."""
     text = text.strip()
     if not text.strip("./") or text.endswith("/") or "\0" in text:
         raise UserError("give the name of a file, such as my-world.yaml")
@@ -32,7 +32,7 @@ def scenario_path(text: str) -> Path:
     try:
         path = path.expanduser()
     except RuntimeError:
-        raise UserError(f"{path}: there is no such user here") from None
+        raise UserError(f"{path}: unknown user") from None
     path = path if path.suffix.lower() in SUFFIXES else path.with_name(f"{path.name}.yaml")
     try:
         if path.is_dir():
@@ -45,7 +45,7 @@ def scenario_path(text: str) -> Path:
 
 
 def save_scenario(scenario: Scenario, path: Path) -> None:
-    """Writes `scenario` as YAML, in place of what is there. Raises UserError, with nothing written.
+    """Writes `scenario` as YAML, and replaces an existing file. Raises UserError, with nothing written.
 
     Files in the folder of `path` are named relative to it, so that the folder can be moved.
     """
@@ -56,13 +56,13 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     for each in (scenario.world, scenario.robot.model):
         if not each.is_file():
             raise UserError(
-                f"{each}: does not exist any more, so no scenario can name it; 'ddenv export' writes the world of a run"
+                f"{each}: no longer exists, so a scenario cannot refer to it; 'ddenv export' writes the world of a run"
             )
     data = scenario.model_dump(mode="json")
     folder = path.resolve().parent
     data["world"], data["robot"]["model"] = _name(scenario.world, folder), _name(scenario.robot.model, folder)
     data["reading"]["model_path"] = [_name(each, folder) for each in scenario.reading.model_path]
-    # Only the user's own programs are looked up there.
+    # This folder is only searched for the user's own programs.
     if scenario.oracle is None and ":" not in scenario.controller.use:
         del data["folder"]
     else:
@@ -71,13 +71,13 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
 
 
 def _name(path: Path, folder: Path) -> str:
-    """How a scenario in `folder` names `path`: relative if it is inside that folder."""
+    """`path` as written in a scenario in `folder`: relative if it is inside that folder."""
     path = path.resolve()
     return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
 class SaveScenario(ModalScreen[Path | None]):
-    """Returns the file that was written, or None. A file that exists is only replaced after a second enter."""
+    """Returns the file that was written, or None. An existing file is only replaced after a second enter."""
 
     BINDINGS: ClassVar = [Binding("escape", "cancel", "cancel", id="save.cancel", tooltip="write nothing")]
 

@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 SMALLEST = (64, 18)
-# From this size on everything is seen at once.
+# From this size on all panes are shown at once.
 ROOMY = (110, 32)
-# From this size on the rarely used settings are seen, too.
+# From this size on the rarely used settings are shown, too.
 VAST = (160, 48)
 PANES = {"choose": "F2 choose", "map": "F3 map", "settings": "F4 settings"}
 # Where the focus goes in each pane.
@@ -50,9 +50,9 @@ HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
 class SetupScreen(Screen[None]):
-    """Small terminals show one of three panes at a time: what to choose from, the map, or the settings.
+    """Small terminals show one of three panes at a time: the list of choices, the map, or the settings.
 
-    Nothing is written before the user starts, and then only if everything fits.
+    Nothing is written before the user starts a run, and then only if all settings are valid.
     """
 
     CSS_PATH = "setup.tcss"
@@ -67,13 +67,13 @@ class SetupScreen(Screen[None]):
     BINDINGS = KEYS
 
     def __init__(self, reading: Mapping[str, Any] | None = None, like: Path | None = None) -> None:
-        """`reading` holds the command line's options on how to read worlds; `like` is a run to begin with the settings of."""
+        """`reading` holds the command line's options for reading worlds; the form starts with the settings of the run `like`."""
         super().__init__()
         self._reading = reading or {}
         self._like = like
         self.form = OptionsForm(id="options", classes="panel")
         self.preview = Preview(self.form, self._reading, id="preview")
-        # Whether the choice is still being read; so is the first file when the screen opens.
+        # Whether the choice is still being read, as is the first file when the screen opens.
         self._awaited = True
         self._past = Past()
         self._saved: Saved | None = None
@@ -117,7 +117,7 @@ class SetupScreen(Screen[None]):
         words = f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}; this terminal has {width} x {height}"
         self.query_one("#small", Static).update(words)
 
-    # What there is to choose from.
+    # The list of choices.
 
     @work(thread=True, group="recent", exclusive=True)
     def _list_files(self) -> None:
@@ -175,7 +175,7 @@ class SetupScreen(Screen[None]):
         if choice is not self.preview.choice:
             return
         self._awaited = False
-        # A complaint about a key that came too early is out of date.
+        # An error about a key pressed too early is out of date.
         self.form.show_message("")
         self.form.suggest_name(event.free_name)
         placed = choice.scenario is not None
@@ -205,7 +205,7 @@ class SetupScreen(Screen[None]):
     def action_fit(self) -> None:
         self.preview.map.fit()
 
-    # What the settings come to.
+    # Cost and command.
 
     @on(OptionsForm.Edited)
     def _edited(self, event: OptionsForm.Edited) -> None:
@@ -214,7 +214,7 @@ class SetupScreen(Screen[None]):
         self._show_outcome()
 
     def _show_outcome(self) -> None:
-        """The cost and the command of what the form says now, or what is wrong with it."""
+        """Shows the cost and the command for the form, or its error."""
         self.workers.cancel_group(self, "cost")
         cost, words, typed = "", "", True
         if self.preview.choice is not None:
@@ -243,7 +243,7 @@ class SetupScreen(Screen[None]):
         return form.asked_of(self._chosen().settings, self.form.texts, pair, algorithm)
 
     def _chosen(self) -> Choice:
-        """Raises UserError while there is none."""
+        """The choice. Raises UserError while there is none."""
         if self.preview.choice is not None:
             return self.preview.choice
         if self._awaited:
@@ -251,7 +251,7 @@ class SetupScreen(Screen[None]):
         raise UserError("choose a scenario or a world that can be read first")
 
     def _command(self) -> list[str]:
-        """The words of the command that does the same, none if there is no such command. Raises UserError."""
+        """The words of the command that does the same, empty if there is none. Raises UserError."""
         jobs, name = form.jobs(self.form.texts["jobs"]), self.form.own_name
         return command_words(self._chosen(), self._saved, self._scenario(), jobs=jobs, reading=self._reading, name=name)
 
@@ -303,7 +303,7 @@ class SetupScreen(Screen[None]):
         call_if_open(self, self.post_message, ShowRun(new.path, engine=engine))
 
     def _complain(self, error: UserError) -> None:
-        """Shows what is wrong, and the field that it is about."""
+        """Shows an error, and marks its field."""
         self._busy = False
         if form.field_of(error) not in (None, form.NAME.id):
             self._show_pane("settings")
@@ -349,7 +349,7 @@ class SetupScreen(Screen[None]):
         self._arrange()
 
     def _arrange(self) -> None:
-        # Not by classes of the screen, which would have all styles worked out again.
+        # Not by classes of the screen: these would compute all styles again.
         width, height = self.size
         all, pane = width >= ROOMY[0] and height >= ROOMY[1], self._pane
         fits = width >= SMALLEST[0] and height >= SMALLEST[1]
@@ -368,7 +368,7 @@ class SetupScreen(Screen[None]):
         self.action_pane(event.pane)
 
     def action_pane(self, pane: str) -> None:
-        """Shows one of the panes where there is no room for all, and goes there."""
+        """Moves the focus to a pane, and shows it if only one fits."""
         self._show_pane(pane)
         self.query_one(HEADS[pane]).focus()
 

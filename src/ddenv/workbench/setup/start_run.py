@@ -1,4 +1,4 @@
-"""From what the setup screen's form says to a run: its file, its engine, and the command that does the same."""
+"""Starts a run from the setup screen's form: its file, its engine, and the command that does the same."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ddenv.workbench.setup.file_list import remember
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
-NO_COMMAND = "a run's own scenario has no command; f7 saves it as a file that has one"
+NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
 @dataclass(frozen=True, slots=True)
 class NewRun:
-    """A run as the form has it: `scenario` for the `choice`, with `jobs` tests at a time, in the file `path`."""
+    """A run as described by the form: `scenario` for the `choice`, with `jobs` tests at a time, in the file `path`."""
 
     choice: Choice
     scenario: Scenario
@@ -58,7 +58,7 @@ def create(new: NewRun, only_baseline: bool) -> Engine:
 def command_words(
     choice: Choice, saved: Saved | None, scenario: Scenario, *, jobs: int, reading: Mapping[str, Any], name: str
 ) -> list[str]:
-    """The command that does what Start does; none where the scenario is in no file."""
+    """The command that does the same as Start; empty if the scenario has no file."""
     from ddenv.world.load import SCENARIOS
 
     if not choice.run:
@@ -71,7 +71,7 @@ def command_words(
 
 
 def run_file(scenario_name: str, name: str) -> Path:
-    """Where the run called `name`, or the file of that path, will be. Raises FieldError."""
+    """The path of a new run with this `name` or path. Raises FieldError."""
     from ddenv.runs.folder import run_path
 
     is_path = len(Path(name).parts) > 1
@@ -90,7 +90,7 @@ def run_file(scenario_name: str, name: str) -> Path:
 
 
 def _pause_after_baseline(path: Path) -> None:
-    """A round's step ends after the baseline. It is sent after the engine was started, which forgets older commands."""
+    """Sends a step of one round, which ends after the baseline. The engine must have started: it ignores older commands."""
     from ddenv.runfile.store import RunFile
 
     with RunFile(path) as run:

@@ -15,9 +15,9 @@ HOST = "127.0.0.1"
 
 
 def serve(port: int, run: str | None = None) -> None:
-    """Serves until it is interrupted; each page has its own workbench, attached to `run` if there is one.
+    """Serves until interrupted; each page has its own workbench, attached to `run` if given.
 
-    Raises UserError if textual-serve is not installed, the port is taken, or there is no such run.
+    Raises UserError if textual-serve is not installed, the port is taken, or the run does not exist.
     """
     try:
         from textual_serve.server import Server
@@ -31,7 +31,7 @@ def serve(port: int, run: str | None = None) -> None:
     _check_free(port)
 
     class Guarded(Server):
-        """Answers only its own pages, and prints only our lines."""
+        """Answers only requests of its own pages, and prints only ddenv's lines."""
 
         async def _make_app(self) -> Any:
             app = await super()._make_app()
@@ -42,13 +42,13 @@ def serve(port: int, run: str | None = None) -> None:
             print("\n".join(address_lines(port)), flush=True)
 
         def initialize_logging(self) -> None:
-            """Requests are not worth a line."""
+            """Requests are not logged."""
 
     Guarded(shlex.join(words), host=HOST, port=port, title="ddenv").serve()
 
 
 def address_lines(port: int) -> list[str]:
-    """The address, and who can reach it."""
+    """The address, and who can use it."""
     return [
         f"The workbench is at http://{HOST}:{port} (ctrl+c ends it).",
         f"Any user of this machine who opens that address acts as {getpass.getuser()}: the workbench can read, write and "
@@ -59,7 +59,7 @@ def address_lines(port: int) -> list[str]:
 
 
 def guard(port: int) -> Any:
-    """Refuses what other web pages ask for in a browser that runs on this machine."""
+    """Refuses requests of other web pages in a browser on this machine."""
     from aiohttp import web
 
     own = {f"{host}:{port}" for host in (HOST, "localhost")}
@@ -71,7 +71,7 @@ def guard(port: int) -> Any:
             raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself")
         response = await handler(request)
         if not response.prepared:
-            # Other pages must not show it in a frame, and catch clicks there.
+            # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
         return response
 

@@ -1,4 +1,4 @@
-"""The colours: two own themes beside Textual's, and the terminal's own colours where it has only sixteen."""
+"""The colours: two themes of ddenv, Textual's, and the terminal's own colours if it has only sixteen."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ LIGHT = Theme(
     dark=False,
     variables={"footer-key-foreground": "#0a58b0", "primary-muted": "#b9d4f3", "panel-lighten-2": "#a9b6c8"},
 )
-# The terminal's own sixteen colours: for terminals that have no more, and for people who chose them well.
+# The terminal's own sixteen colours: for terminals that have no more, and for users who prefer them.
 ANSI = "ansi-dark"
 OURS = (DARK, LIGHT)
 # Other names for themes.
@@ -52,12 +52,12 @@ ALIASES = {"textual-ansi": ANSI, "ansi_dark": ANSI, "ansi": ANSI, "dark": DARK.n
 
 
 def theme_names() -> tuple[str, ...]:
-    """The names of all themes, ours first."""
+    """The names of all themes, ddenv's first."""
     return (*(theme.name for theme in OURS), *sorted(BUILTIN_THEMES))
 
 
 def theme_called(name: str, where: str) -> str:
-    """The theme that `name` stands for. Raises UserError, which begins with `where`."""
+    """The theme of this `name`. Raises UserError with a message that begins with `where`."""
     found = ALIASES.get(name, name)
     if found in theme_names():
         return found
@@ -65,7 +65,7 @@ def theme_called(name: str, where: str) -> str:
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """A question that offers what was probably meant, or nothing."""
+    """A question that suggests the nearest name, or nothing."""
     from difflib import get_close_matches
 
     found = get_close_matches(name, list(names), 1, 0.5)
@@ -74,12 +74,12 @@ def nearest(name: str, names: Iterable[str]) -> str:
 
 def fitting(color_system: str | None) -> str:
     """The theme for a terminal with that colour system, as Rich names it."""
-    # Ours would become whichever of sixteen colours is nearest, some of them the same.
+    # Colours of ddenv's themes would become the nearest of sixteen, and some the same.
     return ANSI if color_system == "standard" else DARK.name
 
 
 def for_rich(variables: Mapping[str, str]) -> dict[str, str]:
-    """A theme's variables, with the terminal's own colours called as Rich calls them: not ansi_red 50% but red."""
+    """A theme's variables, with Rich's names for the terminal's own colours: not ansi_red 50% but red."""
     return {key: _for_rich(value) for key, value in variables.items()}
 
 
@@ -90,7 +90,7 @@ def _for_rich(value: str) -> str:
 
 
 def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style:
-    """The theme's colour `name` as the colour of text; without colour where the theme leaves it to the terminal."""
+    """The theme's colour `name` as the colour of text; without colour if the theme leaves it to the terminal."""
     try:
         return Style(color=_color(variables[name]), bold=bold or None)
     except (KeyError, ColorParseError):
@@ -98,5 +98,5 @@ def ink(variables: Mapping[str, str], name: str, *, bold: bool = False) -> Style
 
 
 def _color(value: str) -> RichColor:
-    # To Textual `blue` is the web's, not the terminal's own.
+    # In Textual `blue` is the web's colour, not the terminal's.
     return RichColor.parse(value) if value in ANSI_COLOR_NAMES else Color.parse(value).rich_color

@@ -1,7 +1,7 @@
-"""The cells that were written to the terminal: of all that widgets draw again, only cells that changed are sent.
+"""Remembers the cells on the terminal, and sends only cells that changed.
 
-This leans on two classes inside Textual, which say what is drawn. The contract with them is in
-tests/workbench/terminal/test_written.py. Textual itself draws any other update.
+This depends on two internal classes of Textual, which describe updates;
+tests/workbench/terminal/test_written.py checks them. Textual itself draws all other updates.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from rich.style import Style
 from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
 from textual.strip import Strip
 
-# Fewer unchanged cells than this between changed ones are written again: to move the cursor takes as many letters.
+# Fewer unchanged cells than this between changed ones are written again: moving the cursor takes as many bytes.
 GAP = 4
 # The maximum number of styles whose codes are remembered.
 MOST_STYLES = 4096
-# What an update raises that is not made as it was when this was written.
+# The errors of an update whose classes have changed.
 STRANGE = (AttributeError, IndexError, KeyError, TypeError, ValueError)
 SYSTEMS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "windows": ColorSystem.WINDOWS}
 RESET = "\x1b[0m"
 CLOSED = "\x1b]8;;\x1b\\"
-# Attributes that a blank does not show.
+# Attributes that are invisible on a blank.
 UNSEEN = ("", "1", "2", "1;2")
 
 
 class Pen(NamedTuple):
-    """The codes of a style: attributes, the colours of text and ground, and a link. "*" is any colour of text."""
+    """The codes of a style: attributes, the colours of text and background, and a link. "*" is any colour of text."""
 
     attributes: str = ""
     fore: str = "39"
@@ -41,12 +41,12 @@ class Pen(NamedTuple):
 
     @property
     def of_blanks(self) -> Pen:
-        """What is seen of it where there is no text."""
+        """The pen as seen on a blank."""
         return Pen("", "*", self.back) if self.attributes in UNSEEN and not self.link else self
 
     @property
     def hides_text(self) -> bool:
-        """Whether text looks like its ground."""
+        """Whether text has the colour of its background."""
         return self.fore == self.back.replace("48;", "38;", 1) and not self.attributes and not self.link
 
 
@@ -75,12 +75,12 @@ class Written:
         self._pen = PLAIN
 
     def forget(self) -> None:
-        """Something else was written, or the terminal was resized."""
+        """Forgets all cells: something else was written, or the terminal was resized."""
         self._rows.clear()
         self._pen = PLAIN
 
     def fewer(self, update: RenderableType | None) -> RenderableType | None:
-        """The same update, but it writes only what is not there yet. An update of an unknown kind is returned as it is."""
+        """The same update, but it writes only changed cells. An update of an unknown kind is returned unchanged."""
         if type(update) is ChopsUpdate or type(update) is LayoutUpdate:
             return _Fewer(self, update)
         if update is not None:
@@ -102,7 +102,7 @@ class Written:
         if old_chars == chars and old_pens == pens:
             return
         row.chars[x:end], row.pens[x:end] = chars, pens
-        # Terminals do not agree on which characters are wide: such a piece is written as a whole, from its first cell on.
+        # Terminals do not agree on which characters are wide: a piece with these is written as a whole, from its first cell on.
         known = simple and "" not in old_chars
         for first, last in _differing(old_chars, chars, old_pens, pens) if known else [(0, len(chars))]:
             yield _move(x + first, y)
@@ -112,7 +112,7 @@ class Written:
                 yield "".join(char for char, _ in some)
 
     def _turn(self, pen: Pen) -> str:
-        """From the pen in use to this one."""
+        """The codes from the current pen to this one."""
         now, self._pen = self._pen, pen
         if pen == now:
             return ""
@@ -140,7 +140,7 @@ class Written:
             if text.isascii() or (width == len(text) and all(cell_len(char) == 1 for char in set(text))):
                 chars += text
             else:
-                # With all of the text in its first cell, another text is another cell.
+                # The first cell holds the whole text, so another text is a changed cell.
                 chars += [text, *[""] * (width - 1)][:width]
                 simple = False
             pens += [pen] * width
@@ -156,7 +156,7 @@ class Written:
 
 
 class _Fewer(CompositorUpdate):
-    """An update that is drawn in fewer cells; one that cannot be read is drawn by Textual, in full."""
+    """An update that writes fewer cells; if it cannot be read, Textual draws it in full."""
 
     def __init__(self, written: Written, update: ChopsUpdate | LayoutUpdate) -> None:
         self._written, self._update = written, update
@@ -205,7 +205,7 @@ def _of_chops(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
 def _differing(
     old_chars: list[str], chars: list[str], old_pens: list[Pen | None], pens: list[Pen]
 ) -> list[tuple[int, int]]:
-    """From where to where cells differ."""
+    """The spans in which cells differ."""
     found: list[tuple[int, int]] = []
     cells = zip(old_chars, chars, old_pens, pens, strict=True)
     for place, (old_char, char, old_pen, pen) in enumerate(cells):

@@ -1,4 +1,4 @@
-"""A long list of lines: only those in sight are made."""
+"""A long list of lines: only visible ones are made."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def changed_lines(before: Text, now: Text, width: int) -> list[Region]:
 
 
 class Lines(ScrollView, can_focus=True):
-    """One line for each item, made by `line(item, width)` when it comes in sight. With `tail` the last ones are shown."""
+    """One line for each item, made by `line(item, width)` when it becomes visible. With `tail` the last ones are shown."""
 
     class Clicked(Message):
         """A line was clicked; `item` is what it shows."""
@@ -52,11 +52,11 @@ class Lines(ScrollView, can_focus=True):
         at_end = self.scroll_offset.y >= self.max_scroll_y
         self._items = items
         if not self.size.width:
-            # Out of sight: the screen need not be laid out anew for each line.
+            # Not visible: the screen needs no new layout for each line.
             return
         self.virtual_size = Size(0, len(items))
         if self._tail and at_end and self.is_attached:
-            # Forced: with the first line too many there is no scroll bar yet.
+            # Forced: the first line that does not fit has no scroll bar yet.
             self.scroll_end(animate=False, immediate=True, force=True)
         self.refresh()
 
@@ -66,7 +66,7 @@ class Lines(ScrollView, can_focus=True):
             self.scroll_end(animate=False, force=True)
 
     def watch_show_vertical_scrollbar(self) -> None:
-        # A new scroll bar does not know how far the list is scrolled.
+        # A new scroll bar does not have the position of the list yet.
         self.vertical_scrollbar.position = self.scroll_y
 
     def on_click(self, event: events.Click) -> None:

@@ -1,4 +1,4 @@
-"""The titles of the panes in one line, for terminals that show only one or two panes at a time."""
+"""The titles of the panes in one line, for terminals with room for only one or two panes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from textual.widgets import Static
 
 
 class Panes(HorizontalGroup):
-    """The pane that is shown is marked by its brackets, and by its colours where there are any."""
+    """Brackets mark the shown pane, and so do colours if there are any."""
 
     class Chosen(Message):
         """A title was clicked."""
@@ -22,7 +22,7 @@ class Panes(HorizontalGroup):
             self.pane = pane
 
     def __init__(self, titles: Mapping[str, str], *, id: str) -> None:
-        """`titles` are the words of each pane, by its name: its key, and what it shows."""
+        """`titles` are the texts of each pane by name: its key, and what it shows."""
         super().__init__(id=id)
         self._titles = dict(titles)
 

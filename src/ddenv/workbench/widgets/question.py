@@ -13,7 +13,7 @@ from textual.widgets import Button, Static
 
 
 class Question(ModalScreen[bool]):
-    """True for yes. The text may contain names from files: it is never markup."""
+    """Returns True for yes. The text may contain names from files, so it is never markup."""
 
     CSS = """
     Question .dialog { width: 72; }
