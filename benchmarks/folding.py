@@ -94,6 +94,7 @@ def finished(test: int) -> dict[str, Any]:
         "simulated_seconds": 45.0,
         "wall_seconds": 1.23456789,
         "first_sensed": [[number, 0.25 * number] for number in range(10)],
+        "cut": False,
         "first_touched": [[3, 12.5]],
     }
 

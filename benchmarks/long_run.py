@@ -99,7 +99,7 @@ def way(width: float) -> bytes:
 
 
 def events(tests: int, models: int, width: float) -> Iterator[Happened]:
-    yield "engine_started", {"pid": 1, "jobs": 2}
+    yield "engine_started", {"pid": 1, "jobs": 2, "version": "0.1.0", "simulator": "drake"}
     for run in range(RUNS):
         yield (
             "test_started",
@@ -168,6 +168,7 @@ def ended(test: int, outcome: str, width: float) -> dict[str, Any]:
         "simulated_seconds": 45.0,
         "wall_seconds": 0.61234567,
         "first_sensed": [[number, 0.25 * number] for number in range(10)],
+        "cut": False,
         "first_touched": [[3, 12.5]],
     }
 
