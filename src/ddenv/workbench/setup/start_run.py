@@ -11,7 +11,7 @@ from ddenv.errors import UserError
 from ddenv.workbench.run.processes import Engine
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
-from ddenv.workbench.setup.command_line import command, source_of
+from ddenv.workbench.setup.equivalent_command import command, source_of
 from ddenv.workbench.setup.file_list import remember
 
 if TYPE_CHECKING:
