@@ -77,7 +77,7 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     state = drive(path, pool)
     assert set(state.environment) == {"wall", "ball"}
     assert state.minimal
-    assert "pinned (1)" in state.reason
+    assert "except pinned ones (1)" in state.reason
     leg = next(event.id for event in events(path) if event.kind == "leg_started")
     started = [event.data["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
     with RunFile(path) as file:
@@ -269,7 +269,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("pin", {"models": [99]}, "no such models"),
         ("pin", {"models": "wall"}, "no such models"),
         ("unpin", {"models": [0]}, "not pinned"),
-        ("try", {"models": list(range(6))}, "as it is"),
+        ("try", {"models": list(range(6))}, "the current environment"),
         ("try", {"models": [True]}, "no such models"),
         ("adopt", {"trial": 1}, "no such try"),
         ("accept_other", {"test": 1}, "did not end in another failure"),

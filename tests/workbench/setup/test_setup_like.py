@@ -46,7 +46,7 @@ async def test_what_is_gone_cannot_be_saved(made, tmp_path, monkeypatch):
     async with Opened(screen=lambda: SetupScreen(like=made)) as session:
         await session.press("f7")
         await session.press("enter")
-        assert "does not exist any more" in session.app.screen.query_one("#wrong").render().plain
+        assert "no longer exists" in session.app.screen.query_one("#wrong").render().plain
 
 
 @pytest.mark.screens

@@ -46,7 +46,7 @@ def test_a_name_gets_its_ending_and_must_be_possible(tmp_path, monkeypatch):
 def test_a_world_that_is_gone_is_told(scenarios, tmp_path):
     own = load_scenario(scenarios / "crates.yaml")
     (scenarios / "crates.sdf").unlink()
-    with pytest.raises(UserError, match="does not exist any more"):
+    with pytest.raises(UserError, match="no longer exists"):
         save_scenario(own, tmp_path / "x.yaml")
     assert not (tmp_path / "x.yaml").exists()
 
