@@ -28,7 +28,10 @@ async def test_the_baseline_pauses_after_itself(scenarios, runs, started):
 @pytest.mark.screens
 @pytest.mark.parametrize(
     ("models", "told"),
-    [("", "None of its models can be removed"), (fake_run.box("one", 3, 3), "1 model: a run can only find")],
+    [
+        ("", "None of its models can be removed"),
+        (fake_run.box("one", 3, 3), "1 model: a run can only show whether the failure needs it"),
+    ],
     ids=["none", "one"],
 )
 async def test_worlds_with_little_in_them(scenarios, runs, started, models, told):
