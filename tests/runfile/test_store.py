@@ -11,7 +11,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import partition_letter
-from ddenv.runfile.store import ROBOT, SCHEMA_VERSION, Event, Live, RunFile, create
+from ddenv.runfile.store import LOGS, ROBOT, SCHEMA_VERSION, Event, Live, RunFile, create
 
 
 @pytest.fixture
@@ -54,6 +54,35 @@ def test_an_existing_file_is_never_overwritten(path):
     with pytest.raises(UserError, match="exists already"):
         create(path, {}, {})
     assert path.read_bytes() == before
+
+
+def _killed(path):
+    """Leaves beside the deleted run what a killed engine leaves: what it wrote last."""
+    with RunFile(path) as file:
+        file.own()
+        file.append("paused", {})
+        logs = {log: log.read_bytes() for ending in LOGS if (log := path.with_name(path.name + ending)).exists()}
+    path.unlink()
+    for log, content in logs.items():
+        log.write_bytes(content)
+    return logs
+
+
+def test_a_new_run_has_nothing_of_a_deleted_one_that_was_killed(path):
+    assert _killed(path)
+    create(path, {"world": b"<sdf/>"}, {"scenario": {}, "elements": ["board"]})
+    with RunFile(path) as file:
+        file.own()
+        assert [event.kind for event in file.events()] == ["created"]
+        assert fold(file.events()).elements == ("board",)
+
+
+def test_a_deleted_run_is_not_replaced_while_its_engine_works(path):
+    logs = _killed(path)
+    with engine_lock(path), pytest.raises(UserError, match="an engine still works on a deleted run of this name"):
+        create(path, {}, {})
+    assert not path.exists()
+    assert all(log.exists() for log in logs)
 
 
 def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path):

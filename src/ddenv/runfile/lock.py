@@ -17,9 +17,9 @@ def _lock_path(run: Path) -> Path:
 
 
 @contextmanager
-def engine_lock(run: Path) -> Iterator[None]:
-    """Holds the run's lock. Raises UserError if another engine holds it."""
-    taken = f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
+def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
+    """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
+    taken = taken or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
     with held(
         _lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder that you can write to"
     ):

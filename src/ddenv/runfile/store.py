@@ -22,6 +22,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.events import moment
+from ddenv.runfile.lock import engine_lock
 
 APPLICATION_ID = 0x64644531
 SCHEMA_VERSION = 4  # the format of the file; formats before 4 were never released
@@ -37,6 +38,8 @@ CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NO
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
 """
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
+# The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
+LOGS = ("-wal", "-shm", "-journal")
 ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
 
 
@@ -87,6 +90,7 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         # The usual permissions of a new file; a temporary one is only for its owner.
         os.umask(mask := os.umask(0))
         Path(name).chmod(0o666 & ~mask)
+        _forget(path)
         os.link(name, path)
     except FileExistsError:
         raise UserError(f"{path}: exists already; choose another name, or attach with 'ddenv open {path}'") from None
@@ -94,6 +98,19 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         raise UserError(f"{path}: cannot be written: {error}") from None
     finally:
         Path(name).unlink(missing_ok=True)
+
+
+def _forget(path: Path) -> None:
+    """Removes what a killed run of this name has left, if its file is gone: SQLite would add it to the new file.
+
+    Raises UserError while an engine still works on the deleted file.
+    """
+    logs = [log for ending in LOGS if (log := path.with_name(f"{path.name}{ending}")).exists()]
+    if not logs or path.exists():
+        return
+    with engine_lock(path, f"{path}: an engine still works on a deleted run of this name; choose another name"):
+        for log in logs:
+            log.unlink(missing_ok=True)
 
 
 class RunFile:

@@ -12,6 +12,7 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
+from ddenv.runfile.store import LOGS
 from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.wording import STATUS
 
@@ -22,7 +23,7 @@ LOCKED = "database is locked"
 # The number of events read at a time, before other threads get their turn.
 BATCH = 500
 # The endings of files beside a run file that are deleted with it.
-BESIDE = ("-wal", "-shm", ".lock", ".log", ".scene.log")
+BESIDE = (*LOGS, ".lock", ".log", ".scene.log")
 
 
 @dataclass(frozen=True, slots=True)
