@@ -85,6 +85,25 @@ def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(p
     assert (test, after.outcome) == (2, "failed")
 
 
+def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goes_on(pool):
+    for test in (1, 2):
+        pool.submit(test, EVERYTHING, 0)
+    wait_until(lambda: not pool.busy or pool.finished(0.2))
+    before = workers(pool)
+    pool.submit(3, frozenset({"deck", "g\nhost"}), 0)
+    ended = []
+    wait_until(lambda: not pool.busy or ended.extend(pool.finished(0.2)))
+    broken = dict(ended)[3]
+    assert broken == Broken("error", "ValueError: no such model: g host")
+    # What it has left behind in the simulator is gone.
+    wait_until(lambda: len(set(workers(pool)) - set(before)) == 1)
+    for test in (4, 5):
+        pool.submit(test, EVERYTHING, 0)
+    after = []
+    wait_until(lambda: not pool.busy or after.extend(pool.finished(0.2)))
+    assert sorted((test, each.outcome) for test, each in after) == [(4, "failed"), (5, "failed")]
+
+
 @pytest.mark.programs
 def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works():
     pool = Pool(*parts(wall_timeout=0.001), 1)

@@ -16,6 +16,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from pebble import ProcessExpired, ProcessPool
 
 from ddenv.engine import worker
+from ddenv.engine.worker import REASON
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import COLUMNS, Live
@@ -69,7 +70,7 @@ MARGIN = 60.0
 
 @dataclass(frozen=True)
 class Broken:
-    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (the process died)."""
+    """A test without a result: `outcome` is "timeout" (wall clock) or "error" (its worker died or broke)."""
 
     outcome: str
     failure: str
@@ -93,7 +94,8 @@ class Pool:
         self._jobs = jobs
         # The user's own simulator gets the environment unchanged.
         self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
-        self._progress = self._context.RawArray("d", jobs * COLUMNS)
+        progress, reasons = self._context.RawArray("d", jobs * COLUMNS), self._context.RawArray("c", jobs * REASON)
+        self._shared = worker.Shared(progress, reasons)
         self._parts = (scenario, world, robot)
         self._wall_timeout = scenario.simulation.wall_timeout + (0.0 if scenario.oracle is None else MARGIN)
         self._free = list(range(jobs))
@@ -106,7 +108,7 @@ class Pool:
             max_workers=self._jobs,
             context=self._context,
             initializer=worker.prepare,
-            initargs=(*self._parts, self._progress),
+            initargs=(*self._parts, self._shared),
         )
 
     @property
@@ -128,7 +130,8 @@ class Pool:
             self._start_again([job])
 
     def _schedule(self, job: Job) -> None:
-        self._progress[job.slot * COLUMNS] = math.nan
+        self._shared.progress[job.slot * COLUMNS] = math.nan
+        self._shared.reasons[job.slot * REASON : (job.slot + 1) * REASON] = bytes(REASON)
         work = (job.keep, job.seed, job.full, job.slot)
         self._running[self._pool.schedule(worker.run_test, args=work, timeout=self._wall_timeout)] = job
 
@@ -148,23 +151,31 @@ class Pool:
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
         """Tests that have ended, waiting at most `seconds` for one. Raises UserError if the world cannot be simulated."""
-        done, _ = wait(self._running, timeout=seconds, return_when=FIRST_COMPLETED)
+        wait(self._running, timeout=seconds, return_when=FIRST_COMPLETED)
         results = []
         try:
-            for future in sorted(done, key=lambda one: self._running[one].test):
-                result = self._result(future)
-                job = self._running.pop(future)
-                self._free.append(job.slot)
-                self._breaks = 0
-                results.append((job.test, result))
+            for future, job in sorted(self._running.items(), key=lambda one: one[1].test):
+                result = self._result(future, job)
+                if result is not None:
+                    del self._running[future]
+                    self._free.append(job.slot)
+                    self._breaks = 0
+                    results.append((job.test, result))
         except BrokenProcessPool:
             self._start_again([])
         return results
 
-    def _result(self, future: Future[RunResult]) -> RunResult | Broken:
+    def _result(self, future: Future[RunResult], job: Job) -> RunResult | Broken | None:
+        """How a test ended; None if it is still running."""
+        start = job.slot * REASON
+        # Its worker has ended itself. Pebble may not know that yet, or never: it misses a death that follows a start at once.
+        if self._shared.reasons[start] != b"\0":
+            reason = self._shared.reasons[start : start + REASON].rstrip(b"\0")
+            return Broken("error", reason.decode(errors="ignore"))
+        if not future.done():
+            return None
         try:
-            result: RunResult = future.result()
-            return result
+            return future.result()
         except TimeoutError:
             return Broken("timeout", f"took longer than {self._wall_timeout:g} s of wall clock")
         except ProcessExpired as error:
@@ -174,7 +185,7 @@ class Pool:
         """The running tests that have begun to move."""
         rows = []
         for job in self._running.values():
-            values = self._progress[job.slot * COLUMNS : (job.slot + 1) * COLUMNS]
+            values = self._shared.progress[job.slot * COLUMNS : (job.slot + 1) * COLUMNS]
             if all(map(math.isfinite, values)):
                 rows.append(Live(job.slot, job.test, values[0], tuple(values[1:])))
         return rows

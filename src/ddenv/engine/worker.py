@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
-from typing import Any, Protocol
+import traceback
+from dataclasses import dataclass
+from typing import Any, NoReturn, Protocol
 
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 from ddenv.robot.result import Progress, RunResult
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 NICENESS = 5
+# How many bytes of the reason why a worker broke its pool can read.
+REASON = 400
 
 
 class Simulator(Protocol):
@@ -29,26 +34,34 @@ class Simulator(Protocol):
     ) -> RunResult: ...
 
 
-_simulator: Simulator | UserError
-_progress: Any
+@dataclass(frozen=True)
+class Shared:
+    """Memory that a pool shares with its workers, with a part for each slot.
 
-
-def prepare(scenario: Scenario, world: World, robot: Model, progress: Any) -> None:
-    """Runs first in every worker. `progress` is shared memory, `COLUMNS` doubles a slot.
-
-    An error in the world is stored, and raised by every test: an exception here would only break the pool.
+    `progress` has `COLUMNS` doubles a slot, `reasons` `REASON` bytes: why the worker broke, in UTF-8.
     """
-    global _simulator, _progress
+
+    progress: Any
+    reasons: Any
+
+
+_simulator: Simulator | Exception
+_shared: Shared
+
+
+def prepare(scenario: Scenario, world: World, robot: Model, shared: Shared) -> None:
+    """Runs first in every worker. An error is stored, and raised by every test: here it would only break the pool."""
+    global _simulator, _shared
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Simulations take all cores; a screen on the same machine needs little, and a user waits for it.
     os.nice(NICENESS)
     # Output printed here, also by native code, must not mix with the caller's output, which programs read.
     os.dup2(2, 1)
     threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
-    _progress = progress
+    _shared = shared
     try:
         _simulator = _simulator_of(scenario, world, robot)
-    except UserError as error:
+    except Exception as error:
         _simulator = error
 
 
@@ -64,15 +77,46 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
 
 def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResult:
-    """One test, with its progress in `slot` of the shared memory."""
-    if isinstance(_simulator, UserError):
-        raise _simulator
+    """One test, with its progress in `slot` of the shared memory.
+
+    Raises UserError if the world cannot be simulated. Any other exception ends the worker, with the reason in the shared
+    memory: nobody knows what it has left behind in the simulator.
+    """
     start = slot * COLUMNS
 
     def report(time_s: float, pose: tuple[float, ...]) -> None:
-        _progress[start : start + COLUMNS] = (time_s, *pose)
+        _shared.progress[start : start + COLUMNS] = (time_s, *pose)
 
-    return _simulator.run(keep, seed, report, full)
+    if isinstance(_simulator, UserError):
+        raise _simulator
+    try:
+        if isinstance(_simulator, Exception):
+            raise _simulator
+        return _simulator.run(keep, seed, report, full)
+    # Drake raises SystemExit when one of its own checks fails.
+    except BaseException as error:
+        _break(error, slot)
+
+
+def _break(error: BaseException, slot: int) -> NoReturn:
+    """Ends the worker. The traceback goes to the log."""
+    try:
+        reason, start = _reason(error), slot * REASON
+        # The first byte comes last: whoever finds one finds all.
+        _shared.reasons[start + 1 : start + len(reason)] = reason[1:]
+        _shared.reasons[start] = reason[0]
+        traceback.print_exception(error)
+        sys.stderr.flush()
+    finally:
+        os._exit(1)
+
+
+def _reason(error: BaseException) -> bytes:
+    """An exception in one line of at most `REASON` bytes."""
+    text = " ".join(str(error).split())
+    words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"
+    # A character that is cut in two is left out when the bytes are read.
+    return printable(words).encode(errors="replace")[:REASON]
 
 
 def _follow_parent(parent: int) -> None:
