@@ -8,12 +8,12 @@ outcome of a run: similar, other or pass. The parts are of all sizes, from a sin
 
 import argparse
 import multiprocessing
-import os
 import random
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv import processor
 from ddenv.engine.baseline import fix_failure
 from ddenv.reduction.rates import wilson_interval
 from ddenv.robot.drake.template import Variants
@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--scenario", default="ditch", help="a bundled name or a YAML file")
     parser.add_argument("--environments", type=int, default=100, help="random parts of the world")
     parser.add_argument("--seeds", type=int, default=4, help="runs of each part")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     options = parser.parse_args()
     scenario = load_scenario(find_scenario(options.scenario))
     world, _ = load_parts(scenario)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from ddenv import processor
 from tests.tiers import SLOW
 
 settings.load_profile("quick")
@@ -57,4 +58,4 @@ def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]
 
 def pytest_xdist_auto_num_workers() -> int:
     """Many tests wait for a terminal, a browser or another program: one worker more keeps all cores busy."""
-    return 1 + (os.cpu_count() or 1)
+    return 1 + processor.usable_cores()

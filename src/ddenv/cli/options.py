@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ddenv import processor
 from ddenv.errors import UserError, printable
 from ddenv.settings import IGNORABLE, JOBS, OPTIONS, Setting
 
@@ -73,7 +73,7 @@ def jobs_option(what: str = "Tests") -> Option:
     """How many tests or runs are made at the same time."""
     allowed = click.IntRange(int(JOBS.least or 1), int(JOBS.most or 1))
     words = f"{what} at the same time."
-    return click.option("--jobs", type=allowed, default=os.cpu_count() or 1, show_default=True, help=words)
+    return click.option("--jobs", type=allowed, default=processor.usable_cores(), show_default=True, help=words)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")

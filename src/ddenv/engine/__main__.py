@@ -13,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+from ddenv import processor
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
@@ -30,7 +31,7 @@ from ddenv.version import __version__
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m ddenv.engine", description="Works on a run until it ends.")
     parser.add_argument("run", type=Path)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
     parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")

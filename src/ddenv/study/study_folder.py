@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -13,11 +12,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.runfile.lock import held
 from ddenv.runs.folder import SUFFIX
 from ddenv.study.plan import Cell
 from ddenv.version import __version__
+from ddenv.words import count
 from ddenv.world.files.access import read_bytes, write_file
 
 RUNS, ABOUT, LOCK = "runs", "study.json", "study.lock"
@@ -108,19 +109,6 @@ def versions() -> str:
 
 def machine() -> str:
     """The processor, its cores and the system."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    name = _processor()[:LONGEST_NAME]
-    return f"{name}, {cores} {'core' if cores == 1 else 'cores'}, {platform.system()}" if name else f"{cores} cores"
-
-
-def _processor() -> str:
-    if sys.platform == "linux":
-        try:
-            lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
-        except OSError:
-            lines = []
-        for line in lines:
-            key, _, value = line.partition(":")
-            if key.strip() in ("model name", "Model", "Hardware"):
-                return " ".join(value.split())
-    return platform.processor() or platform.machine()
+    cores = count(processor.usable_cores(), "core")
+    name = processor.name()[:LONGEST_NAME]
+    return f"{name}, {cores}, {platform.system()}" if name else cores

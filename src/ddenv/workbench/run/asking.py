@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +13,7 @@ from typing import Any
 
 from textual.screen import Screen
 
+from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, data_of, refusal, said, starts_engine
 from ddenv.guiding.pace import StartEngine
@@ -188,7 +188,7 @@ class Asking:
     def _start_engine(self) -> None:
         state = self._poll.snapshot.state
         try:
-            self._engine.start(state.jobs or os.cpu_count() or 1, state.accept_mode)
+            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode)
         except UserError as error:
             self._screen.notify(str(error), severity="error", markup=False)
 

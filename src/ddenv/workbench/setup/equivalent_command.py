@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ddenv import processor
 from ddenv.settings import OPTIONS, number_text, read
 from ddenv.workbench.setup.form import read_key
 
@@ -47,7 +47,7 @@ def command(
     for option, values in reading.items():
         for value in values:
             words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
-    if jobs != (os.cpu_count() or 1):
+    if jobs != processor.usable_cores():
         words += ["--jobs", str(jobs)]
     return words + _name(name)
 

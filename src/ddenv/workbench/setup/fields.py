@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
@@ -15,6 +14,7 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import Button, Input, Label, OptionList, Select, Static
 
+from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.schemas import Kind, names, uses
 from ddenv.workbench.run.methods import chosen, note, paragraph
@@ -211,7 +211,7 @@ class OptionsForm(Vertical):
 
     def circumstances(self) -> Circumstances:
         pair, algorithm = self.method
-        return Circumstances(algorithm, pair, self.seconds, os.cpu_count() or 1)
+        return Circumstances(algorithm, pair, self.seconds, processor.usable_cores())
 
     @on(SchemaSelect.Looked)
     def _looked(self, event: SchemaSelect.Looked) -> None:
@@ -318,7 +318,7 @@ class OptionsForm(Vertical):
 
 
 def _default_jobs() -> str:
-    return str(os.cpu_count() or 1)
+    return str(processor.usable_cores())
 
 
 def _text(widget: Any) -> str:
