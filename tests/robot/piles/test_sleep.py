@@ -57,6 +57,14 @@ FAR = {
         ),
     ),
     "out of the world": (cube("far", 2.0, 6.0, -3.0),),
+    "colliding with itself": (
+        model_of(
+            "far",
+            link_of("a", Box((0.3, 0.3, 0.3)), Pose((2.0, 6.0, 0.44))),
+            link_of("b", Box((0.3, 0.3, 0.3)), Pose((2.0, 6.0, 0.149))),
+            self_collide=True,
+        ),
+    ),
 }
 
 
@@ -79,7 +87,7 @@ def bits(result: RunResult, *left_out: str) -> tuple:
     return result.outcome, result.trajectory.tobytes(), motions
 
 
-@pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air"]))
+@pytest.mark.parametrize("far", slow(pytest.mark.rates, FAR, but=["in the air", "colliding with itself"]))
 def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template, far):
     near, far = (cube("near", 1.2, 0.0, 0.15), cube("beside", 1.5, 1.5, 0.4)), FAR[far]
     names = {model.name for model in (*near, *far)}

@@ -7,7 +7,8 @@ There is no visual geometry: nobody looks at a worker.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph
@@ -30,7 +31,7 @@ class Body:
 
     `links` are the links' bodies, `poses` their start poses in the world frame, `geometry` the collision geometry of the links that
     can move. `bounds` are the boxes around the links in each link's own frame; None for a link that cannot move or has no
-    geometry.
+    geometry. `own_pairs` are the geometries of each two links that touch each other: none, unless the model collides with itself.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Body:
     poses: tuple[Pose, ...]
     geometry: tuple[GeometryId, ...]
     bounds: tuple[Bounds | None, ...]
+    own_pairs: tuple[tuple[tuple[GeometryId, ...], tuple[GeometryId, ...]], ...] = ()
 
     @property
     def base(self) -> RigidBody:
@@ -92,7 +94,17 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
     plant.Finalize()
+    moving = {name: replace(body, own_pairs=_own_pairs(plant, scene_graph, body)) for name, body in moving.items()}
     return Built(builder.Build(), plant, scene_graph, driver, static, moving)
+
+
+def _own_pairs(
+    plant: MultibodyPlant, scene_graph: SceneGraph, body: Body
+) -> tuple[tuple[tuple[GeometryId, ...], tuple[GeometryId, ...]], ...]:
+    """`Body.own_pairs` of a finished plant, in which Drake has filtered links that a joint connects."""
+    filtered = scene_graph.model_inspector().CollisionFiltered
+    links = [tuple(found) for link in body.links if (found := plant.GetCollisionGeometriesForBody(link))]
+    return tuple(pair for pair in combinations(links, 2) if not filtered(pair[0][0], pair[1][0]))
 
 
 def _add_static(plant: MultibodyPlant, model: Model, wheels: float) -> tuple[GeometryId, ...]:
