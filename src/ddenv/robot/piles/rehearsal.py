@@ -28,6 +28,9 @@ CALM = 0.3  # s; a model that was slow for this long is at rest
 # The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
 BUDGET = 200.0
 LEAST = 1.0
+# What the scripts of a world may take in a worker's memory, and an array besides its numbers, bytes.
+MEMORY = 200e6
+ARRAY = 128
 
 
 @dataclass(frozen=True)
@@ -45,33 +48,70 @@ class Script:
     paces: tuple[Floats, ...]
     rests: bool
 
+    @property
+    def size(self) -> int:
+        """About how much memory it takes, bytes."""
+        arrays = [self.states, *self.paces, *(part for motion in self.motions for part in vars(motion).values())]
+        return sum(array.nbytes + ARRAY for array in arrays)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Known:
-    """`script` is valid while exactly `present` of the static models `near` are kept. None: the simulation broke."""
+    """`script` of the pile `names` is valid while exactly `present` of the static models `near` are kept.
 
+    None: the simulation broke.
+    """
+
+    names: tuple[str, ...]
     near: frozenset[str]
     present: frozenset[str]
     script: Script | None
 
+    @property
+    def size(self) -> int:
+        """About how much memory it takes, bytes."""
+        return ARRAY * (1 + len(self.near)) + (0 if self.script is None else self.script.size)
+
 
 class Repertoire:
-    """The scripts of one world's piles. `moving` is the number of its models that can move."""
+    """The scripts of one world's piles. `moving` is the number of its models that can move.
+
+    They take at most about `MEMORY`: then those go that were not used for the longest time. A script that is rehearsed again is
+    the same to the last bit.
+    """
 
     def __init__(self, world: World) -> None:
         self.moving = sum(1 for model in world.models if not model.static and model.links)
         self._known: dict[tuple[str, ...], list[Known]] = {}
+        # With their sizes; the one that was used last comes last.
+        self._by_use: dict[Known, int] = {}
+        self._size = 0
         self._static = {model.name: model_bounds(model) for model in world.models if _has_static(model)}
 
     def find(self, names: tuple[str, ...], present: frozenset[str]) -> Known | None:
-        """The script of the pile `names` in a world that keeps the models `present`; None if it was not rehearsed yet."""
-        candidates = self._known.get(names, ())
-        return next((known for known in candidates if known.near & present == known.present), None)
+        """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
+        for known in self._known.get(names, ()):
+            if known.near & present == known.present:
+                self._by_use[known] = self._by_use.pop(known)
+                return known
+        return None
 
-    def add(self, names: tuple[str, ...], present: frozenset[str], script: Script | None, margin: float) -> None:
+    def add(self, names: tuple[str, ...], present: frozenset[str], script: Script | None, margin: float) -> Known:
         """Stores the script of a pile that can touch what is within `margin` (m) of its links."""
         near = frozenset(self._static) if script is None else frozenset(self._near(script.motions, margin))
-        self._known.setdefault(names, []).append(Known(near, near & present, script))
+        known = Known(names, near, near & present, script)
+        self._known.setdefault(names, []).append(known)
+        self._by_use[known] = known.size
+        self._size += known.size
+        while self._size > MEMORY:
+            self._forget(next(iter(self._by_use)))
+        return known
+
+    def _forget(self, known: Known) -> None:
+        self._size -= self._by_use.pop(known)
+        self._known[known.names].remove(known)
+        if not self._known[known.names]:
+            del self._known[known.names]
 
     def _near(self, motions: Iterable[Motion], margin: float) -> Iterable[str]:
         """The static models that a pile could have touched while it moved."""
@@ -106,13 +146,11 @@ class Rehearsals:
         Call it after `Presence.remove` of all other models.
         """
         piles = self._piles({body.name for body in kept})
-        found = [self._find(pile, present) for pile in piles]
-        missing = [pile for pile, known in zip(piles, found, strict=True) if known is None]
-        if missing:
+        found = [self._repertoire.find(_names(pile), present) for pile in piles]
+        if None in found:
             with self._context.presence.without_robot():
-                for pile in missing:
-                    self._rehearse(pile, present)
-            found = [self._find(pile, present) for pile in piles]
+                # What was found is held here: a rehearsal may push it out of the repertoire.
+                found = [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
         return [known.script for known in found if known is not None and known.script is not None]
 
     def _start_gaps(self) -> tuple[Floats, Floats]:
@@ -138,13 +176,10 @@ class Rehearsals:
             left &= ~pile
         return piles
 
-    def _find(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known | None:
-        return self._repertoire.find(_names(pile), present)
-
-    def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> None:
+    def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
         script = self._simulate(pile)
         fastest = max(motion.speed.max() for motion in script.motions) if script else 0.0
-        self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._context.clock.period)
+        return self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._context.clock.period)
 
     def _simulate(self, pile: tuple[Body, ...]) -> Script | None:
         """Simulates the pile alone until all of it rests or its time is up; None if the simulation breaks."""
