@@ -18,6 +18,7 @@ from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.piles.support import supports
 from ddenv.robot.protocol import Setup
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
@@ -135,6 +136,10 @@ class Template:
             )
             return Run(self._context, parts).execute(progress)
 
+    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
+        """What rests on what in the whole world, as `piles.support.supports` has it."""
+        return supports(self._context, self._rehearsals, self._names, elements)
+
     @contextmanager
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[Sleep]:
         """The moving models `kept` at their start, in a world that keeps the models `present`."""
@@ -246,6 +251,10 @@ class Variants:
     ) -> RunResult:
         """As `Template.run`."""
         return self._template(keep).run(keep, seed, progress, full)
+
+    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
+        """As `Template.supports`."""
+        return self._whole.supports(elements)
 
     def _template(self, keep: frozenset[str]) -> Template:
         """A template that has at least the models `keep`, chosen for the least time of one run."""

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from ddenv.arrays import Floats, Integers
+from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
@@ -145,13 +145,51 @@ class Rehearsals:
 
         Call it after `Presence.remove` of all other models.
         """
-        piles = self._piles({body.name for body in kept})
+        names = {body.name for body in kept}
+        numbers = [number for number, body in enumerate(self._bodies) if body.name in names]
+        joined = self._apart[np.ix_(numbers, numbers)] < NEAR
+        near_robot = spread(self._to_robot[numbers] < NEAR, joined)
+        piles = self._piles(numbers, joined, ~near_robot)
+        return [known.script for known in self._known(piles, present) if known.script is not None]
+
+    def settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
+        """All piles of the plant with their scripts, as if there were no robot. None: the simulation broke.
+
+        Piles that come near each other on their way are one pile.
+        """
+        everything = list(range(len(self._bodies)))
+        joined = self._apart < NEAR
+        while True:
+            piles = self._piles(everything, joined, np.ones(len(everything), dtype=bool))
+            settled = [(pile, known.script) for pile, known in zip(piles, self._known(piles, present), strict=True)]
+            meeting = joined | self._meetings(settled)
+            if (meeting == joined).all():
+                return settled
+            joined = meeting
+
+    def _meetings(self, settled: Sequence[tuple[tuple[Body, ...], Script | None]]) -> Booleans:
+        """Which moving models (M, M) of two piles come near each other: by the boxes around all that a pile passes through."""
+        count = len(self._bodies)
+        low, high, pile_of = np.full((count, 3), np.inf), np.full((count, 3), -np.inf), np.full(count, -1)
+        number_of = {body.name: number for number, body in enumerate(self._bodies)}
+        for pile, (bodies, script) in enumerate(settled):
+            members = [number_of[body.name] for body in bodies]
+            pile_of[members] = pile
+            if script is not None:
+                low[members] = np.min([motion.low.min(axis=0) for motion in script.motions], axis=0)
+                high[members] = np.max([motion.high.max(axis=0) for motion in script.motions], axis=0)
+        apart = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=2)
+        near: Booleans = (apart < NEAR) & (pile_of[:, None] != pile_of)
+        return near
+
+    def _known(self, piles: Sequence[tuple[Body, ...]], present: frozenset[str]) -> list[Known]:
+        """What is known of `piles`, rehearsed where nothing is known yet."""
         found = [self._repertoire.find(_names(pile), present) for pile in piles]
-        if None in found:
-            with self._context.presence.without_robot():
-                # What was found is held here: a rehearsal may push it out of the repertoire.
-                found = [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
-        return [known.script for known in found if known is not None and known.script is not None]
+        if None not in found:
+            return [known for known in found if known is not None]
+        with self._context.presence.without_robot():
+            # What was found is held here: a rehearsal may push it out of the repertoire.
+            return [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
 
     def _start_gaps(self) -> tuple[Floats, Floats]:
         """The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m."""
@@ -162,12 +200,9 @@ class Rehearsals:
         here = robot.observe(self._plant, self._context.plant_context, range(len(robot.bodies)))
         return gaps(links, there, links, there), gaps(robot, here, links, there)[0]
 
-    def _piles(self, names: set[str]) -> list[tuple[Body, ...]]:
-        """The models `names` in groups that start near each other, without the groups that start near the robot."""
-        numbers = [number for number, body in enumerate(self._bodies) if body.name in names]
-        joined = self._apart[np.ix_(numbers, numbers)] < NEAR
-        left = ~spread(self._to_robot[numbers] < NEAR, joined)
-        piles = []
+    def _piles(self, numbers: Sequence[int], joined: Booleans, left: Booleans) -> list[tuple[Body, ...]]:
+        """The moving models `numbers` (K,) in the groups that `joined` (K, K) makes of them; only groups that are `left` (K,)."""
+        left, piles = left.copy(), []
         while left.any():
             one = np.zeros_like(left)
             one[left.argmax()] = True
