@@ -233,7 +233,7 @@ class Simulation:
 
     time_step: float = setting(0.005, "time step of the simulation", unit="s", above=0, most=0.05)
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
-    wall_timeout: float = setting(120.0, "maximum real time of one test", unit="s", above=0)
+    wall_timeout: float = setting(120.0, "maximum real time of one test, without its preparation", unit="s", above=0)
 
 
 def _kind(hint: Any) -> type:

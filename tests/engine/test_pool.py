@@ -3,11 +3,13 @@
 import math
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
+from pebble import ProcessFuture
 
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import PREPARATION, Broken, Pool
 from ddenv.errors import UserError
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import load_scenario
@@ -104,19 +106,76 @@ def test_an_exception_in_a_worker_is_an_error_of_its_test_and_another_worker_goe
     assert sorted((test, each.outcome) for test, each in after) == [(4, "failed"), (5, "failed")]
 
 
+WAITS = """
+from pathlib import Path
+
+class Waits:
+    def __init__(self, setup):
+        pass
+    def step(self, reading):
+        while not Path("FOLDER/go").exists():
+            pass
+        return 0.3, 0.0
+"""
+
+
 @pytest.mark.programs
-def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works():
-    pool = Pool(*parts(wall_timeout=0.001), 1)
+def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works(tmp_path):
+    (tmp_path / "waits.py").write_text(WAITS.replace("FOLDER", str(tmp_path)))
+    scenario, world, robot = parts(wall_timeout=0.5)
+    waits = scenario.controller.model_copy(update={"use": "waits:Waits", "answer_within": 1e6})
+    pool = Pool(scenario.model_copy(update={"controller": waits, "folder": tmp_path}), world, robot, 1)
     try:
         pool.submit(1, EVERYTHING, 0)
         test, late = result(pool)
-        assert (test, late.outcome) == (1, "timeout")
-        assert "wall clock" in late.failure
+        assert (test, late.outcome, late.failure) == (1, "timeout", "took longer than 0.5 s of wall clock")
+        (tmp_path / "go").touch()
+        pool._wall_timeout = 1e6
         pool.submit(2, EVERYTHING, 0)
-        assert result(pool)[0] == 2
-        assert pool.idle == 1
+        assert (result(pool)[1].outcome, pool.idle) == ("failed", 1)
     finally:
         pool.close()
+
+
+class Clock:
+    """The clock that a pool without processes looks at: `looks` for some seconds and returns what has ended by then."""
+
+    def __init__(self, pool, monkeypatch):
+        self.now, self.pool, self.futures = 1000.0, pool, []
+        monkeypatch.setattr(time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(pool, "_pool", self)
+
+    def schedule(self, *_, **__):
+        self.futures.append(ProcessFuture())
+        self.futures[-1].set_running_or_notify_cancel()
+        return self.futures[-1]
+
+    def looks(self, seconds, every=1.0):
+        ended = []
+        for _ in range(round(seconds / every)):
+            self.now += every
+            ended += self.pool.finished(0.0)
+        return ended
+
+
+def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
+    pool = Pool(*parts(wall_timeout=60), 1)
+    clock = Clock(pool, monkeypatch)
+    pool.submit(1, EVERYTHING, 0)
+    assert clock.looks(600, every=0.5) == []
+    pool._shared.begun[0] = clock.now
+    assert clock.looks(30, every=0.5) == []
+    # The engine is stopped for a day.
+    assert clock.looks(86400, every=86400) == []
+    assert clock.looks(28, every=0.5) == []
+    assert clock.looks(2, every=0.5) == [(1, Broken("timeout", "took longer than 60 s of wall clock"))]
+    assert clock.futures[0].cancelled()
+    assert pool.idle == 1
+    # Nothing of its time counts for the next one; and what never begins ends, too.
+    pool.submit(2, EVERYTHING, 0)
+    assert clock.looks(PREPARATION - 1) == []
+    ended = clock.looks(2)
+    assert ended == [(2, Broken("timeout", "took longer than 3600 s of wall clock to prepare"))]
 
 
 def test_progress_is_seen_while_a_test_runs(pool):

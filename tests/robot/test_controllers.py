@@ -113,6 +113,24 @@ def test_what_swallows_its_interruption_is_interrupted_again(tmp_path):
         own(tmp_path, stepping(*lines, "return 0.0, 0.0"), seconds=0.05).step(READING)
 
 
+def test_time_in_which_the_process_is_stopped_does_not_count(tmp_path):
+    # As in a stopped process, all alarms of that time come as one.
+    lines = [
+        "import signal, time",
+        "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])",
+        "time.sleep(0.1)",
+        "signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])",
+        "return 0.0, 0.0",
+    ]
+    assert own(tmp_path, stepping(*lines), seconds=0.05).step(READING) == Twist(0.0, 0.0)
+
+
+def test_native_code_that_takes_too_long_is_noticed_when_it_ends(tmp_path):
+    lines = ["sum(range(10_000_000))", "return 0.0, 0.0"]
+    with pytest.raises(ControllerFailed, match=r"step took longer than 0.01 s"):
+        own(tmp_path, stepping(*lines), seconds=0.01).step(READING)
+
+
 def test_other_alarms_are_as_they_were(tmp_path):
     controller, rung = own(tmp_path, stepping("return 0.0, 0.0")), []
     before = signal.signal(signal.SIGALRM, lambda number, frame: rung.append(number))

@@ -6,8 +6,9 @@ import math
 import multiprocessing
 import os
 import threading
+import time
 from collections.abc import Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, TimeoutError, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from pebble import ProcessExpired, ProcessPool
 from ddenv.engine import worker
 from ddenv.engine.worker import REASON
 from ddenv.errors import UserError
+from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.world.model import Model, World
@@ -66,6 +68,10 @@ def _environment(more: Mapping[str, str]) -> Iterator[None]:
 MOST_BREAKS = 3
 # How much longer than its time limit a test of the user's own simulator may take, s: its worker ends the command, and says why.
 MARGIN = 60.0
+# The maximum time of what comes before a test moves, s: large piles are rehearsed for minutes, but nothing may hang forever.
+PREPARATION = 3600.0
+# The maximum time between two looks that counts, s: it is longer where the engine was stopped.
+LONGEST_LOOK = 1.0
 
 
 @dataclass(frozen=True)
@@ -88,18 +94,22 @@ class Job:
 
 
 class Pool:
-    """`jobs` workers on one scenario; its `simulation.wall_timeout` bounds one test in real time."""
+    """`jobs` workers on one scenario; its `simulation.wall_timeout` bounds one test in real time, without its preparation."""
 
     def __init__(self, scenario: Scenario, world: World, robot: Model, jobs: int) -> None:
         self._jobs = jobs
         # The user's own simulator gets the environment unchanged.
         self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
-        progress, reasons = self._context.RawArray("d", jobs * COLUMNS), self._context.RawArray("c", jobs * REASON)
-        self._shared = worker.Shared(progress, reasons)
+        sizes = (("d", jobs * COLUMNS), ("d", jobs), ("c", jobs * REASON))
+        self._shared = worker.Shared(*(self._context.RawArray(kind, size) for kind, size in sizes))
         self._parts = (scenario, world, robot)
+        # A simulator of the user's own has nothing to prepare.
+        self._prepares = scenario.oracle is None
         self._wall_timeout = scenario.simulation.wall_timeout + (0.0 if scenario.oracle is None else MARGIN)
         self._free = list(range(jobs))
         self._running: dict[Future[RunResult], Job] = {}
+        # How long the test in each slot has run, or is in preparation.
+        self._clocks: dict[int, Stopwatch] = {}
         self._breaks = 0
         self._pool = self._workers()
 
@@ -132,8 +142,10 @@ class Pool:
     def _schedule(self, job: Job) -> None:
         self._shared.progress[job.slot * COLUMNS] = math.nan
         self._shared.reasons[job.slot * REASON : (job.slot + 1) * REASON] = bytes(REASON)
+        self._shared.begun[job.slot] = 0.0 if self._prepares else time.monotonic()
+        self._clocks[job.slot] = Stopwatch(LONGEST_LOOK)
         work = (job.keep, job.seed, job.full, job.slot)
-        self._running[self._pool.schedule(worker.run_test, args=work, timeout=self._wall_timeout)] = job
+        self._running[self._pool.schedule(worker.run_test, args=work)] = job
 
     def _start_again(self, jobs: list[Job]) -> None:
         """New workers for the tests in flight. Raises UserError if they die again and again before they finish a test."""
@@ -150,7 +162,10 @@ class Pool:
             self._schedule(job)
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
-        """Tests that have ended, waiting at most `seconds` for one. Raises UserError if the world cannot be simulated."""
+        """Tests that have ended, waiting at most `seconds` for one. Raises UserError if the world cannot be simulated.
+
+        Has to be called often: between two calls no more than `LONGEST_LOOK` counts as time of the tests.
+        """
         wait(self._running, timeout=seconds, return_when=FIRST_COMPLETED)
         results = []
         try:
@@ -173,13 +188,22 @@ class Pool:
             reason = self._shared.reasons[start : start + REASON].rstrip(b"\0")
             return Broken("error", reason.decode(errors="ignore"))
         if not future.done():
-            return None
+            return self._late(future, job)
         try:
             return future.result()
-        except TimeoutError:
-            return Broken("timeout", f"took longer than {self._wall_timeout:g} s of wall clock")
         except ProcessExpired as error:
             return Broken("error", f"the simulator's process died (exit code {error.exitcode})")
+
+    def _late(self, future: Future[RunResult], job: Job) -> Broken | None:
+        """Kills a test that takes too long."""
+        begun = self._shared.begun[job.slot]
+        if begun and self._clocks[job.slot].since != begun:
+            self._clocks[job.slot] = Stopwatch(LONGEST_LOOK, begun)
+        limit, what = (self._wall_timeout, "") if begun else (PREPARATION, " to prepare")
+        # Pebble's threads do not survive that a test is cancelled before its worker has it.
+        if self._clocks[job.slot].look() <= limit or not future.running() or not future.cancel():
+            return None
+        return Broken("timeout", f"took longer than {limit:g} s of wall clock{what}")
 
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""

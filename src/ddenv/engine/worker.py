@@ -38,10 +38,12 @@ class Simulator(Protocol):
 class Shared:
     """Memory that a pool shares with its workers, with a part for each slot.
 
-    `progress` has `COLUMNS` doubles a slot, `reasons` `REASON` bytes: why the worker broke, in UTF-8.
+    `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that;
+    `reasons` `REASON` bytes: why the worker broke, in UTF-8.
     """
 
     progress: Any
+    begun: Any
     reasons: Any
 
 
@@ -82,9 +84,13 @@ def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResul
     Raises UserError if the world cannot be simulated. Any other exception ends the worker, with the reason in the shared
     memory: nobody knows what it has left behind in the simulator.
     """
-    start = slot * COLUMNS
+    start, begun = slot * COLUMNS, False
 
     def report(time_s: float, pose: tuple[float, ...]) -> None:
+        nonlocal begun
+        if not begun:
+            # What came before, such as rehearsals of piles, is not the test's own time.
+            _shared.begun[slot], begun = time.monotonic(), True
         _shared.progress[start : start + COLUMNS] = (time_s, *pose)
 
     if isinstance(_simulator, UserError):

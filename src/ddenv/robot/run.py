@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from pydrake.systems.framework import Context
 from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
+from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.drake.drive import Drive
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.run_context import RunContext
@@ -26,6 +26,8 @@ from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
 from ddenv.world.scenario import Controller, Scenario
 
+# The maximum real time between two recorded poses that counts as time of the run, s.
+LONGEST_LOOK = 10.0
 # The outcome, the failure, and whether the run was cut short.
 End = tuple[str, str, bool]
 
@@ -63,10 +65,10 @@ class Run:
         self._observer = Observer(built, parts.drive, context.plant_context)
         self._simulator = Simulator(built.diagram, context.diagram_context)
         self._recording = Recording()
+        self._wall_clock = Stopwatch(LONGEST_LOOK)
 
     def execute(self, progress: Progress | None) -> RunResult:
         """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is passed on."""
-        started = time.perf_counter()
         parts = self._parts
         outcome, failure, cut, seconds = self._loop(progress)
         trajectory = self._recording.trajectory()
@@ -78,7 +80,7 @@ class Run:
             trajectory=trajectory,
             motions=self._recording.motions(),
             simulated_seconds=seconds,
-            wall_seconds=time.perf_counter() - started,
+            wall_seconds=self._wall_clock.look(),
             seed=parts.seed,
             first_sensed=parts.notice.first_sensed(parts.lidar.first_seen if parts.lidar else {}),
             first_touched=parts.notice.first_touched,
@@ -153,6 +155,7 @@ class Run:
         return None
 
     def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
+        self._wall_clock.look()
         self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._parts.kept})
         if progress is not None:
             progress(now, pose)

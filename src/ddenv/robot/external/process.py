@@ -9,18 +9,20 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from ddenv.errors import printable
+from ddenv.robot.deadline import Stopwatch
 
 SUPERVISOR = Path(__file__).with_name("supervise.py")
 PIECE = 65536
 # How often a silent command is checked, s.
 TICK = 0.2
+# The maximum time between two checks that counts, s: it is longer where we were stopped ourselves.
+LONGEST_LOOK = 1.0
 # How long the supervisor may take to end a command, s: longer than the grace that it gives the command.
 STOP_WAIT = 10.0
 # The maximum that can be left in a pipe when the command has ended, bytes.
@@ -125,7 +127,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
     """
     complaints = Complaints()
     takers = ((command.stdout, take), (command.stderr, complaints.add))
-    deadline = time.monotonic() + seconds
+    limit, clock = seconds, Stopwatch(LONGEST_LOOK)
     said, why = None, ""
     with selectors.DefaultSelector() as selector:
         selector.register(command.line, selectors.EVENT_READ)
@@ -133,10 +135,10 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             selector.register(stream, selectors.EVENT_READ, taker)
         while said is None:
             said = _look(selector, command)
-            late = f"took longer than {seconds:g} s of wall clock" if time.monotonic() > deadline else ""
+            late = f"took longer than {seconds:g} s of wall clock" if clock.look() > limit else ""
             if said is None and not why and (why := late or too_much()):
                 _ask_to_end(command)
-                deadline = time.monotonic() + STOP_WAIT
+                limit, clock = STOP_WAIT, Stopwatch(LONGEST_LOOK)
             elif said is None and late:
                 # The supervisor itself was stopped, and will be killed.
                 said = ""
