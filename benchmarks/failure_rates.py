@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ddenv.reduction.rates import wilson_interval
+from ddenv.rates import wilson_interval
 from ddenv.robot.drake.template import Template
 from ddenv.robot.oracle import medoid
 from ddenv.robot.result import RunResult

@@ -21,8 +21,8 @@ Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
 IGNORABLE: tuple[str, ...] = get_args(Ignorable)
 
 # Where a setting shows. "method" is chosen by schemas, "basic" and "more" are fields of the setup form, and all three are options
-# of the command line. "scenario" is in scenario files (and in `ddenv.reduce`) alone.
-Shown = Literal["method", "basic", "more", "scenario"]
+# of the command line, as "option" is. "scenario" is in scenario files (and in `ddenv.reduce`) alone.
+Shown = Literal["method", "basic", "more", "option", "scenario"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +164,21 @@ class Reduction:
         stored=False,
         used_by=("ddenv",),
         cost="On needs many more tests, for a result that is as minimal.",
+    )
+    accept_rate: Literal["first", "kept"] = setting(
+        "kept",
+        "when a candidate is taken: at its first run with f (first), or once its runs show that it keeps the rate of f (kept)",
+        printed="first",
+        shown="option",
+        more="The first rule is the paper's. With it, the end may fail far more rarely than the whole world.",
+    )
+    keep_rate: float = setting(
+        0.8,
+        "part of the whole world's failure rate that the end must keep",
+        above=0,
+        most=0.95,
+        shown="more",
+        cost="Lower is cheaper to show, and promises less.",
     )
     growth: Literal["paper", "steady"] = setting(
         "steady",

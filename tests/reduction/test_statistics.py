@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.rates import iterations_needed, miss_chance, wilson_interval
 
 
 def test_wilson_interval_matches_the_textbook():

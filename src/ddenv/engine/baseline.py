@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ddenv.engine.judging import end_of
-from ddenv.reduction.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, judge_trajectory, medoid
 from ddenv.runfile.state import Test
 from ddenv.world.scenario import FailureSpec

@@ -7,20 +7,25 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.reduction.acceptance import Acceptance, estimated_rate
+from ddenv.reduction.stepping_back import Refused
+from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
-from ddenv.runfile.state import Round, RunState, Test
+from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
 Keep = frozenset[str]
 # After these events the search starts again from what the user left.
-STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back")
+STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back", "rate_lost", "left_out")
+BROKEN = ("error", "timeout")
 
 
 @dataclass(frozen=True)
 class Leg:
     """The start of a search: the number of its first round, its n, and the environment that it starts from.
 
-    `n_partitions` is None for the scenario's value. `tests` are those known before, for schemas that learn.
+    `n_partitions` is None for the scenario's value. `tests` are those known before, for schemas that learn. `rule` says when a
+    candidate is taken. The groups `again` are left out first.
     """
 
     first_round: int
@@ -29,7 +34,9 @@ class Leg:
     pinned: Keep
     evidence_test: int | None
     settings: dict[str, Any]
+    rule: Acceptance
     tests: tuple[int, ...] = ()
+    again: tuple[tuple[str, ...], ...] = ()
 
 
 def other_way(round: int) -> str:
@@ -43,11 +50,11 @@ def other_way(round: int) -> str:
 class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
-    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again. Tests that the algorithm
+    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again, except that one that broke
+    is made twice, and anew by the next engine. Tests that the algorithm
     asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only changes runs that
-    it cuts. The algorithm does not see tests that only confirm, so a resumed run repeats its rounds.
-    `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
-    they stay refused in later rounds; `refusals` counts how often that changed. `partitions` are those
+    it cuts. `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
+    they stay refused in later rounds, as those do that lose the rate; `refusals` counts how often that changed. `partitions` are those
     of each round, as numbers of models. `leg` is the current search; once `steered`, a new one has to start. While a user's
     `command` is obeyed, events hold its number.
     """
@@ -57,7 +64,7 @@ class Journal:
         self.state = RunState()
         self.ledger: dict[tuple[Keep, int, bool], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
-        self.refused: dict[Keep, str] = {}
+        self.refused = Refused()
         self.refusals = 0
         self.steered = False
         self.leg: Leg | None = None
@@ -68,6 +75,10 @@ class Journal:
         # n of the last round in each node.
         self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
+        self._broke: dict[tuple[Keep, int, bool], int] = {}
+        self._fresh_run = FIRST_FRESH_RUN
+        self._steps_back = 0
+        self._again: tuple[tuple[str, ...], ...] = ()
         for event in file.events():
             self._take(event)
 
@@ -85,25 +96,51 @@ class Journal:
             data["candidate"] = candidate
         self.record(kind, round=round, **data)
 
-    def is_similar(self, keep: Keep, run: int, full: bool = False) -> bool | None:
+    def shown(self, keep: Keep, run: int, full: bool = False) -> Shown:
         """Whether a finished test showed f; None if it is not made yet. With `full` only a run to the end counts."""
         test = self.ledger.get((keep, run, full))
-        return None if test is None else self.state.tests[test - 1].outcome == "similar"
+        if test is None:
+            return None
+        outcome = self.state.tests[test - 1].outcome
+        return "broken" if outcome in BROKEN else outcome == "similar"
 
-    def only_broke(self, keep: Keep, runs: Iterable[int]) -> bool:
-        """Whether all full runs of `keep` broke, so that they show nothing."""
-        tests = [self.ledger.get((keep, run, True)) for run in runs]
-        outcomes = {self.state.tests[test - 1].outcome for test in tests if test is not None}
-        return bool(outcomes) and outcomes <= {"error", "timeout"}
-
-    def tests_of(self, keep: Keep, iterations: int) -> list[int]:
+    def tests_of(self, keep: Keep, rule: Acceptance) -> list[int]:
         """The tests behind the verdict on `keep`, in the order of runs."""
-        tests = []
-        for run in range(1 + iterations):
-            tests.append(self.ledger[keep, run, False])
-            if self.state.tests[tests[-1] - 1].outcome == "similar":
-                break
-        return tests
+        return [self.ledger[keep, run, False] for run in range(decided_by(lambda run: self.shown(keep, run), rule))]
+
+    def evidence_of(self, tests: Iterable[int]) -> int:
+        """The first of `tests` that showed f."""
+        return next(test for test in tests if self.state.tests[test - 1].outcome == "similar")
+
+    @property
+    def rule(self) -> Acceptance:
+        """When a candidate is taken in the current search."""
+        return self._rule() if self.leg is None else self.leg.rule
+
+    def _rule(self) -> Acceptance:
+        """By all runs of the whole world so far."""
+        reduction = self.state.scenario["reduction"]
+        most_misses = 1 + reduction["iterations"]
+        if reduction["accept_rate"] == "first":
+            return Acceptance(most_misses)
+        return Acceptance(most_misses, self.rate_of_whole(), reduction["keep_rate"], self._steps_back)
+
+    def rate_of_whole(self) -> float:
+        """The estimated rate of f in the whole world."""
+        everything = frozenset(self.state.elements)
+        tests = [test for test in self.state.tests if self.keep_of_test(test.id) == everything]
+        sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
+        return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
+
+    @property
+    def fresh_run(self) -> int:
+        """The number of the first run whose seed chose nothing so far."""
+        return self._fresh_run
+
+    @property
+    def steps_back(self) -> int:
+        """How often the search went back because what was left had lost the rate."""
+        return self._steps_back
 
     def keep_of_test(self, test: int) -> Keep:
         """The models in a test's world."""
@@ -117,14 +154,23 @@ class Journal:
         if self.leg is None:
             state = self.state
             f = None if state.baseline is None else state.baseline.failure_test
-            self.leg = Leg(1, None, state.elements, frozenset(), f, state.scenario["reduction"])
+            self.leg = Leg(1, None, state.elements, frozenset(), f, state.scenario["reduction"], self._rule())
         return self.leg
 
     def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
         state = self.state
         known = tuple(test.id for test in state.tests if test.phase in ("round", "hand") and test.is_finished)
-        evidence, settings = state.evidence_test, state.scenario["reduction"]
-        return Leg(first_round, n_partitions, state.environment, state.pinned, evidence, settings, known)
+        return Leg(
+            first_round,
+            n_partitions,
+            state.environment,
+            state.pinned,
+            state.evidence_test,
+            state.scenario["reduction"],
+            self._rule(),
+            known,
+            self._again,
+        )
 
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even if the robot is stuck for good."""
@@ -149,13 +195,22 @@ class Journal:
         self._keeps[test] = keep
         seed = self.state.scenario["reduction"]["seed"] + run
         place: dict[str, Any] = {"round": round, "candidate": candidate}
-        if phase == "confirm":
-            left_out = [name for name in self.state.environment if name not in keep]
-            place["without"] = self.state.elements.index(left_out[0]) if left_out else None
+        if phase == "certify":
+            place |= self._subject(keep)
         if phase == "hand":
             place["trial"] = trial
         self.record("test_started", test=test, phase=phase, **place, run=run, seed=seed)
         return test
+
+    def _subject(self, keep: Keep) -> dict[str, int]:
+        """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
+        state = self.state
+        environment = frozenset(state.environment)
+        if keep != environment and keep < environment and len(environment) - len(keep) == 1:
+            (without,) = environment - keep
+            return {"node": state.node, "without": state.elements.index(without)}
+        path = [node.number for node in state.path if frozenset(node.environment) == keep]
+        return {"node": path[-1]}
 
     def lose_running(self) -> None:
         """Records tests that were started and never ended as lost."""
@@ -194,8 +249,27 @@ class Journal:
 
     def _leg_started(self, data: dict[str, Any]) -> None:
         self.leg, self.steered = self._leg(data["round"], data["n_partitions"]), False
+        self._again = ()
+
+    def _engine_started(self, _: dict[str, Any]) -> None:
+        """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
+        again = [key for key, test in self.ledger.items() if self.state.tests[test - 1].outcome in BROKEN]
+        for key in again:
+            del self.ledger[key]
+        self._broke.clear()
+        if again and self.state.baseline is not None:
+            self.steered = True
+
+    def _rate_lost(self, data: dict[str, Any]) -> None:
+        """What has lost the rate, and all parts of it, are not taken again."""
+        elements = self.state.elements
+        self._steps_back += 1
+        self._again = tuple(tuple(elements[model] for model in group) for group in data["again"])
+        self.refused.lose(frozenset(self.state.nodes[data["lost"]].environment))
 
     def _test_started(self, data: dict[str, Any]) -> None:
+        if data["phase"] == "certify":
+            self._fresh_run = max(self._fresh_run, data["run"] + 1)
         self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
 
     def _test_finished(self, data: dict[str, Any]) -> None:
@@ -242,7 +316,12 @@ class Journal:
 
     def _enter(self, test: Test) -> None:
         keep = self._keeps[test.id]
-        if test.phase != "confirm":
+        if test.outcome in BROKEN:
+            full = self.is_full(test.phase)
+            self._broke[keep, test.run, full] = broken = self._broke.get((keep, test.run, full), 0) + 1
+            if broken < 2:
+                return
+        if test.phase not in FRESH:
             self.ledger[keep, test.run, False] = test.id
         if not test.cut:
             self.ledger[keep, test.run, True] = test.id
@@ -251,8 +330,9 @@ class Journal:
         """The models of a test that has just started."""
         if test.phase == "baseline":
             return frozenset(self.state.elements)
-        if test.phase == "confirm":
-            return frozenset(self.state.environment) - {test.without}
+        if test.phase in FRESH:
+            node = self.state.node if test.node is None else test.node
+            return frozenset(self.state.nodes[node].environment) - {test.without}
         if test.phase == "hand":
             return frozenset(self.state.trials[(test.trial or 0) - 1].models)
         return self._keep_of(test.candidate or 0)
@@ -263,6 +343,8 @@ class Journal:
 
 
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
+    "engine_started": Journal._engine_started,
+    "rate_lost": Journal._rate_lost,
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,
     "adopted": Journal._arrived,

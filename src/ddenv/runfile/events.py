@@ -4,8 +4,8 @@ The kinds of events with their data. Models are indices into the run's `elements
 
     created              scenario {...}, elements [names]
     engine_started       pid, jobs, version (of ddenv), simulator (Drake and numpy with their versions, or the oracle)
-    test_started         test, phase, round, candidate, run, seed; without? (a model or null) if phase is "confirm", trial? if
-                         it is "hand"
+    test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
+                         trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]], cut, taken? (the run whose result was
                          copied); trajectories beside it
@@ -15,12 +15,18 @@ The kinds of events with their data. Models are indices into the run's `elements
     round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
                          pinned? [..]
     forecast             round, tests [low, likely, high]: how many were left when tests_done of them were finished
-    candidate_judged     candidate, verdict, tests [ids], known
+    candidate_judged     candidate, verdict (similar, dissimilar or unknown), tests [ids], known
     waiting              candidate
     decided              candidate, decision: accept or reject
     reduced              candidate, environment [..], evidence_test
     round_finished
-    confirm_started      the rounds are over; full runs of what is left follow
+    certificate_started  certificate, run (the number of its first), rate, keep_rate, error, at_least: full runs with fresh seeds
+                         follow
+    certificate_finished claims [{without (a model or null), verdict, shown, runs, low, high, outcomes {outcome: number}}]
+    rate_lost            node (the run goes back to it), lost (the node after it), again [[models]] (to leave out at once, or in
+                         halves)
+    left_out             without, environment [..], evidence_test: the certificate showed that this model is not needed
+    confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
     accept_mode          mode
     vetoed               candidate, verdict: vetoed, or rejected with `again`? if the same models were rejected in an earlier round
@@ -122,3 +128,11 @@ DEEDS = {
 def deed(failure: str) -> str:
     """What the robot did, such as "tipped over"; "failed" if nothing more is known."""
     return DEEDS.get(failure, "failed")
+
+
+def as_it_was(scenario: Data) -> Data:
+    """A scenario of a run file, with what older versions of ddenv did without a setting for it."""
+    reduction = scenario.get("reduction")
+    if isinstance(reduction, dict):
+        scenario = {**scenario, "reduction": {"accept_rate": "first", **reduction}}
+    return scenario

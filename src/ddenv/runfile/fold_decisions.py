@@ -37,7 +37,7 @@ def trial_started(state: RunState, data: Data, at: float) -> Changes:
 
 def trial_judged(state: RunState, data: Data, _: float) -> Changes:
     tests = tuple(map(int, data["tests"]))
-    trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar")
+    trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar", "unknown")
     return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=int(data["known"])))
 
 
@@ -70,14 +70,14 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
 
 
 def went_back(state: RunState, data: Data, at: float) -> Changes:
-    node = state.nodes[_node(state, data["node"])]
+    node = here(state, data["node"])
     undone = data.get("rejected")
     nodes = list(state.nodes)
-    nodes[node.number] = replace(node, rejected=False)
+    nodes[node.number] = replace(node, rejected=False, lost_rate=False)
     if undone is None:
         words = f"went to {place(node)}"
     else:
-        last = nodes[_node(state, undone)]
+        last = nodes[here(state, undone).number]
         nodes[last.number] = replace(last, rejected=True)
         words = f"took back {last.what}: {many(len(node.environment))} again"
     # Models that are not in this environment cannot stay pinned.
@@ -175,7 +175,9 @@ def failures_at(state: RunState, number: int) -> tuple[int, ...]:
 
 def left_round(state: RunState) -> Changes:
     """The current search and its round are over."""
-    changes: Changes = {"confirming": False, **waits_no_more(state)}
+    last = state.certificates[-1:]
+    past = (*state.certificates[:-1], *(replace(one, past=True) for one in last))
+    changes: Changes = {"confirming": False, "certificates": past, **waits_no_more(state)}
     if state.round is not None and not state.round.done:
         changes["round"] = replace(state.round, done=True)
     return changes
@@ -256,7 +258,8 @@ def _index(number: int) -> int:
     return number - 1
 
 
-def _node(state: RunState, number: int) -> int:
+def here(state: RunState, number: int) -> Node:
+    """The node with this number. Raises IndexError if there is none."""
     if type(number) is not int or not 0 <= number < len(state.nodes):
         raise IndexError(number)
-    return number
+    return state.nodes[number]

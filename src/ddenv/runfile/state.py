@@ -12,6 +12,10 @@ OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
+# The phases of full runs of what is left. Files of format 4 have "confirm", with the seeds that the search had used.
+FRESH = ("certify", "confirm")
+# The first run with a fresh seed; the search never comes so far.
+FIRST_FRESH_RUN = 10_000
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class RunState:
     stopped    the engine was stopped and can be resumed
     failed     the engine could not continue: `reason` says why
 
-    `confirming`: the rounds are over, and what is left is run in full because tests were cut.
+    `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`.
     `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the number of the current one.
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
@@ -64,6 +68,7 @@ class RunState:
     trials: tuple[Trial, ...] = ()
     decisions: tuple[Decision, ...] = ()
     failures: tuple[int, ...] = ()
+    certificates: tuple[Certificate, ...] = ()
     lower_bound: int = 0
     last_command: int = 0
     refusal: tuple[int, str] = (0, "")
@@ -119,6 +124,15 @@ class RunState:
         return self.nodes[self.node] if self.nodes else None
 
     @property
+    def path(self) -> tuple[Node, ...]:
+        """The nodes from the whole world to the current one."""
+        path, node = [], self.here
+        while node is not None:
+            path.append(node)
+            node = None if node.parent is None else self.nodes[node.parent]
+        return tuple(reversed(path))
+
+    @property
     def finished_tests(self) -> tuple[Test, ...]:
         """All finished tests, collected at each call; use `tests_done` for their number."""
         return tuple(test for test in self.tests if test.is_finished)
@@ -129,10 +143,17 @@ class RunState:
         return len(self.tests) - sum(self.tally[outcome] for outcome in UNFINISHED)
 
     @property
+    def certificate(self) -> Certificate | None:
+        """The last certificate, if it is one of the current environment and no search began since."""
+        last = self.certificates[-1] if self.certificates else None
+        return last if last is not None and last.node == self.node and not last.past else None
+
+    @property
     def confirm_tests(self) -> tuple[Test, ...]:
-        """The full runs of what is left, in the order they were started."""
-        # They are the last tests of the run.
-        return tuple(takewhile(lambda test: test.phase == "confirm", reversed(self.tests)))[::-1]
+        """The tests of the last certificate, in the order they were started."""
+        # Tries of the user may run between them.
+        last = takewhile(lambda test: test.phase in (*FRESH, "hand"), reversed(self.tests))
+        return tuple(test for test in last if test.phase in FRESH)[::-1]
 
     @property
     def running_tests(self) -> tuple[Test, ...]:
@@ -155,10 +176,11 @@ class RunState:
 class Node:
     """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
 
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did) or "accepted" (the user accepted another
-    failure); `what` names the candidate or trial. `tests` is the number of tests finished by then, `time` is Unix time, s,
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another
+    failure) or "certified" (its certificate showed that one more model can go); `what` names the candidate or trial. `tests` is the number of tests finished by then, `time` is Unix time, s,
     `round` the round that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known.
-    `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back.
+    `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs
+    showed that f is too rare in it.
     """
 
     number: int
@@ -173,6 +195,7 @@ class Node:
     method: str = ""
     minimal: bool = False
     rejected: bool = False
+    lost_rate: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +238,8 @@ class Split:
 class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
-    `verdict` is "" while open, then "similar", "dissimilar", "vetoed" or "rejected" (similar, but the user rejected
-    it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
+    `verdict` is "" while open, then "similar", "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but the
+    user rejected it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
     ids of its tests so far, including re-runs and `known` tests of earlier rounds.
     """
 
@@ -281,8 +304,8 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
-    "round", "hand" (for the user's trial number `trial`) or "confirm": a full run of what is left, or of that without the
-    model `without`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the
+    "round", "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of what is left, of that without the
+    model `without`, or of the environment of `node`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the
     robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see
     `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, with the
     simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `taken`: its result was
@@ -307,6 +330,7 @@ class Test:
     without: str | None = None
     trial: int | None = None
     taken: bool = False
+    node: int | None = None
 
     @property
     def is_finished(self) -> bool:
@@ -316,6 +340,44 @@ class Test:
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
         return self.phase == "round" and self.run > 0 and self.is_finished
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What fresh runs show of the environment of `node`; number 1 is the run's first certificate.
+
+    `first_run` is the number of its first run. What is left must keep `keep_rate` of the whole world's rate, which was estimated as
+    `rate`; all claims together are wrong with a probability of at most `error`. What is left is run `at_least` so often. `claims`
+    are empty while its tests are made. `past`: a search began since.
+    """
+
+    number: int
+    node: int
+    first_run: int
+    keep_rate: float
+    rate: float
+    error: float
+    at_least: int
+    claims: tuple[Claim, ...] = ()
+    past: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One claim of a certificate: about what is left, or, if `without` is a model, about that without it.
+
+    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; a model is "needed" (without it the rate falls below what must
+    be kept) or "not needed"; "not shown" if the runs do not decide, "unknown" if they broke. `shown` of `runs` showed f; `outcomes`
+    has the number of each outcome. `low`..`high` is Wilson's 95 % interval of the rate, 0..1 without runs.
+    """
+
+    without: str | None
+    verdict: str
+    shown: int
+    runs: int
+    low: float
+    high: float
+    outcomes: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,8 @@ from ddenv.runfile.events import moment
 from ddenv.runfile.lock import engine_lock
 
 APPLICATION_ID = 0x64644531
-SCHEMA_VERSION = 4  # the format of the file; formats before 4 were never released
+# The format of the file. Formats before 4 were never released; 5 has certificates.
+SCHEMA_VERSION, OLDEST_VERSION = 5, 4
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
@@ -139,10 +140,10 @@ class RunFile:
             raise UserError(f"{path}: is not a ddenv run file ({error})") from None
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is not a ddenv run file")
-        if version != SCHEMA_VERSION:
+        if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
             which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
             raise UserError(
-                f"{path}: was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
+                f"{path}: was written by {which} (format {version}); this one reads formats {OLDEST_VERSION} to {SCHEMA_VERSION}"
             )
         # A view or trigger in place of a table could run forever.
         if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
@@ -213,6 +214,7 @@ class RunFile:
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
+            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 

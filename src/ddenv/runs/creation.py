@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.runfile.events import as_it_was
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.scenarios import check_parts, load_parts
@@ -54,7 +56,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     """The scenario, world and robot of a run file. Raises UserError."""
     try:
-        scenario = Scenario.model_validate_json(run.document("scenario"))
+        scenario = Scenario.model_validate(as_it_was(json.loads(run.document("scenario"))))
     except ValueError:
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
     # Never opens another file, whatever the run file says.
