@@ -1,0 +1,60 @@
+"""What a run may claim of its result, in words: made here alone, from the runs that show it, with their number and interval."""
+
+from __future__ import annotations
+
+from ddenv.runfile.state import Certificate, Claim, RunState
+from ddenv.words import count, first_of, percent
+
+MOST_NAMES = 3
+
+
+def is_minimal(claims: tuple[Claim, ...]) -> bool:
+    """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
+    return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
+
+
+def verdict_on(certificate: Certificate) -> str:
+    """What a finished certificate shows, in one sentence without a full stop."""
+    left, *removals = certificate.claims
+    share = percent(certificate.keep_rate)
+    if left.verdict == "lost":
+        return f"f is too rare in what is left: {rate(left)}; it has to keep {share} of the whole world's rate"
+    if left.verdict != "kept":
+        return f"not shown that what is left keeps {share} of the whole world's rate: {rate(left)}"
+    for word, start in (
+        ("unknown", "not shown that each model is needed: tests broke without"),
+        ("not shown", "not shown that each model is needed: undecided without"),
+        ("not needed", "not minimal: f shows as often without"),
+    ):
+        names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
+        if names:
+            return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
+    if not removals:
+        return f"no model can be removed: {rate(left)}"
+    most = max(removals, key=lambda claim: claim.high)
+    return f"no single model can be removed: {rate(left)}; without any one of them at most {rate(most)}"
+
+
+def rate(claim: Claim) -> str:
+    """How often a claim's runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"."""
+    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
+    return f"f in {claim.shown} of {count(claim.runs, 'fresh run')}{interval}"
+
+
+def meaning(claim: Claim, certificate: Certificate) -> str:
+    """What the verdict of a claim means, in plain words."""
+    share = percent(certificate.keep_rate)
+    return {
+        "kept": f"keeps {share} of the whole world's rate",
+        "lost": f"has lost the rate: below {share} of the whole world's",
+        "needed": f"needed: without it the rate falls below {share} of the whole world's",
+        "not needed": f"not needed: without it the rate keeps {share} of the whole world's",
+        "not shown": "not shown: the runs do not decide",
+        "unknown": "unknown: too many runs broke",
+    }.get(claim.verdict, "")
+
+
+def current(state: RunState) -> Certificate | None:
+    """The finished certificate of the current environment, if there is one."""
+    last = state.certificate
+    return last if last is not None and last.claims else None
