@@ -8,13 +8,14 @@ from ddenv.words import count, first_of, percent
 MOST_NAMES = 3
 
 
-def is_minimal(claims: tuple[Claim, ...]) -> bool:
+def is_minimal(certificate: Certificate) -> bool:
     """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
+    claims = certificate.claims
     return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
 
 
-def verdict_on(certificate: Certificate) -> str:
-    """What a finished certificate shows, in one sentence without a full stop."""
+def verdict_on(certificate: Certificate, pinned: int = 0) -> str:
+    """What a finished certificate shows, in one sentence without a full stop; `pinned` models could not be left out."""
     left, *removals = certificate.claims
     share = percent(certificate.keep_rate)
     if left.verdict == "lost":
@@ -29,10 +30,11 @@ def verdict_on(certificate: Certificate) -> str:
         names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
         if names:
             return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
+    but = f" except pinned ones ({pinned})" if pinned else ""
     if not removals:
-        return f"no model can be removed: {rate(left)}"
+        return f"nothing is left that can be removed{but}: {rate(left)}"
     most = max(removals, key=lambda claim: claim.high)
-    return f"no single model can be removed: {rate(left)}; without any one of them at most {rate(most)}"
+    return f"no single model can be removed{but}: {rate(left)}; without any one of them at most {rate(most)}"
 
 
 def rate(claim: Claim) -> str:

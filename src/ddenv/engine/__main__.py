@@ -34,6 +34,9 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
+    parser.add_argument(
+        "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
+    )
     parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -57,7 +60,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     scenario, world, robot = read_parts(file)
     file.own()
     journal = Journal(file)
-    if journal.state.status == "finished" and not file.commands(journal.state.last_command):
+    new = options.certify or journal.has_broken or file.commands(journal.state.last_command)
+    if journal.state.status == "finished" and not new:
         return 0
     try:
         _begin(journal, jobs, options.accept_mode)
@@ -67,7 +71,11 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         if options.share is not None:
             pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
         try:
-            Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
+            driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
+            if options.certify:
+                driver.certify(options.certify)
+            else:
+                driver.reduce()
         finally:
             pool.close()
     except Stopped as stop:

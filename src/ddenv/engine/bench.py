@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.journal import BROKEN, Journal, Keep
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import SharingPool
@@ -34,19 +34,18 @@ def open_trials(journal: Journal) -> list[Trial]:
 def judge_trials(journal: Journal) -> list[Hand]:
     """Writes the verdicts that are due; returns the tests still needed as (models, run, trial), oldest first."""
     wanted: list[Hand] = []
-    iterations = journal.state.scenario["reduction"]["iterations"]
     for trial in open_trials(journal):
         keep = frozenset(trial.models)
-        now = standing([keep], journal.is_similar, iterations)
+        now = standing([keep], journal.shown, journal.rule)
         if now.verdicts[0]:
-            _judge(journal, trial, keep, now.verdicts[0], iterations)
+            _judge(journal, trial, keep, now.verdicts[0])
         else:
             wanted += [(keep, run, trial.number) for _, run in now.wanted]
     return wanted
 
 
-def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str, iterations: int) -> None:
-    tests = journal.tests_of(keep, iterations)
+def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str) -> None:
+    tests = journal.tests_of(keep, journal.rule)
     known = sum(journal.state.tests[test - 1].trial != trial.number for test in tests)
     journal.record("trial_judged", trial=trial.number, verdict=verdict, tests=tests, known=known)
 
@@ -168,11 +167,11 @@ class Bench:
 
     def _give_up_if_all_break(self, result: RunResult | Broken) -> None:
         """Raises UserError after too many broken tests in a row."""
-        self._broken = self._broken + 1 if result.outcome in ("error", "timeout") else 0
+        self._broken = self._broken + 1 if result.outcome in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(
                 f"{self._broken} tests in a row broke, the last one: {result.failure}; "
-                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (these tests count as without f)"
+                f"fix this and continue with 'ddenv resume {self._journal.file.path}' (these tests are then made again)"
             )
 
     def _show_live(self) -> None:
@@ -187,6 +186,10 @@ class Bench:
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
         data = result_data(result, self._counted())
+        if data["outcome"] in BROKEN:
+            # It is made again, unless that has happened already.
+            started = self._journal.state.tests[test - 1]
+            self._started.discard((self._journal.keep_of_test(test), started.run, self._journal.is_full(started.phase)))
         noticed = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
         self._journal.record("test_finished", motions, test=test, **data | noticed)
 

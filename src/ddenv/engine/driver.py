@@ -8,11 +8,12 @@ from dataclasses import replace
 from itertools import islice
 from typing import Any
 
+from ddenv.claims import current, is_minimal, verdict_on
 from ddenv.engine.baseline import fix_failure
 from ddenv.engine.bench import Bench, Wanted
-from ddenv.engine.confirm import Confirmation
+from ddenv.engine.certify import Certifier
 from ddenv.engine.control import Control, Steered
-from ddenv.engine.journal import Journal, Keep, other_way
+from ddenv.engine.journal import BROKEN, Journal, Keep, other_way
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
@@ -20,13 +21,14 @@ from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Standing, standing
 from ddenv.schemas import split_pair
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
-# No machine has more idle workers than this, so later candidates need no look.
-ENOUGH = 2048
+# Tests looked for at a time, for each worker: those that run are among them.
+AHEAD = 4
 
 
 class Driver:
@@ -35,6 +37,7 @@ class Driver:
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
         self._reduction = scenario.reduction
         self._failure_spec = scenario.failure
+        self._enough = AHEAD * max(1, journal.state.jobs)
         self._journal = journal
         self._bench = bench
         self._control = control
@@ -68,16 +71,24 @@ class Driver:
             except Steered:
                 continue
 
+    def certify(self, at_least: int) -> None:
+        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
+        state = self._journal.state
+        free = [name for name in state.environment if name not in state.pinned]
+        self._certify(free, at_least, moves=False, anew=True)
+
     def _search(self) -> None:
         """Searches from the current environment to the end. Raises Steered if the user changes something."""
         leg = self._journal.begin_leg()
         self._reduction = Reduction.model_validate(leg.settings)
         self._pinned = leg.pinned
         self._learnt = set(leg.tests)
-        self._trials = [self._learnt_from(test) for test in leg.tests]
+        self._trials = [
+            self._learnt_from(test) for test in leg.tests if self._journal.state.tests[test - 1].outcome not in BROKEN
+        ]
         self._look_at(leg.evidence_test)
         free = tuple(name for name in leg.environment if name not in leg.pinned)
-        algorithm = self._begin(self._reduction, free, leg.n_partitions)
+        algorithm = self._begin(self._reduction, free, leg.n_partitions, leg.again)
         number, winner = leg.first_round, None
         try:
             while True:
@@ -86,8 +97,14 @@ class Driver:
         except StopIteration as end:
             self._finish(end.value | self._pinned)
 
-    def _begin(self, asked: Reduction, elements: tuple[str, ...], n_partitions: int | None = None) -> Search:
-        """The algorithm and the schemas by name. Raises UserError for unknown names."""
+    def _begin(
+        self,
+        asked: Reduction,
+        elements: tuple[str, ...],
+        n_partitions: int | None = None,
+        again: tuple[tuple[str, ...], ...] = (),
+    ) -> Search:
+        """The algorithm and the schemas by name; first it leaves out the groups `again`. Raises UserError for unknown names."""
         partitioning, prioritization = split_pair(asked.pair)
         self._elements, self._memory = elements, Memory()
         self._guide = make_guide(
@@ -101,7 +118,10 @@ class Driver:
             growth=asked.growth,
             skip=asked.skip,
         )
-        return search(asked.algorithm, elements, self._memory.of(self._guide))
+        guide = self._memory.of(self._guide)
+        if not again:
+            return search(asked.algorithm, elements, guide)
+        return tried_again(elements, again, lambda environment: search(asked.algorithm, environment, guide))
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
@@ -116,42 +136,27 @@ class Driver:
         # Their results count, too.
         self._bench.finish_trials()
         free = [name for name in self._journal.state.elements if name in kept - self._pinned]
-        # Each model must have been left out in a test that lost f; a veto or a reject leaves this open.
-        untried = [name for name in free if not self._is_dissimilar(kept - {name})]
-        reason = self._reason(kept, free)
-        if untried:
-            why = "vetoed or rejected" if self._journal.refused else f"candidates: {self._reduction.candidates}"
-            reason = f"{len(untried)} of the {len(kept)} models left were not left out in a test ({why})"
-        tried = [name for name in free if name not in untried]
-        doubt = self._confirm(kept, tried) if self._failure_spec.early_stop else ""
-        runs = range(1 + self._reduction.iterations)
-        broken = [name for name in free if self._journal.only_broke(kept - {name}, runs)]
-        if broken and not untried:
-            reason = f"{len(broken)} of the {len(kept)} models left may not be needed: all tests without them broke"
-        self._end(not untried and not broken and not doubt, doubt or reason)
+        self._certify(free, self._reduction.baseline_runs, moves=self._reduction.accept_rate == "kept")
 
-    def _reason(self, kept: Keep, free: list[str]) -> str:
-        if not kept:
-            return "f needs none of the models that can be removed"
-        if len(free) == len(kept):
-            return "no single model can be removed"
-        return f"no single model can be removed except pinned ones ({len(kept) - len(free)})"
-
-    def _confirm(self, kept: Keep, tried: list[str]) -> str:
-        """Makes the full runs that are still missing at the end; returns what they contradict, or ""."""
-        self._journal.record("confirm_started")
-        confirmation = Confirmation(self._journal, kept, tried, self._reduction.iterations, ENOUGH)
-        self._bench.work("confirm", None, confirmation.wanted)
-        return confirmation.doubt()
+    def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
+        """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
+        journal = self._journal
+        Certifier(journal, self._bench, free, max(1, journal.state.jobs), moves).certify(at_least, anew)
+        while journal.steered:
+            self._bench.tick()
+        certificate = current(journal.state)
+        assert certificate is not None
+        reason = verdict_on(certificate, len(self._pinned))
+        spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
+        if any(journal.refused.get(frozenset(journal.state.environment) - {name}) for name in spare):
+            reason += "; to leave it out was vetoed or rejected"
+        self._end(is_minimal(certificate), reason)
 
     def _end(self, minimal: bool, reason: str) -> None:
         self._bench.finish_trials()
         # Tests that ran ahead of time are no longer needed.
         self._journal.lose_running()
         self._journal.record("finished", minimal=minimal, reason=reason)
-
-    def _is_dissimilar(self, keep: Keep) -> bool:
-        return standing([keep], self._journal.is_similar, self._reduction.iterations).verdicts[0] == "dissimilar"
 
     def _baseline(self) -> str:
         """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""
@@ -224,7 +229,7 @@ class Driver:
             self._guide,
             self._memory,
             replace(self._known(), trials=tuple(self._trials)),
-            self._reduction.iterations,
+            self._journal.rule,
             known_failure(self._journal.state).rate,
             self._journal.state.jobs,
         )
@@ -257,8 +262,8 @@ class Driver:
     def _standing(self, round: Round) -> Standing:
         """Tests of the candidates that have no verdict yet."""
         open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
-        similar, refused = self._journal.is_similar, self._journal.refused
-        return standing(open_ones, similar, self._reduction.iterations, refused, first=self._judged, enough=ENOUGH)
+        shown, rule, refused = self._journal.shown, self._journal.rule, self._journal.refused
+        return standing(open_ones, shown, rule, refused, first=self._judged, enough=self._enough)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
         """Records verdicts in the order of candidates: tests that ran ahead of time wait for their turn."""
@@ -266,8 +271,10 @@ class Driver:
             if not verdict:
                 return
             models = self._keep(round.candidates[self._judged])
-            if models not in self._journal.refused:
-                tests = self._journal.tests_of(models, self._reduction.iterations)
+            if self._journal.refused.get(models) is None:
+                # What has lost the rate is not tested.
+                lost = models in self._journal.refused
+                tests = [] if lost else self._journal.tests_of(models, self._journal.rule)
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
                 self._journal.record_once(
                     "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
@@ -285,10 +292,11 @@ class Driver:
         journal = self._journal
         for index, candidate in enumerate(round.candidates[:last]):
             rejected = journal.decisions.get((number, index)) == "reject"
-            if rejected or not journal.has("candidate_judged", number, index):
+            lost = journal.refused.has_lost(self._keep(candidate))
+            if rejected or lost or not journal.has("candidate_judged", number, index):
                 continue
-            for test in journal.tests_of(self._keep(candidate), self._reduction.iterations):
-                if test not in self._learnt:
+            for test in journal.tests_of(self._keep(candidate), journal.rule):
+                if test not in self._learnt and journal.state.tests[test - 1].outcome not in BROKEN:
                     self._learnt.add(test)
                     self._trials.append(self._learnt_from(test))
 
@@ -313,7 +321,7 @@ class Driver:
     def _take(self, number: int, round: Round, winner: int) -> None:
         """The winner becomes the environment; the next rounds use its similar run."""
         models = self._keep(round.candidates[winner])
-        test = self._journal.tests_of(models, self._reduction.iterations)[-1]
+        test = self._journal.evidence_of(self._journal.tests_of(models, self._journal.rule))
         environment = self._numbers(models)
         self._journal.record_once("reduced", number, winner, environment=environment, evidence_test=test)
         self._look_at(test)

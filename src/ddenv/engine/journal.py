@@ -50,13 +50,12 @@ def other_way(round: int) -> str:
 class Journal:
     """The events of a run, `state` folded from them, and what a resumed engine needs of them.
 
-    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again, except that one that broke
-    is made twice, and anew by the next engine. Tests that the algorithm
-    asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only changes runs that
-    it cuts. `decisions` are the user's accepts and rejects by (round, candidate), `refused` the sub-environments vetoed or rejected:
-    they stay refused in later rounds, as those do that lose the rate; `refusals` counts how often that changed. `partitions` are those
-    of each round, as numbers of models. `leg` is the current search; once `steered`, a new one has to start. While a user's
-    `command` is obeyed, events hold its number.
+    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again, except that one that
+    broke is made twice, and anew by the next engine. Tests that the algorithm asked for have full False, tests that ran to their
+    end full True, most tests both: `early_stop` only changes runs that it cuts. `decisions` are the user's accepts and rejects by
+    (round, candidate), `refused` the sub-environments vetoed or rejected: they stay refused in later rounds, as those do that
+    lose the rate; `refusals` counts how often that changed. `partitions` are those of each round, as numbers of models. `leg` is
+    the current search; once `steered`, a new one has to start. While a user's `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
@@ -118,12 +117,14 @@ class Journal:
         return self._rule() if self.leg is None else self.leg.rule
 
     def _rule(self) -> Acceptance:
-        """By all runs of the whole world so far."""
-        reduction = self.state.scenario["reduction"]
+        """By what is known of the whole world now; in the first search, by the baseline alone."""
+        reduction, baseline = self.state.scenario["reduction"], self.state.baseline
         most_misses = 1 + reduction["iterations"]
-        if reduction["accept_rate"] == "first":
+        if reduction["accept_rate"] == "first" or baseline is None:
             return Acceptance(most_misses)
-        return Acceptance(most_misses, self.rate_of_whole(), reduction["keep_rate"], self._steps_back)
+        first = self.leg is None and not self.steered
+        rate = estimated_rate(baseline.failures, baseline.runs) if first else self.rate_of_whole()
+        return Acceptance(most_misses, rate, reduction["keep_rate"], self._steps_back)
 
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world."""
@@ -131,6 +132,12 @@ class Journal:
         tests = [test for test in self.state.tests if self.keep_of_test(test.id) == everything]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
+
+    @property
+    def has_broken(self) -> bool:
+        """Whether tests broke twice, so that a verdict or a claim is unknown."""
+        tests = (self.state.tests[test - 1] for test in self.ledger.values())
+        return any(test.outcome in BROKEN and test.phase != "baseline" for test in tests)
 
     @property
     def fresh_run(self) -> int:
@@ -253,7 +260,10 @@ class Journal:
 
     def _engine_started(self, _: dict[str, Any]) -> None:
         """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
-        again = [key for key, test in self.ledger.items() if self.state.tests[test - 1].outcome in BROKEN]
+        tests = self.state.tests
+        again = [key for key, test in self.ledger.items() if tests[test - 1].outcome in BROKEN]
+        if self.state.baseline is not None:
+            again = [key for key in again if tests[self.ledger[key] - 1].phase != "baseline"]
         for key in again:
             del self.ledger[key]
         self._broke.clear()
@@ -348,6 +358,7 @@ _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,
     "adopted": Journal._arrived,
+    "left_out": Journal._arrived,
     "accepted_other": Journal._arrived,
     "leg_started": Journal._leg_started,
     "test_started": Journal._test_started,

@@ -9,7 +9,7 @@ anytime-valid inference", 2023). Nothing is assumed about how runs with the same
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -72,6 +72,7 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
     of its subjects counts for none.
     """
     run = broken = 0
+    # Every procedure asks for a run.
     subjects = next(procedure)
     while True:
         known = [shown(subject, run) for subject in subjects]
@@ -93,7 +94,7 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
 def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
     """Whether `left` shows f at `keep_rate` of the rate of `whole` or more: "kept", "lost" or "not shown"."""
     if left == whole:
-        return "kept"
+        return (yield from _at_least(max(1, terms.at_least), (left,), "kept"))
     need, rate, alone, runs, hits, share = 1.0 / terms.error, terms.rate, 0.0, 0, 0, 0.0
     if rate >= SURE and terms.keep_rate < EXPECTED[0]:
         share, bet = SHARE_ALONE, [1.0 / len(EXPECTED)] * len(EXPECTED)
@@ -200,4 +201,3 @@ def _best_stake(rate: float, keep_rate: float) -> tuple[float, float]:
     stakes = [step / 100 for step in range(1, math.ceil(99 / keep_rate)) if keep_rate * step / 100 < 1.0]
     best = max(stakes, key=growth)
     return best, max(growth(best), 1e-4)
-

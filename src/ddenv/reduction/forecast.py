@@ -12,6 +12,7 @@ from random import Random
 import numpy as np
 
 from ddenv import schemas
+from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.guide import Guide, Search, search
@@ -66,8 +67,8 @@ class Memory:
 class Moment:
     """Where a search stands: of `elements`, with which it began, `environment` is left.
 
-    `guide` is the search's own, `memory` what that was asked. A candidate without f is run `1 + iterations` times; f shows in a
-    share `rate` of the runs with all that it needs. `jobs` tests run at the same time.
+    `guide` is the search's own, `memory` what that was asked. `rule` judges a candidate; f shows in a share `rate` of the runs
+    with all that it needs. `jobs` tests run at the same time.
     """
 
     algorithm: str
@@ -77,7 +78,7 @@ class Moment:
     guide: Guide
     memory: Memory
     evidence: Evidence
-    iterations: int
+    rule: Acceptance
     rate: float
     jobs: int = 1
 
@@ -123,7 +124,7 @@ class _Play:
     ) -> None:
         self.tests = 0.0
         self.looked_at = 0
-        self._runs = 1 + moment.iterations
+        self._rule = moment.rule
         self._rate = min(1.0, max(LEAST_RATE, moment.rate))
         self._wasted = WASTED * (moment.jobs - 1)
         self._random = random
@@ -154,12 +155,16 @@ class _Play:
     def _shows(self, candidate: Candidate) -> bool:
         part = candidate.part
         all_there = self._needed.issubset(part) if candidate.kind == "partition" else self._needed.isdisjoint(part)
-        for _ in range(self._runs):
+        shown = missed = 0
+        while not (verdict := self._rule.verdict(shown, missed)):
             self.tests += 1
             if all_there and self._random.random() < self._rate:
-                self.tests += self._wasted
-                return True
-        return False
+                shown += 1
+            else:
+                missed += 1
+        if verdict == "similar":
+            self.tests += self._wasted
+        return verdict == "similar"
 
 
 def _code(codes: dict[str, int], models: Iterable[str]) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ddenv.reduction.certificate import Claim
 from ddenv.reduction.evidence import Partition
 from ddenv.reduction.guide import Search
 from ddenv.reduction.round import left_out
@@ -28,7 +29,9 @@ class Refused(dict[frozenset[str], str]):
         return super().__contains__(models) or (isinstance(models, frozenset) and self.has_lost(models))
 
 
-def groups_again(good: frozenset[str], bad: frozenset[str], end: frozenset[str], order: Sequence[str]) -> list[Partition]:
+def groups_again(
+    good: frozenset[str], bad: frozenset[str], end: frozenset[str], order: Sequence[str]
+) -> list[Partition]:
     """What to leave out of `good` at once: all that went after `bad`, then halves of what went from `good` to `bad`."""
     later = tuple(name for name in order if name in bad - end)
     step = tuple(name for name in order if name in good - bad)
@@ -51,3 +54,21 @@ def tried_again(environment: Partition, groups: Sequence[Partition], search: Cal
         elif len(group) > 1:
             waiting += [group[len(group) // 2 :], group[: len(group) // 2]]
     return (yield from search(environment))
+
+
+def last_good(
+    chain: Sequence[frozenset[str]], judged: Callable[[frozenset[str]], Claim]
+) -> int | tuple[tuple[frozenset[str], int], ...]:
+    """The place of the last environment of `chain` that keeps the rate, or the tests (models, run) needed to know it.
+
+    `chain` begins with the whole world and ends with what has lost the rate. `judged` carries `good_enough` as far as the
+    finished runs go. By bisection: it assumes that the rate falls along the chain.
+    """
+    good, bad = 0, len(chain) - 1
+    while bad - good > 1:
+        place = (good + bad) // 2
+        claim = judged(chain[place])
+        if not claim.verdict:
+            return claim.wanted
+        good, bad = (place, bad) if claim.verdict == "kept" else (good, place)
+    return good

@@ -176,11 +176,11 @@ class RunState:
 class Node:
     """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
 
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another
-    failure) or "certified" (its certificate showed that one more model can go); `what` names the candidate or trial. `tests` is the number of tests finished by then, `time` is Unix time, s,
-    `round` the round that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known.
-    `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs
-    showed that f is too rare in it.
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure) or
+    "certified" (its certificate showed that one more model can go); `what` names the candidate or trial. `tests` is the number of
+    tests finished by then, `time` is Unix time, s, `round` the round that ended in it. `evidence_test` is the run in it that
+    guides the next rounds, None before f is known. `method` is the algorithm and pair. `minimal`: the reduction ended here;
+    `rejected`: it was taken back; `lost_rate`: fresh runs showed that f is too rare in it.
     """
 
     number: int
@@ -238,9 +238,9 @@ class Split:
 class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
-    `verdict` is "" while open, then "similar", "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but the
-    user rejected it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the
-    ids of its tests so far, including re-runs and `known` tests of earlier rounds.
+    `verdict` is "" while open, then "similar", "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but
+    the user rejected it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None.
+    `tests` are the ids of its tests so far, including re-runs and `known` tests of earlier rounds.
     """
 
     index: int
@@ -303,12 +303,12 @@ class Trial:
 class Test:
     """One run of the robot.
 
-    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline",
-    "round", "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of what is left, of that without the
-    model `without`, or of the environment of `node`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the
-    robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see
-    `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, with the
-    simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `taken`: its result was
+    `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
+    "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of what is left, of that without the model
+    `without`, or of the environment of `node`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking).
+    `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of
+    the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, with
+    the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `taken`: its result was
     copied from another run.
     """
 
