@@ -131,7 +131,7 @@ def test_a_simulator_that_is_out_of_order_stops_the_engine_and_it_can_go_on(tmp_
     assert done.returncode == 2
     assert done.stderr == (
         f"ddenv: {MOST_BROKEN} tests in a row broke, the last one: the command's exit code is 2, neither 0 nor 1: no display; "
-        f"fix this and continue with 'ddenv resume {run}' (these tests count as without f)\n"
+        f"fix this and continue with 'ddenv resume {run}' (these tests are then made again)\n"
     )
     with RunFile(run) as file:
         state = fold(file.events())

@@ -68,8 +68,12 @@ def test_it_is_reported(run, tmp_path):
 
 
 def test_an_engine_obeys_its_waiting_commands_and_goes_on(run):
+    with RunFile(run) as file:
+        # The recorded budget has no room for a certificate.
+        file.send("change", settings={"budget": None})
     ddenv("resume", run, "--jobs", "1")
     state = state_of(run)
     assert (state.status, state.environment, state.minimal) == ("finished", ("deck", "wall"), True)
     assert state.last_command >= 12 and state.refusal[0] == 12
+    assert len(state.certificates) == 1
     assert state.trials[0].adopted and len(state.nodes) == 8

@@ -134,5 +134,5 @@ def as_it_was(scenario: Data) -> Data:
     """A scenario of a run file, with what older versions of ddenv did without a setting for it."""
     reduction = scenario.get("reduction")
     if isinstance(reduction, dict):
-        scenario = {**scenario, "reduction": {"accept_rate": "first", **reduction}}
+        scenario = {**scenario, "reduction": {"accept_rate": "first", "keep_rate": 0.8, **reduction}}
     return scenario
