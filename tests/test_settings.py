@@ -69,7 +69,7 @@ def test_it_is_where_it_shows_and_nowhere_else(one):
     options = {name for command in ("run", "test") for each in app.commands[command].params for name in each.opts}
     fields = {field.id for field in form.ALL} | {"algorithm", "pair"}
     assert (one.option in options) == (one.shown != "scenario") or not one.option
-    assert (one.name in fields) == (one.shown != "scenario")
+    assert (one.name in fields) == (one.shown in ("method", "basic", "more"))
     assert f"--{one.name.replace('_', '-')}" not in options or one.option
     shown = [each for each in app.commands["run"].params if one.option in each.opts]
     assert not one.option or shown[0].help.startswith(f"{one.summary[:1].upper()}{one.summary[1:]}")
@@ -118,7 +118,7 @@ def test_as_printed_stands_for_what_the_paper_has():
     printed = scenario(as_printed=True)
     assert printed.reduction.as_printed
     assert {name: getattr(printed.reduction, name) for name in PRINTED} == PRINTED
-    assert printed == scenario(growth="paper", skip="known")
+    assert printed == scenario(growth="paper", skip="known", accept_rate="first")
     assert not scenario().reduction.as_printed
     assert Scenario.model_validate_json(printed.model_dump_json()) == printed
 
@@ -167,6 +167,7 @@ EARLIER = {
 
 @pytest.mark.parametrize("changed", [{}, {"growth": "steady", "complement_order": "far-first"}], ids=str)
 def test_an_earlier_run_keeps_its_settings(changed):
+    from ddenv.runfile.events import as_it_was
     from ddenv.runfile.run_settings import Settings
 
     data = load_scenario(DATA / "wall.yaml").model_dump(mode="json") | {"reduction": EARLIER | changed}
@@ -175,7 +176,7 @@ def test_an_earlier_run_keeps_its_settings(changed):
     now = resumed.model_dump(mode="json")["reduction"]
     assert {name: now[name] for name in EARLIER} == EARLIER | changed
     assert Settings(data).growth == (EARLIER | changed)["growth"]
-    assert Settings(data).as_printed is not bool(changed)
+    assert Settings(as_it_was(data)).as_printed is not bool(changed)
 
 
 def test_what_is_damaged_has_its_default():

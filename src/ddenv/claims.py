@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ddenv.runfile.state import Certificate, Claim, RunState
+from ddenv.runfile.progress import Certificate, Claim
+from ddenv.runfile.state import RunState
 from ddenv.words import count, first_of, percent
 
 MOST_NAMES = 3

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import make_guide, search
@@ -43,7 +44,9 @@ def searched(known, needed, algorithm="ddenv", pair=NEAR, iterations=3, **option
         while True:
             round = searching.send(winner)
             now = replace(known, trials=tuple(trials))
-            moment = Moment(algorithm, pair, known.elements, round.environment, guide, memory, now, iterations, 1.0)
+            moment = Moment(
+                algorithm, pair, known.elements, round.environment, guide, memory, now, Acceptance(1 + iterations), 1.0
+            )
             told.append((len(trials), interval(list(plays(moment)))))
             winner = None
             for one in round.candidates:
@@ -61,7 +64,9 @@ def searched(known, needed, algorithm="ddenv", pair=NEAR, iterations=3, **option
 def first(models, algorithm="ddenv", pair=NEAR, iterations=3, rate=1.0, known=None, **options):
     known = world(models) if known is None else known
     guide = make_guide(*split_pair(pair), lambda: known, **options)
-    return Moment(algorithm, pair, known.elements, known.elements, guide, Memory(), known, iterations, rate)
+    return Moment(
+        algorithm, pair, known.elements, known.elements, guide, Memory(), known, Acceptance(1 + iterations), rate
+    )
 
 
 def likely(*arguments, **options):

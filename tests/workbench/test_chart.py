@@ -2,7 +2,7 @@
 
 import pytest
 
-from ddenv.runfile.state import Point
+from ddenv.runfile.progress import Point
 from ddenv.workbench.run.models_chart import DECIDED, NEEDED, Course, steps
 
 FALLING = Course((Point(0, 40), Point(10, 20), Point(20, 5)), 20)

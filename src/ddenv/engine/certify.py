@@ -13,7 +13,7 @@ from ddenv.errors import UserError
 from ddenv.rates import wilson_interval
 from ddenv.reduction.certificate import Claim, Procedure, Terms, error_of, falls, good_enough, keeps, settle
 from ddenv.reduction.stepping_back import groups_again, last_good
-from ddenv.runfile.state import Certificate
+from ddenv.runfile.progress import Certificate
 
 # After this many steps back what is left stays as it is, and is not called minimal.
 MOST_STEPS_BACK = 14

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from ddenv.map.frame import tick_step, tick_text, ticks
-from ddenv.runfile.state import Point, RunState
+from ddenv.runfile.progress import Point
+from ddenv.runfile.state import RunState
 from ddenv.words import count
 
 WIDTH, HEIGHT = 880.0, 300.0

@@ -7,26 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_decisions
+from ddenv.runfile import fold_certificates, fold_decisions
 from ddenv.runfile.events import Changes, Data, as_it_was, chance, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_outcomes, with_test
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.state import (
-    OUTCOMES,
-    Baseline,
-    Candidate,
-    Certificate,
-    Claim,
-    Forecast,
-    Node,
-    Point,
-    Round,
-    RunState,
-    Split,
-    Test,
-    Trial,
-    many,
-)
+from ddenv.runfile.progress import Forecast, Point
+from ddenv.runfile.state import Baseline, Candidate, Node, Round, RunState, Split, Test, Trial, many
 from ddenv.runfile.store import Event
 
 
@@ -237,65 +223,6 @@ def _confirm_started(_: RunState, __: Data, ___: float) -> Changes:
     return {"confirming": True}
 
 
-def _certificate_started(state: RunState, data: Data, _: float) -> Changes:
-    one = Certificate(
-        number=int(data["certificate"]),
-        node=state.node,
-        first_run=int(data["run"]),
-        keep_rate=chance(data["keep_rate"]),
-        rate=chance(data["rate"]),
-        error=chance(data["error"]),
-        at_least=int(data["at_least"]),
-    )
-    if one.number != len(state.certificates) + 1:
-        raise ValueError(one.number)
-    return {"confirming": True, "certificates": (*state.certificates, one)}
-
-
-def _certificate_finished(state: RunState, data: Data, _: float) -> Changes:
-    claims = tuple(_claim(state, claim) for claim in data["claims"])
-    last = replace(state.certificates[-1], claims=claims)
-    return {"certificates": (*state.certificates[:-1], last)}
-
-
-def _claim(state: RunState, data: Data) -> Claim:
-    without, shown, runs = data["without"], int(data["shown"]), int(data["runs"])
-    if not 0 <= shown <= runs:
-        raise ValueError(shown)
-    return Claim(
-        without=None if without is None else names(state.elements, [without])[0],
-        verdict=one_of(data["verdict"], "kept", "lost", "needed", "not needed", "not shown", "unknown"),
-        shown=shown,
-        runs=runs,
-        low=chance(data["low"]),
-        high=chance(data["high"]),
-        outcomes=tuple((one_of(outcome, *OUTCOMES), int(number)) for outcome, number in data["outcomes"].items()),
-    )
-
-
-def _rate_lost(state: RunState, data: Data, _: float) -> Changes:
-    """What is left shows f too rarely: the run goes back to the last environment that keeps the rate."""
-    node, lost = here(state, data["node"]), here(state, data["lost"])
-    for group in data["again"]:
-        names(state.elements, group)
-    nodes = list(state.nodes)
-    nodes[lost.number] = replace(lost, lost_rate=True)
-    return {
-        **fold_decisions.searched_anew(state),
-        "nodes": tuple(nodes),
-        "node": node.number,
-        "environment": node.environment,
-        "evidence_test": node.evidence_test,
-        "lower_bound": 0,
-        "history": (*state.history, Point(state.tests_done, len(node.environment))),
-    }
-
-
-def _left_out(state: RunState, data: Data, at: float) -> Changes:
-    without = names(state.elements, [data["without"]])[0]
-    return arrived(state, data, at, "certified", f"without {fold_decisions.listed([without])}")
-
-
 def _paused(state: RunState, _: Data, __: float) -> Changes:
     return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
 
@@ -375,10 +302,10 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "reduced": _reduced,
     "round_finished": _round_finished,
     "confirm_started": _confirm_started,
-    "certificate_started": _certificate_started,
-    "certificate_finished": _certificate_finished,
-    "rate_lost": _rate_lost,
-    "left_out": _left_out,
+    "certificate_started": fold_certificates.certificate_started,
+    "certificate_finished": fold_certificates.certificate_finished,
+    "rate_lost": fold_certificates.rate_lost,
+    "left_out": fold_certificates.left_out,
     "paused": _paused,
     "resumed": _resumed,
     "accept_mode": _accept_mode,

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes, Data, names, number, one_of
-from ddenv.runfile.state import Decision, Node, Point, RunState, Test, Trial, many
+from ddenv.runfile.progress import Point
+from ddenv.runfile.state import Decision, Node, RunState, Test, Trial, many
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40

@@ -10,7 +10,7 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.runfile.state import Point
+from ddenv.runfile.progress import Point
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.widgets.lines import changed_lines

@@ -1,0 +1,69 @@
+"""Folds the events of certificates: what fresh runs show, and where the run goes on by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ddenv.runfile.events import Changes, Data, chance, names, one_of
+from ddenv.runfile.fold_decisions import arrived, here, listed, searched_anew
+from ddenv.runfile.progress import Certificate, Claim, Point
+from ddenv.runfile.state import OUTCOMES, RunState
+
+
+def certificate_started(state: RunState, data: Data, _: float) -> Changes:
+    one = Certificate(
+        number=int(data["certificate"]),
+        node=state.node,
+        first_run=int(data["run"]),
+        keep_rate=chance(data["keep_rate"]),
+        rate=chance(data["rate"]),
+        error=chance(data["error"]),
+        at_least=int(data["at_least"]),
+    )
+    if one.number != len(state.certificates) + 1:
+        raise ValueError(one.number)
+    return {"confirming": True, "certificates": (*state.certificates, one)}
+
+
+def certificate_finished(state: RunState, data: Data, _: float) -> Changes:
+    claims = tuple(_claim(state, claim) for claim in data["claims"])
+    last = replace(state.certificates[-1], claims=claims)
+    return {"certificates": (*state.certificates[:-1], last)}
+
+
+def _claim(state: RunState, data: Data) -> Claim:
+    without, shown, runs = data["without"], int(data["shown"]), int(data["runs"])
+    if not 0 <= shown <= runs:
+        raise ValueError(shown)
+    return Claim(
+        without=None if without is None else names(state.elements, [without])[0],
+        verdict=one_of(data["verdict"], "kept", "lost", "needed", "not needed", "not shown", "unknown"),
+        shown=shown,
+        runs=runs,
+        low=chance(data["low"]),
+        high=chance(data["high"]),
+        outcomes=tuple((one_of(outcome, *OUTCOMES), int(number)) for outcome, number in data["outcomes"].items()),
+    )
+
+
+def rate_lost(state: RunState, data: Data, _: float) -> Changes:
+    """What is left shows f too rarely: the run goes back to the last environment that keeps the rate."""
+    node, lost = here(state, data["node"]), here(state, data["lost"])
+    for group in data["again"]:
+        names(state.elements, group)
+    nodes = list(state.nodes)
+    nodes[lost.number] = replace(lost, lost_rate=True)
+    return {
+        **searched_anew(state),
+        "nodes": tuple(nodes),
+        "node": node.number,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
+        "lower_bound": 0,
+        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+    }
+
+
+def left_out(state: RunState, data: Data, at: float) -> Changes:
+    without = names(state.elements, [data["without"]])[0]
+    return arrived(state, data, at, "certified", f"without {listed([without])}")
