@@ -1,4 +1,4 @@
-"""How many models were left after each test, as steps; how many of them are known to be needed, as a line below."""
+"""How many models were left after each test, as steps; how many of them seem to be needed, as a line below."""
 
 from __future__ import annotations
 
@@ -89,4 +89,4 @@ def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Ite
     yield f'<text class="said" x="{x - 8:.1f}" y="{y - 10:.1f}" text-anchor="end">{words}</text>'
     if bounded and state.lower_bound < 0.6 * most:
         yield '<g transform="translate(180 9)"><path class="needed" d="M0 0H26"/>'
-        yield '<text class="tick" x="34" y="4">known to be needed</text></g>'
+        yield '<text class="tick" x="34" y="4">seem to be needed</text></g>'

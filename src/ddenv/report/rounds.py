@@ -52,7 +52,7 @@ def way(record: Record) -> Section | None:
 
 
 def _alternative(state: RunState) -> str:
-    bound = f" At least {state.lower_bound} of them are known to be needed." if state.lower_bound else ""
+    bound = f" At least {state.lower_bound} of them seem to be needed." if state.lower_bound else ""
     return (
         f"Models left after each test, down to {len(state.environment)} after {count(state.tests_done, 'test')}.{bound}"
     )

@@ -179,7 +179,8 @@ def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
         known=int(data["known"]),
     )
     round = _with(_current(state), candidate)
-    if candidate.verdict != "dissimilar":
+    # Without tests it is part of what has lost the rate.
+    if candidate.verdict != "dissimilar" or not candidate.tests:
         return {"round": round}
     # Something in the part that it leaves out is needed, and these parts are disjoint.
     apart = candidate.kind == "complement" or len(round.partitions) == 2

@@ -1,4 +1,4 @@
-"""How many models were left after each test, how many are known to be needed, and when the user decided something."""
+"""How many models were left after each test, how many seem to be needed, and when the user decided something."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _marks(most: int, rows: int) -> dict[int, str]:
 
 
 def _at(course: Course, tests: float) -> tuple[int, int]:
-    """How many models were left after `tests` tests, and how many were known to be needed."""
+    """How many models were left after `tests` tests, and how many seemed to be needed."""
     place = bisect_right(course.points, tests, key=lambda point: point.tests) - 1
     point = course.points[max(0, place)]
     needed = max(point.needed, course.needed) if place == len(course.points) - 1 else point.needed
