@@ -14,7 +14,7 @@ SLOW = ("rates", "fuzz", "terminal", "browser", "examples", "screens", "programs
 settings.register_profile(
     "quick", max_examples=10, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
-settings.register_profile("thorough", settings.get_profile("quick"), max_examples=100, derandomize=False)
+settings.register_profile("thorough", settings.get_profile("quick"), max_examples=60, derandomize=False)
 
 
 def slow(mark: pytest.MarkDecorator, values: Iterable, *, but: Iterable = ()) -> list:

@@ -135,8 +135,11 @@ class Driver:
     def _finish(self, kept: Keep) -> None:
         # Their results count, too.
         self._bench.finish_trials()
-        free = [name for name in self._journal.state.elements if name in kept - self._pinned]
-        self._certify(free, self._reduction.baseline_runs, moves=self._reduction.accept_rate == "kept")
+        state = self._journal.state
+        free = [name for name in state.elements if name in kept - self._pinned]
+        # Whoever accepts each reduction by hand also goes back by hand.
+        moves = self._reduction.accept_rate == "kept" and state.accept_mode == "automatic"
+        self._certify(free, self._reduction.baseline_runs, moves)
 
     def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
         """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
