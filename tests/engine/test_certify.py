@@ -274,3 +274,19 @@ def _resumed(path, pool):
     with RunFile(path) as file:
         state = fold(file.events())
     return state if state.status == "finished" else drive(path, pool)
+
+
+def test_what_a_certificate_rests_on_does_not_depend_on_the_workers(tmp_path):
+    def rests_on(jobs):
+        path = kept(tmp_path)
+        oracle = at_rates(1, ({"wall", "beam"}, 0.9), ({"wall"}, 0.2))
+        state = drive(path, FakePool(oracle, jobs))
+        with RunFile(path) as file:
+            named = [
+                event.data["tests"] for event in file.events() if event.kind in ("certificate_finished", "rate_lost")
+            ]
+        tests = [[state.tests[number - 1] for number in tests] for tests in named]
+        assert all(test.phase == "certify" for certificate in tests for test in certificate)
+        return [sorted((test.run, test.node, test.without or "") for test in certificate) for certificate in tests]
+
+    assert rests_on(1) == rests_on(3) != []

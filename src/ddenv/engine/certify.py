@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +41,8 @@ class Certifier:
         if not self._certificate.claims:
             self.bench.work("certify", None, self._wanted)
             named = [claim for claim in self._claims() if claim[1].verdict]
-            journal.record("certificate_finished", claims=[self._plain(*claim) for claim in named])
+            tests = self._tests(claim for _, claim in named)
+            journal.record("certificate_finished", claims=[self._plain(*claim) for claim in named], tests=tests)
         if self.moves:
             self._move()
 
@@ -95,6 +96,11 @@ class Certifier:
         wanted = dict.fromkeys(test for _, claim in self._claims() for test in claim.wanted)
         return [(keep, self._certificate.first_run + run, None) for keep, run in wanted]
 
+    def _tests(self, claims: Iterable[Claim]) -> list[int]:
+        """The tests that claims rest on: without those that only ran ahead of time."""
+        first, ledger = self._certificate.first_run, self.journal.ledger
+        return sorted({ledger[keep, first + run, True] for claim in claims for keep, run in claim.rests_on})
+
     def _plain(self, name: str | None, claim: Claim) -> dict[str, Any]:
         """A claim as data of an event."""
         journal, first = self.journal, self._certificate.first_run
@@ -132,8 +138,11 @@ class Certifier:
         if len(chain) == 1:
             return
 
+        judged_last: dict[Keep, Claim] = {}
+
         def judged(keep: Keep) -> Claim:
-            return self._settle(good_enough(keep, now.rate, now.keep_rate, lost_rate))
+            judged_last[keep] = self._settle(good_enough(keep, now.rate, now.keep_rate, lost_rate))
+            return judged_last[keep]
 
         def wanted() -> Wanted:
             found = last_good(chain, judged)
@@ -149,6 +158,7 @@ class Certifier:
             node=nodes[place].number,
             lost=nodes[place + 1].number,
             again=[[numbers[name] for name in group] for group in groups],
+            tests=self._tests(judged_last.values()),
         )
 
     def _leave_out(self, name: str) -> None:

@@ -58,11 +58,14 @@ def error_of(number: int) -> float:
 
 @dataclass(frozen=True)
 class Claim:
-    """A verdict, "" while it is open, that rests on the first `runs` runs; and the tests still needed, as (subject, run)."""
+    """A verdict, "" while it is open, that rests on the first `runs` runs; the tests that it rests on and those still needed, as
+    (subject, run).
+    """
 
     verdict: Verdict
     runs: int
     wanted: tuple[tuple[Subject, int], ...] = ()
+    rests_on: tuple[tuple[Subject, int], ...] = ()
 
 
 def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: int = 1) -> Claim:
@@ -72,23 +75,25 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
     of its subjects counts for none.
     """
     run = broken = 0
+    tests: list[tuple[Subject, int]] = []
     # Every procedure asks for a run.
     subjects = next(procedure)
     while True:
         known = [shown(subject, run) for subject in subjects]
         if None in known:
             later = ((subject, run + more) for more in range(max(1, ahead)) for subject in subjects)
-            return Claim("", run, tuple(one for one in later if shown(*one) is None))
+            return Claim("", run, tuple(one for one in later if shown(*one) is None), tuple(tests))
+        tests += [(subject, run) for subject in subjects]
         run += 1
         if "broken" in known:
             broken += 1
             if broken > MOST_BROKEN:
-                return Claim("unknown", run)
+                return Claim("unknown", run, rests_on=tuple(tests))
             continue
         try:
             subjects = procedure.send(tuple(one is True for one in known))
         except StopIteration as end:
-            return Claim(end.value, run)
+            return Claim(end.value, run, rests_on=tuple(tests))
 
 
 def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:

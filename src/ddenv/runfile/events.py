@@ -22,9 +22,10 @@ The kinds of events with their data. Models are indices into the run's `elements
     round_finished
     certificate_started  certificate, run (the number of its first), rate, keep_rate, error, at_least: full runs with fresh seeds
                          follow
-    certificate_finished claims [{without (a model or null), verdict, shown, runs, low, high, outcomes {outcome: number}}]
+    certificate_finished claims [{without (a model or null), verdict, shown, runs, low, high, outcomes {outcome: number}}], tests
+                         [ids] that they rest on
     rate_lost            node (the run goes back to it), lost (the node after it), again [[models]] (to leave out at once, or in
-                         halves)
+                         halves), tests [ids] that this rests on
     left_out             without, environment [..], evidence_test: the certificate showed that this model is not needed
     confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
