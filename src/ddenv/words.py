@@ -50,6 +50,13 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
             resumed = " again" if before.tests else ""
             workers, models = count(after.jobs, "worker"), count(len(after.elements), "model")
             return f"engine started{resumed} with {workers}; {models} can be removed"
+        case "comparing":
+            return (
+                f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
+            )
+        case "compared":
+            same = after.physics.mixed == before.physics.mixed
+            return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
         case "baseline_finished":
             return baseline(after)
         case "round_started" if (round := after.round) is not None:

@@ -15,6 +15,7 @@ from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
+from ddenv.engine.repeating import check_repeats
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
@@ -96,7 +97,11 @@ def new_run(folder: Path, *, early_stop: bool = False, **reduction) -> Path:
 
 
 def drive(
-    path: Path, pool: FakePool, accept_mode: str | None = None, prepare: Callable[[RunFile], None] | None = None
+    path: Path,
+    pool: FakePool,
+    accept_mode: str | None = None,
+    prepare: Callable[[RunFile], None] | None = None,
+    mixed: bool = False,
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
@@ -110,6 +115,7 @@ def drive(
         if prepare is not None:
             prepare(file)
         control = Control(journal, threading.Event(), time.time())
+        check_repeats(journal, pool, control, mixed)
         Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
         return journal.state
 

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
-from ddenv.cli.options import jobs_option, json_option
+from ddenv.cli.options import announce, jobs_option, json_option
+from ddenv.errors import UserError
 
 
 @click.command("resume")
 @click.argument("run")
 @jobs_option()
+@click.option("--mixed", is_flag=True, help="Go on even if other versions or another processor give other results.")
+@click.option("--again", is_flag=True, help="Make all tests again, in a new run of the same scenario.")
 @json_option
-def resume_command(run: str, jobs: int, as_json: bool) -> int:
-    """Continues RUN (a name or a file) without a screen; no finished test is made again."""
+def resume_command(run: str, jobs: int, mixed: bool, again: bool, as_json: bool) -> int:
+    """Continues RUN (a name or a file) without a screen; no finished test is made again.
+
+    If Drake, Python or the processor is another one than before, the first run of the whole world is made again and compared.
+    """
     from ddenv.cli.follow import follow_to_summary
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
@@ -21,9 +29,29 @@ def resume_command(run: str, jobs: int, as_json: bool) -> int:
     from ddenv.runs.programs import start_engine
 
     path = find_run(run)
+    if mixed and again:
+        raise UserError("--mixed and --again: give one of them")
+    if again:
+        new = _made_again(path)
+        announce(f"makes the tests of {path} again in {new}")
+        return follow_to_summary(new, start_engine(new, jobs), as_json)[0]
     with RunFile(path) as file, engine_lock(path):
         # Going back while no engine works ends in a pause, and without a screen nobody can end it.
         if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
             file.send("resume")
     # Without a screen there is nobody to ask.
-    return follow_to_summary(path, start_engine(path, jobs, accept_mode="automatic"), as_json)[0]
+    bits = "mixed" if mixed else "same"
+    return follow_to_summary(path, start_engine(path, jobs, accept_mode="automatic", bits=bits), as_json)[0]
+
+
+def _made_again(path: Path) -> Path:
+    """A new run beside `path`, with its world, robot and first settings."""
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.creation import create_like, read_parts
+    from ddenv.runs.folder import run_path
+
+    with RunFile(path) as file:
+        scenario = read_parts(file)[0]
+    new = run_path(scenario.name, None, path.parent)
+    create_like(path, scenario, new)
+    return new

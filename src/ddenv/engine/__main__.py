@@ -19,7 +19,8 @@ from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
-from ddenv.engine.shared import SharingPool, simulator, tests_of_others
+from ddenv.engine.repeating import check_repeats
+from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
@@ -33,6 +34,9 @@ def main() -> int:
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
+    parser.add_argument(
+        "--bits", choices=("same", "mixed"), default="same", help="whether tests with other bits may follow"
+    )
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
     parser.add_argument(
         "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
@@ -71,6 +75,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         if options.share is not None:
             pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
         try:
+            if scenario.oracle is None:
+                check_repeats(journal, workers, control, options.bits == "mixed")
             driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
             if options.certify:
                 driver.certify(options.certify)
@@ -100,7 +106,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
     # This event comes first: all events before it are another engine's.
-    journal.record("engine_started", pid=os.getpid(), jobs=jobs, version=__version__, simulator=simulator())
+    made_with = {"version": __version__, "simulator": simulator(), "machine": machine()}
+    journal.record("engine_started", None, pid=os.getpid(), jobs=jobs, **made_with)
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
         journal.record("accept_mode", mode=accept_mode)

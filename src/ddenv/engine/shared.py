@@ -6,6 +6,7 @@ controllers may not be deterministic, so their tests are not reused.
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ddenv import processor
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
@@ -48,6 +50,11 @@ def simulator() -> str:
         except PackageNotFoundError:
             versions.append(f"no {name}")
     return ", ".join(versions)
+
+
+def machine() -> str:
+    """What else they may depend on: Python and the processor."""
+    return f"Python {platform.python_version()}, {processor.name().replace(',', '')}"
 
 
 def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key, Place]:
@@ -87,7 +94,8 @@ def _is_alike(run: RunFile, other: RunFile) -> bool:
     if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
         return False
     engines = [event.data for event in other.events() if event.kind == "engine_started"]
-    return {(data.get("version"), data.get("simulator")) for data in engines} == {(__version__, simulator())}
+    made_with = {(data.get("version"), data.get("simulator"), data.get("machine")) for data in engines}
+    return made_with == {(__version__, simulator(), machine())}
 
 
 def _asked(scenario: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ddenv.page.blocks import Block, Cell, Picture, Section, Table, percent, plain, say, section, thousands
+from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, percent, plain, say, section, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.state import Baseline, RunState
@@ -49,7 +49,16 @@ def sureness(record: Record) -> Section | None:
     state = record.state
     if not state.tests_done:
         return None
-    return Section("How sure it is", (*_baseline(state), *_tests(state), *_confirmed(state)))
+    return Section("How sure it is", (*_baseline(state), *_tests(state), *_confirmed(state), *_mixed(state)))
+
+
+def _mixed(state: RunState) -> list[Block]:
+    return [
+        say(
+            Strong("Mixed tests."), f" They were made with {plain(each)}, which do not give the same bits.", notice=True
+        )
+        for each in state.physics.mixed
+    ]
 
 
 def _baseline(state: RunState) -> list[Block]:

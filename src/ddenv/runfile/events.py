@@ -3,7 +3,10 @@
 The kinds of events with their data. Models are indices into the run's `elements`; fields marked ? may be missing:
 
     created              scenario {...}, elements [names]
-    engine_started       pid, jobs, version (of ddenv), simulator (Drake and numpy with their versions, or the oracle)
+    engine_started       pid, jobs, version (of ddenv), simulator (Drake and numpy with their versions, or the oracle), machine?
+                         (Python and the processor)
+    comparing            test: it is made again, because this engine computes with something else than the earlier ones
+    compared             same: whether its bits are the same; if not, the user goes on with mixed tests
     test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
                          trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,

@@ -63,6 +63,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "jobs": int(data["jobs"]),
         "engine_version": str(data["version"]),
         "simulator": str(data["simulator"]),
+        "physics": state.physics.started(data, state.tests_done),
         "started_at": at,
         "working_seconds": state.working_seconds + spent,
     }
@@ -291,6 +292,8 @@ def _engine_failed(state: RunState, data: Data, at: float) -> Changes:
 _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "created": _created,
     "engine_started": _engine_started,
+    "comparing": lambda *_: {},
+    "compared": lambda state, data, _: {"physics": state.physics.compared(bool(data["same"]))},
     "test_started": _test_started,
     "test_finished": _test_finished,
     "test_lost": _test_lost,

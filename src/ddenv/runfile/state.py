@@ -7,6 +7,7 @@ from itertools import islice, takewhile
 from typing import Any
 
 from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
@@ -37,7 +38,8 @@ class RunState:
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
-    `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with.
+    `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
+    with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
     `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is the time
     that ended engines have worked, s; `started_at` (Unix time, s) is set while one works.
@@ -75,6 +77,7 @@ class RunState:
     refusal: tuple[int, str] = (0, "")
     engine_version: str = ""
     simulator: str = ""
+    physics: Physics = field(default_factory=Physics)
     jobs: int = 0
     working_seconds: float = 0.0
     started_at: float | None = None
