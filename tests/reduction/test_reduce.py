@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ddenv
+from ddenv.reduction.walk import Step
 from ddenv.schemas import names
 from tests.conftest import ROOT
 from tests.tiers import examples
@@ -61,7 +62,7 @@ def test_it_counts_the_tests_it_makes_and_makes_none_twice():
 
 def test_its_history_goes_from_all_to_what_is_kept():
     found = ddenv.reduce(ELEMENTS, needs("b", "g"), **ALL)
-    assert found.history[0] == ddenv.reduction.reduce.Step(0, ELEMENTS)
+    assert found.history[0] == Step(0, ELEMENTS)
     assert found.history[-1].kept == found.kept
     tests = [step.tests for step in found.history]
     assert tests == sorted(tests)

@@ -33,7 +33,7 @@ REFUTED = 20.0
 PATIENCE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 2.5, 600, 120
 # After all pairs, a rate of at least this share of the whole world's is likely to be kept.
 LIKELY_KEPT = 0.9
-# More broken runs of one claim than this leave it unknown.
+# More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
 ENOUGH_RATIO, MOST_EARLIER = 3.0, 60
@@ -87,7 +87,7 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
         run += 1
         if "broken" in known:
             broken += 1
-            if broken > MOST_BROKEN:
+            if broken > max(MOST_BROKEN, run // 10):
                 return Claim("unknown", run, rests_on=tuple(tests))
             continue
         try:
@@ -110,7 +110,8 @@ def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
             if share * sum(bet) >= need:
                 return (yield from _at_least(terms.at_least - runs, (left,), "kept"))
         alone = share * sum(bet)
-        rate = min(rate, hits / runs)
+        if sum(bet) >= HOPELESS:
+            rate = min(rate, hits / runs)
     rate = min(max(rate, 0.05), HIGHEST_RATE)
     stake, growth = _best_stake(round(rate, 2), terms.keep_rate)
     highest = 0.995 / terms.keep_rate
@@ -203,6 +204,6 @@ def _best_stake(rate: float, keep_rate: float) -> tuple[float, float]:
             + one * math.log(1.0 - keep_rate * stake)
         )
 
-    stakes = [step / 100 for step in range(1, math.ceil(99 / keep_rate)) if keep_rate * step / 100 < 1.0]
+    stakes = [step / 100 / keep_rate for step in range(1, 100)]
     best = max(stakes, key=growth)
     return best, max(growth(best), 1e-4)

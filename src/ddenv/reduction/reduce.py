@@ -2,41 +2,57 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
-
-import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
-from ddenv.reduction.evidence import Evidence, Place, Traits, Trial
-from ddenv.reduction.guide import Search, make_guide, search
-from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Candidate, Round
-
-Test = Callable[[frozenset[str]], bool]
-
-
-@dataclass(frozen=True)
-class Step:
-    """The environment `kept`, in the order of the elements, after `tests` tests."""
-
-    tests: int
-    kept: tuple[str, ...]
+from ddenv.reduction.acceptance import Acceptance
+from ddenv.reduction.arguments import (
+    checked_choice,
+    checked_count,
+    checked_failure,
+    checked_names,
+    checked_number,
+    checked_positions,
+    checked_share,
+    checked_times,
+    checked_traits,
+    checked_trajectory,
+)
+from ddenv.reduction.calls import Calls, Test
+from ddenv.reduction.rate_claims import RateClaim
+from ddenv.reduction.evidence import Evidence, Place, Traits
+from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.keeping import NOTHING_TO_REDUCE, Keeping
+from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Round
+from ddenv.reduction.verdict import standing
+from ddenv.reduction.walk import Step, Walk, next_round
 
 
 @dataclass(frozen=True)
 class Reduction:
     """What `reduce` returns: the elements `kept`, in their order, after `tests` calls of the test in `rounds` rounds.
 
-    `history` begins with all elements; each further step is a reduction.
+    `history` begins with all elements; each further step is a reduction, or a step back to more elements. The tests are those of
+    all elements at first, of the search, and those that show what the result is worth. `minimal`: what is kept shows the failure
+    often enough, and no single element can be left out; each was left out in a test. With the rule "kept", `claims` say what
+    fresh calls of the test showed of this; with "first" there are none.
     """
 
     kept: tuple[str, ...]
-    tests: int
     rounds: int
     history: tuple[Step, ...]
+    minimal: bool
+    baseline_tests: int
+    search_tests: int
+    certificate_tests: int
+    claims: tuple[RateClaim, ...] = ()
+
+    @property
+    def tests(self) -> int:
+        """How often the test was called."""
+        return self.baseline_tests + self.search_tests + self.certificate_tests
 
 
 def reduce(
@@ -61,15 +77,24 @@ def reduce(
     prior: str = "spatial",
     delta: float = 0.5,
     seed: int = 0,
+    accept_rate: str | None = None,
+    keep_rate: float = 0.8,
+    baseline_runs: int = 10,
     check: bool = True,
     on_round: Callable[[Round], None] | None = None,
 ) -> Reduction:
-    """Finds a few of `elements` with which `test` still shows the failure, and of which no single one can be left out.
+    """Finds a few of `elements` with which `test` still shows the failure; the best end is one of which no single one can go.
 
         ddenv.reduce("abcdef", lambda kept: kept >= {"a", "e"}, algorithm="ddmin").kept  # ("a", "e")
 
     `test(frozenset of names)` runs the robot, or anything else, with these elements alone, and returns whether the failure showed.
     A test that returns False is repeated up to `iterations` times, for failures that do not show every time.
+
+    With `accept_rate` "first", the first run with the failure decides, as in the paper; the end may fail far more rarely than all
+    elements do. With "kept", the default if there are `iterations`, all elements are run `baseline_runs` times at first, and more
+    often if the failure is rare. The search takes what seems to keep `keep_rate` of their failure rate. Fresh runs show at the end
+    whether that is so, and without which elements the rate falls below it; where a claim fails, the search steps back or goes on.
+    All claims together are wrong with a probability of at most 5 %.
 
     `positions` maps each name to x, y, z (m). `trajectory` (N, 5) is time (s), x, y, z (m), yaw (rad) of the run that failed.
     `failure_pose` is where it failed, beginning with x, y, z (m); the default is the trajectory's end. `first_sensed` maps names to
@@ -77,8 +102,8 @@ def reduce(
     maps each name to its `ddenv.Traits`. Only what the chosen schemas look at is required. `n_partitions`, `candidates`,
     `complement_order`, `growth`, `skip`, `prior` and `delta` (rad/s) mean the same as in a scenario's section `reduction`.
 
-    With `check`, all elements are tested first: without the failure there is nothing to reduce. `on_round` is called with each
-    round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are passed on.
+    With `check`, all elements are tested first, as "kept" always does: without the failure there is nothing to reduce. `on_round`
+    is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are passed on.
     """
     names = checked_names(elements)
     known = Evidence(
@@ -99,11 +124,15 @@ def reduce(
     checked_choice("growth", growth, ("paper", "steady"))
     checked_choice("skip", skip, ("known", "implied"))
     checked_choice("prior", prior, ("spatial", "uniform"))
-    bench = _Bench(test, iterations)
+    checked_count("baseline_runs", baseline_runs, 1)
+    checked_share("keep_rate", keep_rate, 0.95)
+    checked_choice("accept_rate", accept_rate := accept_rate or ("kept" if iterations else "first"), ("first", "kept"))
+    calls, everything = Calls(test), frozenset(names)
+    keeping = Keeping(calls, everything, keep_rate, 1 + iterations, baseline_runs)
     guide = make_guide(
         partitioning,
         prioritization,
-        lambda: replace(known, trials=bench.trials),
+        lambda: replace(known, trials=calls.trials),
         prior=prior,
         n_partitions=n_partitions,
         candidates=candidates,
@@ -111,171 +140,30 @@ def reduce(
         growth=growth,
         skip=skip,
     )
-    running = search(algorithm, names, guide)
-    history, rounds = [Step(0, names)], 0
+    walk, searching = Walk(names, calls, on_round or (lambda _: None)), search(algorithm, names, guide)
     # Planned before the first test, so that a missing argument is reported at once.
-    round, left = _next(running, None)
-    if check and not bench.is_similar(frozenset(names)):
-        raise UserError("the failure does not show with all elements: there is nothing to reduce")
-    while round is not None:
-        rounds += 1
-        if on_round is not None:
-            on_round(round)
-        winner = bench.first_similar(round)
-        if winner is not None:
-            models = winner.models
-            history.append(Step(len(bench.trials), tuple(name for name in names if name in models)))
-        round, left = _next(running, winner)
-    kept = tuple(name for name in names if name in left)
-    return Reduction(kept, len(bench.trials), rounds, tuple(history))
+    planned = next_round(searching, None)
+    claims: tuple[RateClaim, ...] = ()
+    if accept_rate == "kept":
+        keeping.baseline()
+        before = calls.others
+        walk.search(searching, keeping.rule(), planned)
+        claims = keeping.carry_on(walk)
+        minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
+    else:
+        if check:
+            _check(calls, everything, 1 + iterations)
+        before, rule = calls.others, Acceptance(1 + iterations)
+        walk.search(searching, rule, planned)
+        rests = [walk.chain[-1] - {name} for name in walk.left]
+        minimal = all(standing([rest], calls.known, rule).verdicts[0] == "dissimilar" for rest in rests)
+    tests = before, len(calls.trials), calls.others - before
+    return Reduction(walk.left, walk.rounds, tuple(walk.history), minimal, *tests, claims)
 
 
-def _next(running: Search, winner: Candidate | None) -> tuple[Round | None, frozenset[str]]:
-    """The next round, or None and the minimal environment."""
-    try:
-        return running.send(winner), frozenset()
-    except StopIteration as end:
-        return None, end.value
-
-
-class _Bench:
-    """Runs tests one after another, and tests no candidate twice."""
-
-    def __init__(self, test: Test, iterations: int) -> None:
-        self._test = test
-        self._iterations = iterations
-        self._known: dict[frozenset[str], bool] = {}
-        self.trials: list[Trial] = []
-
-    def first_similar(self, round: Round) -> Candidate | None:
-        for one in round.candidates:
-            if self.is_similar(one.models):
-                return one
-        return None
-
-    def is_similar(self, models: frozenset[str]) -> bool:
-        if models not in self._known:
-            self._known[models] = self._deflaked(models)
-        return self._known[models]
-
-    def _deflaked(self, models: frozenset[str]) -> bool:
-        # Not any(): a generator would turn a StopIteration of the test into another exception.
-        for _ in range(1 + self._iterations):  # noqa: SIM110
-            if self._run(models):
-                return True
-        return False
-
-    def _run(self, models: frozenset[str]) -> bool:
-        similar = bool(self._test(models))
-        self.trials.append(Trial(models, similar))
-        return similar
-
-
-# Larger numbers are a mistake, and their squares could be infinite.
-LARGEST = 1e9
-
-
-def checked_names(elements: Iterable[str]) -> tuple[str, ...]:
-    """The elements as a tuple. Raises UserError if they are no names, or if a name occurs twice."""
-    try:
-        names = tuple(elements)
-        different = len(set(names))
-    except TypeError:
-        raise UserError(f"elements: expected names, found {elements!r}") from None
-    if different != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise UserError(f"elements: {twice!r} occurs twice; give each element its own name")
-    return names
-
-
-def checked_positions(names: tuple[str, ...], positions: Mapping[str, Place] | None) -> dict[str, Place] | None:
-    """The position of each name, m. Raises UserError."""
-    if positions is None:
-        return None
-    _check_mapping("positions", positions)
-    return {name: _place(f"positions[{name!r}]", positions.get(name)) for name in names}
-
-
-def checked_trajectory(trajectory: Floats | None) -> Floats | None:
-    """The trajectory, shape (N, 5). Raises UserError."""
-    if trajectory is None:
-        return None
-    try:
-        path = np.asarray(trajectory)
-        path = path.astype(float, casting="safe" if path.dtype.kind in "cOSU" else "unsafe")
-    except (TypeError, ValueError):
-        raise UserError("trajectory: expected finite numbers of shape (N, 5)") from None
-    if path.ndim != 2 or path.shape[1] != 5 or not len(path) or not (np.abs(path) <= LARGEST).all():
-        raise UserError(f"trajectory: expected finite numbers of shape (N, 5), found shape {path.shape}")
-    if (np.diff(path[:, 0]) < 0).any():
-        raise UserError("trajectory: its times, in the first column, must not decrease")
-    return path
-
-
-def checked_failure(failure_pose: Iterable[float] | None, path: Floats | None) -> Place | None:
-    """The position of the failure, m: given, or the end of the path (N, 5). Raises UserError."""
-    if failure_pose is not None:
-        return _place("failure_pose", failure_pose)
-    if path is None:
-        return None
-    x, y, z = path[-1, 1:4].tolist()
-    return x, y, z
-
-
-def checked_times(first_sensed: Mapping[str, float] | None) -> dict[str, float] | None:
-    """The time of each name that was sensed, s. Raises UserError."""
-    if first_sensed is None:
-        return None
-    _check_mapping("first_sensed", first_sensed)
-    for name, at in first_sensed.items():
-        if not isinstance(at, Real) or not 0 <= at <= LARGEST:
-            raise UserError(f"first_sensed[{name!r}]: expected a time in s, found {at!r}")
-    return {name: float(at) for name, at in first_sensed.items()}
-
-
-def checked_traits(names: tuple[str, ...], traits: Mapping[str, Traits] | None) -> Mapping[str, Traits] | None:
-    """The traits of each name. Raises UserError."""
-    if traits is None:
-        return None
-    _check_mapping("traits", traits)
-    for name in names:
-        if not isinstance(traits.get(name), Traits):
-            raise UserError(f"traits[{name!r}]: expected ddenv.Traits, found {traits.get(name)!r}")
-    return traits
-
-
-def checked_number(what: str, value: float) -> float:
-    """`value` as a number above 0. Raises UserError."""
-    if not isinstance(value, Real) or not 0 < value <= LARGEST:
-        raise UserError(f"{what}: expected a number above 0, found {value!r}")
-    return float(value)
-
-
-def checked_count(what: str, value: int, least: int) -> int:
-    """`value` as a whole number, `least` or more. Raises UserError."""
-    if not isinstance(value, Integral) or not least <= value < 2**31:
-        raise UserError(f"{what}: expected {least} or more, found {value!r}")
-    return int(value)
-
-
-def checked_choice(what: str, value: str, allowed: tuple[str, ...]) -> None:
-    """Raises UserError if `value` is not allowed."""
-    if value not in allowed:
-        raise UserError(f"{what}: {value!r} is not allowed; use one of {', '.join(allowed)}")
-
-
-def _check_mapping(what: str, value: object) -> None:
-    if not isinstance(value, Mapping):
-        raise UserError(f"{what}: expected a mapping from names to values, found {type(value).__name__}")
-
-
-def _place(what: str, values: Iterable[float] | None) -> Place:
-    if values is None:
-        raise UserError(f"{what}: is missing")
-    try:
-        numbers = [] if isinstance(values, str) else [float(value) for value in values][:3]
-    except (TypeError, ValueError):
-        numbers = []
-    if len(numbers) < 3 or not all(math.isfinite(number) and abs(number) <= LARGEST for number in numbers):
-        raise UserError(f"{what}: expected x, y, z m, found {values!r}")
-    return numbers[0], numbers[1], numbers[2]
+def _check(calls: Calls, everything: frozenset[str], runs: int) -> None:
+    # Not any(): a generator would turn a StopIteration of the test into another exception.
+    for _ in range(runs):
+        if calls.once(everything):
+            return
+    raise UserError(NOTHING_TO_REDUCE)

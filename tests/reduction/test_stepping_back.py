@@ -1,0 +1,102 @@
+"""After its end has lost the rate, a search goes back as far as it must, and no farther."""
+
+import random
+from string import ascii_lowercase
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.reduction.algorithms import sweep
+from ddenv.reduction.certificate import good_enough, settle
+from ddenv.reduction.stepping_back import Refused, groups_again, last_good, tried_again
+
+CHAIN = [frozenset(ascii_lowercase[:length]) for length in range(12, 0, -1)]
+
+
+def outcomes(rate_of, seed=0):
+    """Independent runs, the same whenever they are asked for."""
+
+    def shown(subject, run):
+        return random.Random(f"{seed} {sorted(subject)} {run}").random() < rate_of(subject)
+
+    return shown
+
+
+def place(shown, rate=0.9, lost_rate=0.3, ahead=1):
+    return last_good(CHAIN, lambda subject: settle(good_enough(subject, rate, 0.8, lost_rate), shown, ahead))
+
+
+@given(last=st.integers(0, 10), salt=st.integers(0, 10**6))
+def test_it_goes_back_to_the_last_environment_that_keeps_the_rate(last, salt):
+    shown = outcomes(lambda subject: 1.0 if subject >= CHAIN[last] else 0.0, salt)
+    assert place(shown, 0.95, 0.0) == last
+
+
+@given(rates=st.lists(st.floats(0, 1), min_size=12, max_size=12), ahead=st.integers(1, 5), salt=st.integers(0, 10**6))
+def test_the_place_does_not_depend_on_which_tests_finish_first(rates, ahead, salt):
+    shown = outcomes(dict(zip(CHAIN, rates, strict=True)).__getitem__, salt)
+    known, order = {}, random.Random(salt)
+    while not isinstance(now := place(lambda *one: known.get(one), ahead=ahead), int):
+        assert now
+        assert not known.keys() & set(now)
+        for one in order.sample(now, order.randint(1, len(now))):
+            known[one] = shown(*one)
+    assert now == place(shown)
+
+
+def test_where_runs_break_nothing_shows_that_the_rate_is_kept():
+    assert place(lambda *_: "broken") == 0
+
+
+def test_what_lost_the_rate_is_refused_with_all_its_parts():
+    refused = Refused()
+    refused[frozenset("xyz")] = "vetoed"
+    refused.lose(frozenset("abc"))
+    assert frozenset("xyz") in refused
+    assert all(frozenset(part) in refused for part in ("abc", "ac", ""))
+    assert frozenset("xy") not in refused
+    assert frozenset("abcd") not in refused
+
+
+def carried_through(searching, is_similar):
+    """The end of a search, and the candidates that it tried."""
+    tried, winner = [], None
+    while True:
+        try:
+            round = searching.send(winner)
+        except StopIteration as end:
+            return end.value, tried
+        winner = None
+        for one in round.candidates:
+            tried.append(one.models)
+            if is_similar(one.models):
+                winner = one
+                break
+
+
+@given(needed=st.sets(st.sampled_from(ascii_lowercase[:12]), min_size=1), step=st.integers(0, 10))
+def test_models_that_went_too_early_are_found_and_all_others_go_again(needed, step):
+    """The end lacked a needed model since step + 1."""
+    good, bad, end = CHAIN[step], CHAIN[step + 1], CHAIN[-1]
+    needed = (needed & good) | (good - bad)
+    refused = Refused()
+    refused.lose(bad)
+    order = tuple(sorted(good))
+    groups = groups_again(good, bad, end, order)
+    left, tried = carried_through(
+        tried_again(order, groups, sweep), lambda models: models not in refused and needed <= models
+    )
+    assert left == needed
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "end", "groups"),
+    [
+        ("abcdef", "abcd", "a", [("b", "c", "d"), ("e",), ("f",)]),
+        ("abcd", "abc", "a", [("b", "c")]),
+        ("abcd", "a", "a", [("b",), ("c", "d")]),
+    ],
+)
+def test_first_goes_what_went_later_then_halves_of_the_step_that_lost_it(good, bad, end, groups):
+    assert groups_again(frozenset(good), frozenset(bad), frozenset(end), "abcdef") == groups
