@@ -30,7 +30,9 @@ EXPECTED = (0.9, 0.95, 0.99, 1.0)
 # At this wealth a bet on the opposite ends the search for evidence. Where it is wrong, it only costs runs.
 REFUTED = 20.0
 # The maximum number of pairs: a multiple of the expected number, and never more than these.
-PATIENCE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 2.5, 600, 120
+PATIENCE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 5.0, 600, 240
+# After this number of pairs a claim is given up if both bets grow so slowly that this many times their growth would not be enough.
+FEWEST_PAIRS, HOPE = 100, 4.0
 # After all pairs, a rate of at least this share of the whole world's is likely to be kept.
 LIKELY_KEPT = 0.9
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
@@ -131,7 +133,7 @@ def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
 
 def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
     """Whether `without` shows f at less than `keep_rate` of the rate of `whole`: "needed", "not needed" or "not shown"."""
-    bet_for = _Bet.of(0.5, 0.95, 0.95, 0.95)
+    bet_for = _Bet.of(0.5, 0.75, 0.95, 0.95)
     against = _Bet.of(0.2, 0.5, 0.9)
     shown_without = shown_whole = 0
     for pair in range(MOST_REMOVAL_PAIRS):
@@ -143,6 +145,9 @@ def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
             return (yield from _at_least(terms.at_least - pair - 1, (without, whole), "needed"))
         if against.wealth >= REFUTED:
             return "not needed"
+        more = pair + 1, MOST_REMOVAL_PAIRS
+        if not bet_for.may_reach(1.0 / terms.error, *more) and not against.may_reach(REFUTED, *more):
+            break
     return "not needed" if shown_without >= LIKELY_KEPT * shown_whole else "not shown"
 
 
@@ -190,6 +195,11 @@ class _Bet:
     @property
     def wealth(self) -> float:
         return sum(self.wealths)
+
+    def may_reach(self, wealth: float, pairs: int, most: int) -> bool:
+        """Whether it may reach `wealth` within `most` pairs, if it goes on to grow up to `HOPE` times as fast as in these `pairs`."""
+        growth = math.log(max(self.wealths) * len(self.stakes)) / pairs
+        return pairs < FEWEST_PAIRS or HOPE * growth * most >= math.log(wealth)
 
 
 @lru_cache(maxsize=1024)
