@@ -83,9 +83,72 @@ def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs(salt
     assert found.kept == ("b", "g")
 
 
-def test_a_world_that_does_not_fail_is_refused():
+@pytest.mark.parametrize("options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}])
+def test_a_world_that_does_not_fail_is_refused(options):
     with pytest.raises(ddenv.UserError, match="does not show with all elements"):
-        ddenv.reduce(ELEMENTS, lambda _: False, algorithm="ddmin")
+        ddenv.reduce(ELEMENTS, lambda _: False, algorithm="ddmin", **options)
+
+
+def drifting(salt):
+    """Needs b; c and g are enough to show the failure now and then, both show it always."""
+    rng = np.random.default_rng(salt)
+    return lambda kept: "b" in kept and rng.random() < (0.0, 0.25, 1.0)[len(kept & {"c", "g"})]
+
+
+@given(salt=st.integers(0, 2**31), algorithm=st.sampled_from(names("algorithm")))
+@examples(0.5)
+def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, algorithm):
+    made, test = [], drifting(salt)
+
+    def counted(kept):
+        made.append((kept, test(kept)))
+        return made[-1][1]
+
+    found = ddenv.reduce(ELEMENTS, counted, algorithm=algorithm, accept_rate="kept", **ALL)
+    assert found.kept == ("b", "c", "g")
+    assert found.minimal
+    assert found.tests == len(made) == found.baseline_tests + found.search_tests + found.certificate_tests
+    assert [(claim.without, claim.verdict) for claim in found.claims] == [
+        (None, "kept"),
+        ("b", "needed"),
+        ("c", "needed"),
+        ("g", "needed"),
+    ]
+    assert set(found.history[-1].kept) >= set(found.kept)
+    fresh = made[-found.certificate_tests :]
+    for claim in found.claims:
+        shown = [result for kept, result in fresh if kept == frozenset(found.kept) - {claim.without}][-claim.runs :]
+        assert (claim.shown, claim.runs) == (sum(shown), len(shown))
+        assert claim.low <= claim.shown / claim.runs <= claim.high
+
+
+def test_the_papers_rule_is_content_with_a_rarer_failure_and_claims_nothing():
+    ends = [ddenv.reduce(ELEMENTS, drifting(salt), iterations=3, accept_rate="first", **ALL) for salt in range(20)]
+    assert any(found.kept != ("b", "c", "g") for found in ends)
+    assert all(not found.claims and not found.certificate_tests for found in ends)
+
+
+@given(needed=st.sets(st.sampled_from(ELEMENTS), min_size=1), algorithm=st.sampled_from(names("algorithm")))
+def test_minimal_is_said_only_if_each_element_was_left_out(needed, algorithm):
+    tested = []
+
+    def test(kept):
+        tested.append(kept)
+        return kept >= needed
+
+    for candidates in ("both", "partitions", "complements"):
+        tested.clear()
+        found = ddenv.reduce(ELEMENTS, test, algorithm=algorithm, candidates=candidates, **ALL)
+        left = frozenset(found.kept)
+        assert found.minimal == all(left - {name} in tested for name in left)
+        assert not found.minimal or left == needed
+        assert found.minimal or candidates == "partitions"
+
+
+def test_partitions_alone_do_not_promise_what_they_did_not_test():
+    found = ddenv.reduce(ELEMENTS, needs("a", "h"), candidates="partitions", **ALL)
+    assert found.kept == ELEMENTS
+    assert not found.minimal
 
 
 def test_without_a_check_the_first_test_is_already_a_smaller_one():
@@ -135,6 +198,9 @@ WRONG = {
     "iterations": ({"iterations": -1}, "iterations: expected 0 or more, found -1"),
     "n_partitions": ({"n_partitions": 1}, "n_partitions: expected 2 or more, found 1"),
     "candidates": ({"candidates": "all"}, "candidates: 'all' is not allowed; use one of both, partitions, complements"),
+    "accept_rate": ({"accept_rate": "often"}, "accept_rate: 'often' is not allowed; use one of first, kept"),
+    "keep_rate": ({"keep_rate": 1.0}, "keep_rate: expected a number above 0, at most 0.95, found 1.0"),
+    "baseline_runs": ({"baseline_runs": 0}, "baseline_runs: expected 1 or more, found 0"),
     "prior": ({"prior": "near"}, "prior: 'near' is not allowed"),
     "delta": ({"delta": 0}, "delta: expected a number above 0"),
     "half an iteration": ({"iterations": 1.5}, "iterations: expected 0 or more, found 1.5"),

@@ -60,19 +60,14 @@ def test_what_lost_the_rate_is_refused_with_all_its_parts():
 
 
 def carried_through(searching, is_similar):
-    """The end of a search, and the candidates that it tried."""
-    tried, winner = [], None
+    """The end of a search."""
+    winner = None
     while True:
         try:
             round = searching.send(winner)
         except StopIteration as end:
-            return end.value, tried
-        winner = None
-        for one in round.candidates:
-            tried.append(one.models)
-            if is_similar(one.models):
-                winner = one
-                break
+            return end.value
+        winner = next((one for one in round.candidates if is_similar(one.models)), None)
 
 
 @given(needed=st.sets(st.sampled_from(ascii_lowercase[:12]), min_size=1), step=st.integers(0, 10))
@@ -84,9 +79,7 @@ def test_models_that_went_too_early_are_found_and_all_others_go_again(needed, st
     refused.lose(bad)
     order = tuple(sorted(good))
     groups = groups_again(good, bad, end, order)
-    left, tried = carried_through(
-        tried_again(order, groups, sweep), lambda models: models not in refused and needed <= models
-    )
+    left = carried_through(tried_again(order, groups, sweep), lambda models: models not in refused and needed <= models)
     assert left == needed
 
 

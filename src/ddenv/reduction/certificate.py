@@ -197,7 +197,7 @@ class _Bet:
         return sum(self.wealths)
 
     def may_reach(self, wealth: float, pairs: int, most: int) -> bool:
-        """Whether it may reach `wealth` within `most` pairs, if it goes on to grow up to `HOPE` times as fast as in these `pairs`."""
+        """Whether it may reach `wealth` within `most` pairs, if it grows up to `HOPE` times as fast as in these `pairs`."""
         growth = math.log(max(self.wealths) * len(self.stakes)) / pairs
         return pairs < FEWEST_PAIRS or HOPE * growth * most >= math.log(wealth)
 

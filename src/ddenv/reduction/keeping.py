@@ -10,8 +10,8 @@ from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE, Acceptanc
 from ddenv.reduction.algorithms import sweep
 from ddenv.reduction.calls import Calls
 from ddenv.reduction.certificate import Claim, Subject, Terms, error_of, good_enough, settle
-from ddenv.reduction.rate_claims import RateClaim, certified
 from ddenv.reduction.evidence import Partition
+from ddenv.reduction.rate_claims import RateClaim, certified
 from ddenv.reduction.stepping_back import groups_again, last_good, tried_again
 from ddenv.reduction.walk import Walk
 

@@ -21,10 +21,10 @@ from ddenv.reduction.arguments import (
     checked_trajectory,
 )
 from ddenv.reduction.calls import Calls, Test
-from ddenv.reduction.rate_claims import RateClaim
 from ddenv.reduction.evidence import Evidence, Place, Traits
 from ddenv.reduction.guide import make_guide, search
 from ddenv.reduction.keeping import NOTHING_TO_REDUCE, Keeping
+from ddenv.reduction.rate_claims import RateClaim
 from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Round
 from ddenv.reduction.verdict import standing
 from ddenv.reduction.walk import Step, Walk, next_round
@@ -103,7 +103,8 @@ def reduce(
     `complement_order`, `growth`, `skip`, `prior` and `delta` (rad/s) mean the same as in a scenario's section `reduction`.
 
     With `check`, all elements are tested first, as "kept" always does: without the failure there is nothing to reduce. `on_round`
-    is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are passed on.
+    is called with each round before it is tested. Raises UserError, in one line, for wrong arguments; exceptions of `test` are
+    passed on.
     """
     names = checked_names(elements)
     known = Evidence(
