@@ -14,6 +14,7 @@ from pathlib import Path
 
 from early_stop import fixed
 
+from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.verdict import standing
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
@@ -131,7 +132,7 @@ class Bench:
         `bets` are sets that may be asked for next; their first runs are made ahead of time.
         """
         while True:
-            now = standing(candidates, self._similar, _scenario.reduction.iterations)
+            now = standing(candidates, self._similar, Acceptance(1 + _scenario.reduction.iterations))
             if not now.wanted:
                 return now.winner
             line = [(candidates[index], run) for index, run in now.wanted]

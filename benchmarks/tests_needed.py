@@ -97,9 +97,8 @@ def tests_of(world: World, options: dict | None, flaky: bool, seed: int) -> tupl
     if options is None:
         return _picire(world, test, RERUNS if flaky else 0)
     iterations = RERUNS if flaky else 0
-    found = ddenv.reduce(
-        world.elements, test, iterations=iterations, check=False, seed=seed, **world.evidence, **options
-    )
+    rule = {"iterations": iterations, "accept_rate": "first", "check": False}
+    found = ddenv.reduce(world.elements, test, seed=seed, **rule, **world.evidence, **options)
     return found.tests, set(found.kept) == world.needed
 
 
