@@ -32,7 +32,8 @@ class Engine:
 
     def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
         self._lab, self._run = lab, run
-        self._options = Namespace(jobs=jobs, accept_mode="automatic", share=share, since=time.time())
+        given = {"jobs": jobs, "share": share, "since": time.time()}
+        self._options = Namespace(accept_mode="automatic", bits="same", certify=None, **given)
         self._terminated = threading.Event()
         self._code: int | None = None
         threading.Thread(target=self._work, daemon=True).start()
