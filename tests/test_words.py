@@ -55,11 +55,15 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     runs = {1: ("similar", "stuck"), 2: ("other", "fell"), 3: ("pass", "")}
     happened = [event for test, way in runs.items() for event in (base(test), ended(test, *way))]
     found = {"runs": 3, "failures": 1, "rate": 1 / 3, "low": 0.1, "high": 0.7, "failure_test": 1, "miss_chance": 0.2}
-    more = {"position": [1, 2, 0.5], "iterations_95": 7, "outcomes": {}, "distances": {}}
+    more = {"position": [1, 2, 0.5], "iterations_95": 7, "outcomes": {}, "distances": {}, "broken": 2}
+    f = {"test": 1, "runs": 1, "kinds": ["stuck"], "position": [1, 2, 0.5]}
+    others = [{"test": 2, "runs": 1, "kinds": ["fell", "lost"], "position": [3, -0.001, 0]}]
+    more["seen"] = [f, *others]
     state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
     assert baseline(state) == (
-        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 1 run failed in another way; "
-        "f: stuck at (1.00, 2.00, 0.50) m; the chance that 4 runs of a candidate miss f is 0.2; "
+        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 2 more runs broke; "
+        "f: stuck at (1.00, 2.00, 0.50) m; other failures: 2. fell or lost at (3.00, 0.00) in 1 run "
+        "(--failure reduces another one); the chance that 4 runs of a candidate miss f is 0.2; "
         "a 95 % chance to see f needs --iterations 7"
     )
 

@@ -7,10 +7,13 @@ import shutil
 from collections import Counter
 from collections.abc import Sequence
 
-from ddenv.runfile.events import DEEDS
+from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
 
 CONFIRMING = "confirming what is left with full runs"
+# A line names so many failures of the baseline.
+MOST_FAILURES = 3
 # Events whose text is always the same.
 SAID = {
     "paused": "paused",
@@ -100,13 +103,25 @@ def baseline(state: RunState) -> str:
     if found is None:
         return ""
     x, y, z = found.position
-    failure, others = state.failure or "ending", state.other_failures
-    also = f", {count(others, 'run')} failed in another way" if others else ""
-    also += f", {count(broke, 'run')} broke" if (broke := state.broken_runs) else ""
+    failure = state.failure or "ending"
+    broke = f", {count(found.broken, 'more run')} broke" if found.broken else ""
+    others = f"; {also} (--failure reduces another one)" if (also := other_failures(found)) else ""
     return (
         f"baseline: f in {found.failures} of {found.runs} runs ({found.rate:.0%}, 95 % interval {found.low:.0%} to "
-        f"{found.high:.0%}){also}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m; {iterations(state)}"
+        f"{found.high:.0%}){broke}; f: {failure} at ({x:.2f}, {y:.2f}, {z:.2f}) m{others}; {iterations(state)}"
     )
+
+
+def failed_in(state: RunState, found: Baseline) -> str:
+    """What the robot did in the f of the baseline; on a branch another failure is f."""
+    known = 0 < found.failure_test <= len(state.tests)
+    return deed(state.tests[found.failure_test - 1].failure if known else "")
+
+
+def other_failures(found: Baseline) -> str:
+    """The failures of the baseline besides f, with their numbers; "" if there is none."""
+    listed = [f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in found.others]
+    return f"other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
 
 
 def _endings(state: RunState, one: Candidate | Trial) -> str:

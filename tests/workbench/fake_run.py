@@ -18,6 +18,8 @@ from ddenv.world.read import parse_world
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
 <collision name="body"><geometry><box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"""
 SIZE = (1.2, 0.8, 0.3)
+# Where runs end in f, and in another failure, m.
+END, OTHER_END = (2.0, 0.4, 0.2), (3.0, 1.4, 0.2)
 
 
 def box(name: str, x: float, y: float, yaw: float = 0.0, size: tuple[float, float, float] = SIZE) -> str:
@@ -111,15 +113,20 @@ class FakeRun:
         return self.tests
 
     def finish(
-        self, test: int, outcome: str, distance: float | None = None, wall: float = 2.0, failure: str = ""
+        self,
+        test: int,
+        outcome: str,
+        distance: float | None = None,
+        wall: float = 2.0,
+        failure: str = "",
+        end: tuple[float, float, float] = END,
     ) -> None:
-        pose = [2.0, 0.4, 0.2, 1.0, 0.0, 0.0, 0.0]
         event = {
             "test": test,
             "outcome": outcome,
             "failure": failure,
             "distance": distance,
-            "end_pose": pose,
+            "end_pose": [*end, 1.0, 0.0, 0.0, 0.0],
             "simulated_seconds": 45.0,
             "wall_seconds": wall,
             "first_sensed": [],
@@ -151,10 +158,19 @@ class FakeRun:
             rows.append(Live(slot, test, t, (x, y, z, *quaternion)))
         self.file.set_live(rows)
 
-    def baseline(self, failures: int = 3, runs: int = 4) -> FakeRun:
-        words = [("failed", "stuck") if run < failures else ("pass", "") for run in range(runs)]
-        tests = [self.test(None, outcome, run=run, failure=how) for run, (outcome, how) in enumerate(words)]
-        outcomes = {test: "similar" if index < failures else "pass" for index, test in enumerate(tests)}
+    def baseline(self, failures: int = 3, runs: int = 4, others: int = 0) -> FakeRun:
+        """`others` more runs show another failure."""
+        runs += others
+        ways = ["similar"] * failures + ["other"] * others + ["pass"] * (runs - failures - others)
+        tests = []
+        for run, way in enumerate(ways):
+            tests.append(self.start(run=run))
+            kind = {"similar": "stuck", "other": "fell"}.get(way, "")
+            self.finish(tests[-1], "failed" if kind else "pass", failure=kind, end=OTHER_END if way == "other" else END)
+        outcomes = dict(zip(tests, ways, strict=True))
+        seen = [{"test": tests[0], "runs": failures, "kinds": ["stuck"], "position": END}]
+        if others:
+            seen.append({"test": tests[failures], "runs": others, "kinds": ["fell"], "position": OTHER_END})
         self.write(
             "baseline_finished",
             runs=runs,
@@ -163,7 +179,8 @@ class FakeRun:
             low=0.3,
             high=0.95,
             failure_test=tests[0],
-            position=[2.0, 0.4, 0.2],
+            position=END,
+            seen=seen,
             miss_chance=(1 - failures / runs) ** 4,
             iterations_95=2,
             outcomes=outcomes,

@@ -143,11 +143,9 @@ def test_full_runs_of_what_is_left_come_before_the_end(run):
     assert "f no longer shows; full runs confirm it." in told(run, "absent")[1]
 
 
-def test_other_failures_in_the_baseline_are_counted(run):
-    run.created()
-    run.test(None, "other", 3.0, failure="fell")
-    state = fold(run.baseline().file.events())
-    assert "95 %); 1 run failed in another way." in baseline_sentence(state, 3)
+def test_other_failures_in_the_baseline_are_named_and_counted(run):
+    state = fold(run.created().baseline(others=2).file.events())
+    assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs." in baseline_sentence(state, 3)
 
 
 def test_files_that_do_not_say_how_a_robot_failed_are_worded_too(run):

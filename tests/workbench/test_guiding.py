@@ -142,7 +142,7 @@ async def test_another_failure_is_accepted_after_a_question(run):
         await session.press("n")
         assert session.asked() == []
         await session.press("a", "y")
-        assert session.asked() == [("accept_other", {"test": row.tests[0]})]
+        assert session.asked() == [("accept_other", {"test": row.tests[0], "instead": False})]
 
 
 async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
@@ -332,7 +332,7 @@ def test_the_nearest_other_failure_is_the_one_to_accept(run):
     run.start_round(2)
     tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
     state = state_of(run)
-    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1]})
+    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1], "instead": False})
 
 
 def test_what_the_cursor_only_follows_is_not_accepted(run):

@@ -13,7 +13,13 @@ from ddenv.words import count
 MOST = 120
 # The maximum number of steps in the line about a history without branches.
 MOST_STEPS = 40
-HOW = {"start": "", "reduced": "", "adopted": "adopted by hand", "accepted": "another failure, accepted by hand"}
+HOW = {
+    "start": "",
+    "reduced": "",
+    "adopted": "adopted by hand",
+    "accepted": "another failure, accepted by hand",
+    "instead": "a branch to its failure",
+}
 
 
 def guiding(record: Record) -> Section | None:

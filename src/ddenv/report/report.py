@@ -28,7 +28,8 @@ from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.state import Baseline, RunState
+from ddenv.runfile.failures import Place
+from ddenv.runfile.state import RunState
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
@@ -102,30 +103,29 @@ def _failure(state: RunState) -> list[Paragraph]:
     """The scenario in its author's words, and how the robot failed in it."""
     description = plain(state.scenario.get("description", ""))
     described = [say(description)] if description else []
-    base = state.baseline
-    if base is None:
+    position = state.f_position
+    if position is None:
         seen = count(state.tests_done, "run")
         words = f"The whole world is run first to fix the failure: {seen} ended so far."
         return [*described, say(words)] if state.tests_done else described
-    words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m"
-    words += f"{_short_of(state, base)}{_after(state, base)}."
+    words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
+    words += f"{_short_of(state, position)}{_after(state)}."
     return [*described, say(words)]
 
 
-def _short_of(state: RunState, base: Baseline) -> str:
+def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
     x, y = goal.get("x"), goal.get("y")
     if not isinstance(x, (int, float)) or not isinstance(y, (int, float)):
         return ""
-    away = math.dist((x, y), base.position[:2])
+    away = math.dist((x, y), position[:2])
     return f", {away:.1f} m short of the goal at ({x:g}, {y:g})" if math.isfinite(away) else ""
 
 
-def _after(state: RunState, base: Baseline) -> str:
-    number = base.failure_test
-    if not 0 < number <= len(state.tests) or state.failure not in DEEDS:
+def _after(state: RunState) -> str:
+    test = state.f_test
+    if test is None or state.failure not in DEEDS:
         return ""
-    test = state.tests[number - 1]
     if test.cut:
         return f"; this was certain after {test.simulated_seconds:.1f} s"
     return f"; it had {test.simulated_seconds:.1f} s" if state.failure in ("stuck", "out of time") else ""

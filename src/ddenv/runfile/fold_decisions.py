@@ -59,6 +59,8 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
     trial = None if data.get("trial") is None else tried(state, data["trial"])
     what = trial.label if trial else str(data["what"])
     judged = with_outcomes(state, data)
+    if data.get("instead"):
+        return _branched(judged, test, data, at, what)
     changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
     return {
         "tests": judged.tests,
@@ -68,6 +70,26 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
         **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
         **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
     }
+
+
+def _branched(state: RunState, test: Test, data: Data, at: float, what: str) -> Changes:
+    """Another failure is f from now on, in place of what was f, in the environment that showed it."""
+    arrival = arrived(state, {**data, "evidence_test": test.id}, at, "instead", what, below=test.node)
+    gone = state.pinned.difference(arrival["environment"])
+    words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
+    return {
+        "tests": state.tests,
+        "tally": state.tally,
+        "failures": (test.id,),
+        "pinned": state.pinned - gone,
+        **arrival,
+        **decision(state, at, "accept_other", words),
+    }
+
+
+def _unpinned(state: RunState, gone: frozenset[str]) -> str:
+    """Models that are not in the new environment cannot stay pinned."""
+    return f"; unpinned {listed([name for name in state.elements if name in gone])}" if gone else ""
 
 
 def went_back(state: RunState, data: Data, at: float) -> Changes:
@@ -81,10 +103,8 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         last = nodes[here(state, undone).number]
         nodes[last.number] = replace(last, rejected=True)
         words = f"took back {last.what}: {many(len(node.environment))} again"
-    # Models that are not in this environment cannot stay pinned.
     gone = state.pinned.difference(node.environment)
-    if gone:
-        words += f"; unpinned {listed([name for name in state.elements if name in gone])}"
+    words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
     judged = with_outcomes(state, data) if "outcomes" in data else state
     return {
@@ -126,13 +146,13 @@ def command_refused(state: RunState, data: Data, _: float) -> Changes:
     return {"refusal": (int(data["command"]), str(data["why"]))}
 
 
-def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Changes:
-    """The run moves to another environment, a new node below the current one."""
+def arrived(state: RunState, data: Data, at: float, how: str, what: str, below: int | None = None) -> Changes:
+    """The run moves to another environment, a new node below the current one, or below node number `below`."""
     environment = names(state.elements, data["environment"])
     reduction = state.scenario.get("reduction", {})
     node = Node(
         number=len(state.nodes),
-        parent=state.node,
+        parent=state.node if below is None else below,
         how=how,
         what=what,
         environment=environment,
@@ -144,7 +164,7 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str) -> Chan
     )
     inside = set(environment) <= set(state.environment)
     # Nothing is known yet about what another failure needs.
-    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
+    needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
     changes = {} if how == "reduced" else left_round(state)
     return changes | {
         "nodes": (*state.nodes, node),
@@ -164,14 +184,23 @@ def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
-    """The tests whose failures count as f in a node: that of f, and those accepted on the path to the node."""
+    """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
     accepted: list[int] = []
-    node = state.nodes[number]
-    while node.parent is not None:
+    node, first = state.nodes[number], origin(state, number)
+    while node.parent is not None and node.number != first.number:
         if node.how == "accepted" and node.evidence_test is not None:
             accepted.append(node.evidence_test)
         node = state.nodes[node.parent]
-    return (*state.failures[:1], *reversed(accepted))
+    f = () if first.evidence_test is None else (first.evidence_test,)
+    return (*f, *reversed(accepted))
+
+
+def origin(state: RunState, number: int) -> Node:
+    """Where f in a node was seen first: the whole world, or the start of a branch that reduces another failure."""
+    node = state.nodes[number]
+    while node.how != "instead" and node.parent is not None:
+        node = state.nodes[node.parent]
+    return node
 
 
 def left_round(state: RunState) -> Changes:

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import IO
 
 from ddenv.errors import UserError
+from ddenv.runfile.failures import Baseline
 from ddenv.runfile.fold import apply
-from ddenv.runfile.state import Baseline, RunState
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
 from ddenv.study.plan import Cell
 from ddenv.study.study_folder import check_path, run_path

@@ -246,4 +246,5 @@ HOW = {
     "reduced": "reduced to what shows f",
     "adopted": "a try by hand that showed f",
     "accepted": "another failure, accepted as f, too",
+    "instead": "a branch: the failure of this test is f here",
 }

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
+from ddenv.words import failed_in, other_failures
 from ddenv.workbench.run.explain_decisions import (
     arrival,
     by_hand,
@@ -78,12 +79,13 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
     base = state.baseline
     if base is None:
         return ""
-    others = f"; {count(state.other_failures, 'run')} failed in another way" if state.other_failures else ""
-    others += f"; {count(state.broken_runs, 'run')} broke" if state.broken_runs else ""
+    broke = f"; {count(base.broken, 'more run')} broke" if base.broken else ""
     sentence = (
-        f"Baseline: the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')} "
-        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){others}."
+        f"Baseline: the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')} "
+        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){broke}."
     )
+    if also := other_failures(base):
+        sentence += f" {also[:1].upper()}{also[1:]}."
     if base.rate >= 1.0:
         return sentence
     tests = count(1 + iterations, "test")
@@ -145,6 +147,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     first = (
         f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
     )
+    if len(tests) >= options.baseline_runs:
+        first = "Few runs of the whole world show f: the robot runs in it until more do."
     if not tests:
         return (first,)
     return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")

@@ -11,6 +11,7 @@ from ddenv.workbench.wording import count, plain
 HOW = {
     "adopted": "You adopted {what}",
     "accepted": "You accepted the other failure of {what} as f",
+    "instead": "You branched: the failure of {what} is f here",
 }
 
 
