@@ -102,6 +102,8 @@ OPENED = {
     "settings": ["c"],
     "accept-other": ["up", "up", "up", "a"],
     "history": ["h"],
+    "failures": ["f"],
+    "branch": ["f", "enter"],
     "compare": ["h", "m", "up", "c"],
     "log": ["L"],
     "quit": ["q"],

@@ -190,8 +190,8 @@ def _question(state: RunState, test: Test, instead: bool = False) -> str:
     near = test.distance is not None and math.isfinite(test.distance)
     apart = f", {test.distance:.2f} m from f's end" if near else ""
     branch = (
-        "Reduce this failure in place of f? The run branches: these models become the environment, and only this failure is f "
-        "there. What was found for f stays in the history (h); f is f again where you go back to."
+        "Reduce this failure in place of f? The run branches: these models become the environment, and only this failure counts as "
+        "f in the branch. Going back in the history (h) restores f, and all that was found for it."
     )
     too = "Count this failure as f, too? Then these models become the environment. u takes it back."
     return (

@@ -22,6 +22,7 @@ from ddenv.page.blocks import (
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.by_hand import guiding
+from ddenv.report.others_met import others_met
 from ddenv.report.outcomes import sureness
 from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import way
@@ -38,7 +39,8 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    sections = (what_is_left(record), way(record), guiding(record), sureness(record), settings(record), repeat(record))
+    about = (what_is_left, way, guiding, sureness, others_met, settings, repeat)
+    sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),

@@ -229,6 +229,9 @@ class RunScreen(Screen[None]):
     def action_history(self) -> None:
         self._opening.history()
 
+    def action_failures(self) -> None:
+        self._opening.failures()
+
     def action_find(self) -> None:
         names = [each.name for each in self._map.place.prints]
         self._opening.choose("Find a model on the map", names, False, lambda chosen: self._find(chosen[0]))
