@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import random
+from contextlib import suppress
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ddenv.engine.baseline import fix_failure
+from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
+from ddenv.runfile.store import RunFile
 from ddenv.world.scenario import FailureSpec
+from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.test_driver import Killed
 
 SPEC = FailureSpec(epsilon=0.5)
 
@@ -84,3 +93,70 @@ def test_another_failure_can_be_chosen_by_its_number():
         "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "
         "2. fell at (5.00, 0.00) in 2 runs; 3. lost at (-9.00, 0.00) in 1 run"
     )
+
+
+def rare(rate: float, salt: int):
+    """In this part of its runs the wall stops the robot; in others it ends elsewhere, or the simulation breaks."""
+
+    def oracle(keep, seed):
+        luck = random.Random(f"{salt} {seed}").random()
+        if luck < rate:
+            return "similar" if "wall" in keep else "pass"
+        return "other" if luck < rate + 0.05 else "error" if luck > 0.95 else "pass"
+
+    return oracle
+
+
+def last_baseline(folder, salt: int, jobs: int, kill_every: int):
+    """The baseline, and the runs made in it, of an engine that is killed and started again all the time."""
+    path = new_run(folder, accept_rate="kept", baseline_runs=4, iterations=1)
+    for _ in range(40):
+        pool = FakePool(rare(0.2, salt), jobs, salt)
+        with suppress(Killed):
+            drive(path, pool, prepare=lambda file: _kill_at_end_of_baseline(file, kill_every))
+            break
+        with RunFile(path) as file:
+            state = fold(file.events())
+        if state.baseline is not None:
+            break
+    with RunFile(path) as file:
+        state = fold(file.events())
+    runs = {test.run for test in state.tests if test.phase == "baseline" and test.is_finished}
+    if state.baseline is None:
+        return None, state.status, sorted(runs)
+    # The numbers of tests depend on how often an engine was killed.
+    seen = [(state.tests[one.test - 1].run, one.runs, one.kinds, one.position) for one in state.baseline.seen]
+    return replace(state.baseline, failure_test=0, seen=()), seen, sorted(runs)
+
+
+def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:
+    """No more than so many events are written, and none after the baseline."""
+    append, written = file.append, []
+
+    def appended(kind, data, motions=None):
+        written.append(kind)
+        event = append(kind, data, motions)
+        if len(written) > events or kind == "baseline_finished":
+            raise Killed
+        return event
+
+    file.append = appended
+
+
+@pytest.mark.parametrize("salt", range(6))
+def test_where_few_runs_show_f_the_baseline_goes_on_in_the_same_way_for_all_engines(tmp_path, salt):
+    usual = last_baseline(tmp_path, salt, 1, 10_000)
+    found, status, runs = usual
+    assert last_baseline(tmp_path, salt, 3, 10_000) == last_baseline(tmp_path, salt, 2, 25) == usual
+    if found is None:
+        assert (status, runs) == ("finished", [0, 1, 2, 3])
+    else:
+        assert len(runs) == found.runs + found.broken
+        # No run more than needed.
+        assert len(runs) == 4 or (found.failures == FEWEST_SHOWN) or (len(runs) == LONGEST_BASELINE)
+        assert found.failures >= FEWEST_SHOWN or len(runs) == LONGEST_BASELINE
+
+
+def test_the_papers_baseline_never_goes_on(tmp_path):
+    state = drive(new_run(tmp_path, baseline_runs=4, iterations=1), FakePool(rare(0.2, 2), 2))
+    assert sum(test.phase == "baseline" for test in state.tests) == 4

@@ -123,6 +123,21 @@ def test_rounds_as_they_ended(run):
     ]
 
 
+def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
+    run.created().baseline(others=2)
+    run.start_round(2)
+    run.dissimilar(0)
+    sections = {one.title: one.blocks for one in content(read_run(run.path)).sections}
+    rows = next(block for block in sections["Other failures met"] if isinstance(block, Table)).rows
+    assert [row[:4] for row in rows] == [
+        ("fell at (3.00, 1.40)", "1.41", "2", "11 models (test 4)"),
+        ("tipped over at (2.00, 0.40)", "0.00", "2", "6 models (test 7)"),
+    ]
+    seen = next(block for block in sections["How sure it is"] if isinstance(block, Table))
+    assert seen.rows == (("1", "stuck at (2.00, 0.40)", "3"), ("2", "fell at (3.00, 1.40)", "2"))
+    assert seen.strong == {0}
+
+
 def test_what_was_decided_by_hand(run):
     fake_run.guided(run)
     report = content(read_run(run.path))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ddenv.page.blocks import Cell, Name, Part, Section, Table, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.atlas import OtherFailure, atlas, models_of
@@ -22,8 +24,8 @@ def others_met(record: Record) -> Section | None:
         f"{count(len(found), 'other failure')} in {tests}, each with the smallest environment that showed it. "
         "The workbench reduces any of them in a branch of the run (key f)."
     )
-    head = ("failure", "tests", "smallest environment", "its models")
-    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), frozenset({1}))
+    head = ("failure", "from f's end, m", "tests", "smallest environment", "its models")
+    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), frozenset({1, 2}))
     more = len(found) - MOST
     rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
     return Section("Other failures met", (lead, table, *rest))
@@ -37,4 +39,6 @@ def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
     more = len(models) - MOST_NAMES
     names += [f" and {more} more"] if more > 0 else []
     size = f"{count(failure.size, 'model')} (test {failure.smallest})"
-    return failure.name, thousands(len(failure.tests)), size, tuple(names[1:]) or "none"
+    f = state.f_position
+    away = "" if f is None else f"{math.dist(f, failure.position):.2f}"
+    return failure.name, away, thousands(len(failure.tests)), size, tuple(names[1:]) or "none"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -92,7 +93,7 @@ class FailuresMet(ModalScreen[int | None]):
     @on(OptionList.OptionHighlighted)
     def _show_about(self) -> None:
         state, one = self._look_at().state, self._under_cursor
-        words = Text(_f(state), "dim")
+        words = Text(_f(state, one), "dim")
         if one is None:
             words = Text("No test shows a failure other than f.\n").append_text(words)
         else:
@@ -127,7 +128,9 @@ def _smallest(one: OtherFailure) -> str:
     return f"{count(one.size, 'model')} (test {one.smallest})"
 
 
-def _f(state: RunState) -> str:
+def _f(state: RunState, one: OtherFailure | None) -> str:
     if state.f_position is None:
         return "f is not known yet."
-    return f"f: {named((state.failure,), state.f_position)}"
+    # Ends that differ in height alone have similar names.
+    away = "" if one is None else f", {math.dist(one.position, state.f_position):.2f} m from this end"
+    return f"f: {named((state.failure,), state.f_position)}{away}"
