@@ -3,8 +3,8 @@
     python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
 
 Repaired worlds: the ditch is filled, the cinder blocks of the rubble are gone, all patches are as rough as the asphalt. A run
-failed if it did not reach the goal; it shows f if it ended within epsilon of the failed run that has most others there. Intervals are
-Wilson's, 95 %.
+failed if it did not reach the goal; it shows f if it ended within epsilon of the failed run that has most others there. Intervals
+are Wilson's, 95 %.
 """
 
 import argparse
@@ -14,8 +14,6 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-
-import numpy as np
 
 from ddenv.rates import wilson_interval
 from ddenv.robot.drake.template import Template
