@@ -3,8 +3,8 @@
     python benchmarks/failure_rates.py [--seeds N] [--jobs N] [--scenarios ditch,rubble,friction]
 
 Repaired worlds: the ditch is filled, the cinder blocks of the rubble are gone, all patches are as rough as the asphalt. A run
-failed if it did not reach the goal; it shows f if it ended within epsilon of the medoid of all failed runs. Intervals are
-Wilson's, 95 %.
+failed if it did not reach the goal; it shows f if it ended within epsilon of the failed run that has most others there. Intervals
+are Wilson's, 95 %.
 """
 
 import argparse
@@ -15,12 +15,10 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
-
 from ddenv.rates import wilson_interval
 from ddenv.robot.drake.template import Template
-from ddenv.robot.oracle import medoid
 from ddenv.robot.result import RunResult
+from ddenv.runfile.failures import alike
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
@@ -69,9 +67,8 @@ def row(name: str, repaired: bool, results: list[RunResult]) -> str:
     failed = [result for result in results if result.outcome != "pass"]
     similar = 0
     if failed:
-        ends = np.array([result.end_position for result in failed])
         epsilon = load_scenario(SCENARIOS / f"{name}.yaml").failure.epsilon
-        similar = int((np.linalg.norm(ends - ends[medoid(ends)], axis=1) <= epsilon).sum())
+        similar = len(alike([result.end_position for result in failed], epsilon)[0])
     kinds = ", ".join(f"{count} {kind}" for kind, count in Counter(one.failure for one in failed).most_common())
     longest = max((one.simulated_seconds for one in results if one.outcome == "pass"), default=None)
     cells = [name, "repaired" if repaired else "whole", share(len(failed), len(results)), share(similar, len(results))]

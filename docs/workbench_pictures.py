@@ -79,6 +79,7 @@ PICTURES = {
     "quit": Picture("Quit", "Leaving: stop the engine or let it go on"),
     "choose": Picture("ChooseModels", "Choosing models by their names"),
     "other": Picture("Question", "Accepting another failure as f"),
+    "failures": Picture("FailuresMet", "Other failures, each with its smallest environment"),
     "change": Picture("Change", "Changing the settings during a run"),
     "history": Picture("History", "The history, with a branch"),
     "compare": Picture("Compare", "Two environments side by side"),
@@ -176,7 +177,9 @@ async def guide(pilot: Pilot[int]) -> None:
     await until(pilot, lambda: state(pilot).paused)
     await press(pilot, "2", "home", *["down"] * rows[0], "a")
     await take(pilot, "other")
-    await press(pilot, "n", "p", *"near", "tab", "enter")
+    await press(pilot, "n", "f")
+    await take(pilot, "failures")
+    await press(pilot, "escape", "p", *"near", "tab", "enter")
     await until(pilot, lambda: bool(state(pilot).pinned))
     await press(pilot, "o", *"asphalt", "tab", "down", "tab")
     await take(pilot, "choose")

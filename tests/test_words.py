@@ -1,6 +1,6 @@
 """The lines that are printed while a run is followed."""
 
-from ddenv.cli.summary import broken
+from ddenv.cli.follow import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event
@@ -55,11 +55,15 @@ def test_the_baseline_says_how_the_robot_failed_in_f():
     runs = {1: ("similar", "stuck"), 2: ("other", "fell"), 3: ("pass", "")}
     happened = [event for test, way in runs.items() for event in (base(test), ended(test, *way))]
     found = {"runs": 3, "failures": 1, "rate": 1 / 3, "low": 0.1, "high": 0.7, "failure_test": 1, "miss_chance": 0.2}
-    more = {"position": [1, 2, 0.5], "iterations_95": 7, "outcomes": {}, "distances": {}}
+    more = {"position": [1, 2, 0.5], "iterations_95": 7, "outcomes": {}, "distances": {}, "broken": 2}
+    f = {"test": 1, "runs": 1, "kinds": ["stuck"], "position": [1, 2, 0.5]}
+    others = [{"test": 2, "runs": 1, "kinds": ["fell", "lost"], "position": [3, -0.001, 0]}]
+    more["seen"] = [f, *others]
     state = states(*happened, ("baseline_finished", found | more), scenario={"reduction": {"iterations": 3}})[-1]
     assert baseline(state) == (
-        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 1 run failed in another way; "
-        "f: stuck at (1.00, 2.00, 0.50) m; the chance that 4 runs of a candidate miss f is 0.2; "
+        "baseline: f in 1 of 3 runs (33%, 95 % interval 10% to 70%), 2 more runs broke; "
+        "f: stuck at (1.00, 2.00, 0.50) m; other failures: 2. fell or lost at (3.00, 0.00) in 1 run "
+        "(--failure reduces another one); the chance that 4 runs of a candidate miss f is 0.2; "
         "a 95 % chance to see f needs --iterations 7"
     )
 
@@ -68,37 +72,10 @@ def base(test: int) -> tuple[str, dict]:
     return "test_started", {"test": test, "phase": "baseline", "round": None, "candidate": None, "run": 0, "seed": 0}
 
 
-STARTED = {"certificate": 1, "run": 10_000, "rate": 0.9, "keep_rate": 0.8, "error": 0.03, "at_least": 3}
-
-
-def claim(without: int | None, verdict: str, shown: int, runs: int) -> dict:
-    ends = {"similar": shown, "pass": runs - shown}
-    return {
-        "without": without,
-        "verdict": verdict,
-        "shown": shown,
-        "runs": runs,
-        "low": 0.1,
-        "high": 0.9,
-        "outcomes": ends,
-    }
-
-
-def test_a_certificate_is_told_with_what_follows_from_it():
-    lost = {"claims": [claim(None, "lost", 3, 9)]}
-    _, before, after = states(started(1), ("certificate_started", STARTED))
-    assert news("certificate_started", before, after).startswith("certificate 1: fresh runs of what is left (4 models)")
-    assert "certifying what is left with fresh runs · 4 of 4 models" in headline(after)
-    both = (("certificate_started", STARTED), ("certificate_finished", lost))
-    _, before, after = states(*both)
-    assert news("certificate_finished", before, after) == (
-        "  certificate 1: f is too rare in what is left: f in 3 of 9 fresh runs (10 % to 90 %); "
-        "it has to keep 80 % of the whole world's rate"
-    )
-    _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": []}))
-    assert news("rate_lost", before, after) == "  back to 4 models, the last environment that keeps the rate"
-    _, _, before, after = states(*both, ("left_out", {"without": 1, "environment": [0, 2, 3], "evidence_test": 1}))
-    assert news("left_out", before, after) == "  reduced to 3 models after 0 tests: without b f shows as often"
+def test_full_runs_of_what_is_left_are_told():
+    _, before, after = states(started(1), ("confirm_started", {"round": None}))
+    assert news("confirm_started", before, after) == "confirming what is left with full runs"
+    assert "confirming what is left with full runs · 4 of 4 models" in headline(after)
 
 
 def test_the_headline_counts_tests_that_ended_and_that_run():

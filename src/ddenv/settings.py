@@ -157,6 +157,15 @@ class Reduction:
         cost="Costs nothing.",
     )
     baseline_runs: int = setting(10, "runs of the whole world before the first round", least=1, most=1000, shown="more")
+    failure: int = setting(
+        1,
+        "which failure of the whole world is reduced; 1 is the most frequent one",
+        least=1,
+        most=1000,
+        shown="more",
+        more="The baseline lists them with their numbers.",
+        cost="A rarer failure needs more re-runs.",
+    )
     as_printed: bool = setting(
         False,
         "follow the paper's algorithm to the letter, not the variant that needs fewer tests",

@@ -252,6 +252,29 @@ def test_the_baseline_tells_the_rate_and_the_chance_to_miss(tmp_path):
     assert [test.outcome for test in state.tests[:10]].count("other") == 1
 
 
+def test_the_failure_that_the_user_chose_is_reduced(tmp_path):
+    def oracle(keep, seed):
+        """The wall stops the robot, but in every third run the ball does so elsewhere, if it is there."""
+        return "other" if seed % 3 == 0 and "ball" in keep else "similar" if "wall" in keep else "pass"
+
+    usual = drive(new_run(tmp_path, baseline_runs=5, iterations=2), FakePool(oracle, 2))
+    rarer = drive(new_run(tmp_path, baseline_runs=5, iterations=2, failure=2), FakePool(oracle, 2))
+    assert [(one.name, one.runs) for one in usual.baseline.seen] == [
+        ("stuck at (2.00, 0.00)", 3),
+        ("stuck at (9.00, 0.00)", 2),
+    ]
+    assert rarer.baseline.seen == usual.baseline.seen
+    assert (usual.environment, usual.baseline.failures) == (("wall",), 3)
+    assert (rarer.environment, rarer.baseline.failures) == (("ball",), 2)
+
+    none = drive(new_run(tmp_path, baseline_runs=5, failure=3), FakePool(oracle, 2))
+    assert (none.status, none.rounds_done, none.minimal) == ("finished", 0, False)
+    assert none.reason == (
+        "there is no failure number 3; 5 runs of the whole world showed these: "
+        "1. stuck at (2.00, 0.00) in 3 runs; 2. stuck at (9.00, 0.00) in 2 runs"
+    )
+
+
 def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
     path = new_run(tmp_path)
     viewer = RunFile(path)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
+from ddenv.runfile.atlas import atlas, models_of
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
@@ -167,6 +168,47 @@ def test_another_failure_is_taken_for_as_good(tmp_path):
     assert state.minimal
 
 
+def test_another_failure_is_reduced_in_a_branch_and_f_is_f_again_outside_of_it(tmp_path):
+    def oracle(keep, _):
+        # Without the beam the robot gets stuck elsewhere.
+        return "similar" if {"wall", "beam"} <= keep else "other" if "wall" in keep else "pass"
+
+    def guide():
+        state = yield from until(lambda state: any(test.outcome == "other" for test in state.tests))
+        yield "pause", {}
+        state = yield from until(lambda state: state.paused)
+        met = atlas(state)[0]
+        test = state.tests[met.smallest - 1]
+        whole = [one.id for one in state.tests if one.phase == "baseline"]
+        yield "pin", {"models": numbers("beam")}
+        yield "accept_other", {"test": test.id, "instead": True}
+        state = yield from until(lambda state: state.here.how == "instead")
+        assert set(state.environment) == set(models_of(state, test)) > {"wall"}
+        assert (state.here.parent, state.failures, state.f_position) == (test.node, (test.id,), test.end_pose[:3])
+        # What was f is another failure here.
+        assert {state.tests[one - 1].outcome for one in whole} == {"other"}
+        assert not state.pinned
+        branch = state.node
+        yield "resume", {}
+        state = yield from until(lambda state: state.nodes[branch].number != state.node and state.here.parent == branch)
+        assert "beam" not in state.environment
+        yield "go_back", {"node": 0}
+        state = yield from until(lambda state: state.node == 0)
+        assert state.failures == (state.baseline.failure_test,)
+        assert {state.tests[one - 1].outcome for one in whole} == {"similar"}
+        yield "go_back", {"node": branch}
+        state = yield from until(lambda state: state.node == branch)
+        assert state.failures == (test.id,)
+        yield "resume", {}
+
+    path = new_run(tmp_path)
+    pool = Guided(path, oracle, guide(), 2)
+    state = drive(path, pool)
+    assert set(state.environment) == {"wall"}
+    assert state.minimal
+    assert len(pool.made) == len(set(pool.made))
+
+
 def test_an_undone_reduction_is_not_made_again(tmp_path):
     def guide():
         state = yield from until(lambda state: len(state.nodes) == 2)
@@ -305,7 +347,7 @@ COMMANDS = st.one_of(
         st.fixed_dictionaries({"models": st.lists(st.integers(0, 5), min_size=1, max_size=4)}),
     ),
     st.tuples(st.just("adopt"), st.fixed_dictionaries({"trial": st.integers(1, 3)})),
-    st.tuples(st.just("accept_other"), st.fixed_dictionaries({"test": st.integers(1, 40)})),
+    st.tuples(st.just("accept_other"), st.fixed_dictionaries({"test": st.integers(1, 40), "instead": st.booleans()})),
     st.tuples(st.just("undo"), st.just({})),
     st.tuples(st.just("go_back"), st.fixed_dictionaries({"node": st.integers(0, 4)})),
     st.tuples(

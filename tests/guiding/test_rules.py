@@ -41,7 +41,8 @@ WRITTEN = [
     ("unpin", {"models": [1]}),
     ("try", {"models": []}),
     ("adopt", {"trial": 1}),
-    ("accept_other", {"test": 7}),
+    ("accept_other", {"test": 7, "instead": False}),
+    ("accept_other", {"test": 7, "instead": True}),
     ("undo", {}),
     ("go_back", {"node": 0}),
     ("change", {"settings": {"budget": None, "iterations": 2}}),
@@ -112,7 +113,7 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
             control = Control(journal, threading.Event())
             for kind, data in asked:
                 before = journal.state
-                now = Situation(before, search_due=journal.steered, models_of=journal.keep_of_test)
+                now = Situation(before, search_due=journal.steered)
                 why = refusal(parse(kind, data), now)
                 command = file.send(kind, **data)
                 control.poll()

@@ -91,8 +91,7 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
     fake_run.finished(run)
     text = page(run, tmp_path).text
     assert "2 of 11 models are enough to make the robot fail" in text
-    assert "Minimal: no single model can be removed: f in 23 of 23 fresh runs (86 % to 100 %)" in text
-    assert "without crate_01 12 11 pass, 1 similar" in text.replace("1 similar, 11 pass", "11 pass, 1 similar")
+    assert "Minimal: without any one of them the failure was not seen again." in text
     assert "the robot got stuck at (2.00, 0.40, 0.20) m, 4.0 m short of the goal at (6, 0)" in text
     assert "got stuck in 3 of 4 runs: 75 %, 95 % interval (Wilson) 30 % to 95 %" in text
     assert "11 → 6 → 2 models" in text
@@ -122,6 +121,21 @@ def test_rounds_as_they_ended(run):
         ("2", "3", "1 of 6", "without A, taken back", "4", "1"),
         ("3", "2", "2 of 2", "under way", "5", "4"),
     ]
+
+
+def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
+    run.created().baseline(others=2)
+    run.start_round(2)
+    run.dissimilar(0)
+    sections = {one.title: one.blocks for one in content(read_run(run.path)).sections}
+    rows = next(block for block in sections["Other failures met"] if isinstance(block, Table)).rows
+    assert [row[:4] for row in rows] == [
+        ("fell at (3.00, 1.40)", "1.41", "2", "11 models (test 4)"),
+        ("tipped over at (2.00, 0.40)", "0.00", "2", "6 models (test 7)"),
+    ]
+    seen = next(block for block in sections["How sure it is"] if isinstance(block, Table))
+    assert seen.rows == (("1", "stuck at (2.00, 0.40)", "3"), ("2", "fell at (3.00, 1.40)", "2"))
+    assert seen.strong == {0}
 
 
 def test_what_was_decided_by_hand(run):

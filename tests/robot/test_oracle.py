@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot.oracle import Failure, judge, medoid, trajectory_distance
+from ddenv.robot.oracle import Failure, judge, trajectory_distance
 from ddenv.robot.result import RunResult
 
 
@@ -106,9 +106,3 @@ def test_similar_trajectories_have_similar_ends(a, b, epsilon):
     along = judge(result("failed", a), replace(f, similarity="trajectory"))
     assert along.outcome == "other" or judge(result("failed", a), f).outcome == "similar"
     assert (along.outcome == "similar") == (max(along.distance, along.trajectory_distance) <= epsilon)
-
-
-def test_medoid_is_the_position_nearest_to_all_others():
-    positions = np.array([[0, 0, 0], [0.1, 0, 0], [0.3, 0, 0], [9, 9, 9]], dtype=float)
-    assert medoid(positions) == 1
-    assert medoid(positions[3:]) == 0

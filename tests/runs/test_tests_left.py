@@ -72,7 +72,7 @@ def test_no_time_is_said_while_nothing_runs(run):
 
 def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
     assert left(run) is None
-    fake_run.certifying(run)
+    fake_run.confirming(run)
     assert left(run) is None
     run.write("finished", minimal=True, reason="")
     assert left(run) is None

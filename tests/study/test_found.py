@@ -44,7 +44,7 @@ def run(tmp_path, cell):
 
 
 def test_a_minimal_cell(tmp_path, cell, run):
-    fake_run.uncertified(run)
+    fake_run.finished(run)
     found = read_cell(tmp_path, cell)
     assert (found.minimal, found.problem, found.left) == (True, "", LEFT)
     assert len(found.elements) == 11 and found.smaller == 1 - 2 / 11
@@ -78,13 +78,13 @@ def test_tests_made_ahead_of_time_do_not_count(tmp_path, cell, run):
 
 
 def test_full_runs_at_the_end_count(tmp_path, cell, run):
-    fake_run.certifying(run)
-    for test in (31, 32):
+    fake_run.confirming(run)
+    for test in (17, 18):
         run.finish(test, "pass")
     run.write("finished", minimal=True, reason="no candidate showed f")
     found = read_cell(tmp_path, cell)
-    assert (found.tests, found.reruns) == (14 + 18, 6)
-    assert found.sizes[-1] == (32, 2)
+    assert (found.tests, found.reruns) == (14 + 4, 6)
+    assert found.sizes[-1] == (18, 2)
 
 
 def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):

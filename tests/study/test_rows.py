@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from ddenv.page.blocks import Strong, Table
-from ddenv.runfile.state import Baseline
+from ddenv.runfile.failures import Baseline
 from ddenv.study.figures import chart
 from ddenv.study.plan import PAIRS, make_plan
 from ddenv.study.results import APART, Check, Found

@@ -9,11 +9,7 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
-from ddenv.claims import is_minimal, verdict_on
-from ddenv.rates import wilson_interval
-from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
@@ -22,6 +18,8 @@ from ddenv.world.read import parse_world
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
 <collision name="body"><geometry><box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"""
 SIZE = (1.2, 0.8, 0.3)
+# Where runs end in f, and in another failure, m.
+END, OTHER_END = (2.0, 0.4, 0.2), (3.0, 1.4, 0.2)
 
 
 def box(name: str, x: float, y: float, yaw: float = 0.0, size: tuple[float, float, float] = SIZE) -> str:
@@ -82,8 +80,6 @@ class FakeRun:
         self.tests = 0
         self.round = 0
         self.trials = 0
-        self.certificates = 0
-        self.fresh = self.first_fresh = FIRST_FRESH_RUN
         self._stack = ExitStack()
 
     def engine(self):
@@ -117,15 +113,20 @@ class FakeRun:
         return self.tests
 
     def finish(
-        self, test: int, outcome: str, distance: float | None = None, wall: float = 2.0, failure: str = ""
+        self,
+        test: int,
+        outcome: str,
+        distance: float | None = None,
+        wall: float = 2.0,
+        failure: str = "",
+        end: tuple[float, float, float] = END,
     ) -> None:
-        pose = [2.0, 0.4, 0.2, 1.0, 0.0, 0.0, 0.0]
         event = {
             "test": test,
             "outcome": outcome,
             "failure": failure,
             "distance": distance,
-            "end_pose": pose,
+            "end_pose": [*end, 1.0, 0.0, 0.0, 0.0],
             "simulated_seconds": 45.0,
             "wall_seconds": wall,
             "first_sensed": [],
@@ -141,48 +142,13 @@ class FakeRun:
         self.finish(number, outcome, distance, failure=failure)
         return number
 
-    def start_certificate(self) -> None:
-        self.certificates += 1
-        self.first_fresh = self.fresh
-        terms = {"rate": 0.7, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
-        self.write("certificate_started", certificate=self.certificates, run=self.fresh, **terms)
-
-    def certify(self, node: int, without: str | None = None, run: int = 0) -> int:
-        """A run with a fresh seed starts, of the environment of `node`."""
+    def confirm(self, without: str | None = None, run: int = 0) -> int:
+        """A full run of what is left starts."""
         self.tests += 1
-        place = {"phase": "certify", "round": None, "candidate": None, "node": node}
-        if without is not None:
-            place["without"] = self.elements.index(without)
-        number = self.first_fresh + run
-        self.write("test_started", test=self.tests, **place, run=number, seed=number)
-        self.fresh = max(self.fresh, number + 1)
+        left_out = None if without is None else self.elements.index(without)
+        place = {"phase": "confirm", "round": None, "candidate": None, "without": left_out}
+        self.write("test_started", test=self.tests, **place, run=run, seed=run)
         return self.tests
-
-    def certify_all(self, node: int, without: str | None, outcomes: str) -> None:
-        """A run for each letter: s similar, p pass, o another failure, e broken."""
-        words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "o": ("other", 2.3, "tipped over")}
-        for run, letter in enumerate(outcomes):
-            outcome, distance, failure = words.get(letter, ("error", None, "the simulation broke"))
-            self.finish(self.certify(node, without, run), outcome, distance, failure=failure)
-
-    def finish_certificate(self, *claims: tuple[str | None, str, str]) -> None:
-        """Each claim as (without, verdict, outcomes as in `certify_all`)."""
-        tests = [test.id for test in fold(self.file.events()).confirm_tests]
-        self.write("certificate_finished", claims=[self._claim(*each) for each in claims], tests=tests)
-
-    def _claim(self, without: str | None, verdict: str, outcomes: str) -> dict:
-        shown, runs = outcomes.count("s"), len(outcomes.replace("e", ""))
-        low, high = wilson_interval(shown, runs) if runs else (0.0, 1.0)
-        names = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
-        return {
-            "without": None if without is None else self.elements.index(without),
-            "verdict": verdict,
-            "shown": shown,
-            "runs": runs,
-            "low": low,
-            "high": high,
-            "outcomes": {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes},
-        }
 
     def live(self, *tests: tuple[int, float]) -> None:
         """Tests run now: each (test, part of the way from 0 to 1)."""
@@ -192,10 +158,19 @@ class FakeRun:
             rows.append(Live(slot, test, t, (x, y, z, *quaternion)))
         self.file.set_live(rows)
 
-    def baseline(self, failures: int = 3, runs: int = 4) -> FakeRun:
-        words = [("failed", "stuck") if run < failures else ("pass", "") for run in range(runs)]
-        tests = [self.test(None, outcome, run=run, failure=how) for run, (outcome, how) in enumerate(words)]
-        outcomes = {test: "similar" if index < failures else "pass" for index, test in enumerate(tests)}
+    def baseline(self, failures: int = 3, runs: int = 4, others: int = 0) -> FakeRun:
+        """`others` more runs show another failure."""
+        runs += others
+        ways = ["similar"] * failures + ["other"] * others + ["pass"] * (runs - failures - others)
+        tests = []
+        for run, way in enumerate(ways):
+            tests.append(self.start(run=run))
+            kind = {"similar": "stuck", "other": "fell"}.get(way, "")
+            self.finish(tests[-1], "failed" if kind else "pass", failure=kind, end=OTHER_END if way == "other" else END)
+        outcomes = dict(zip(tests, ways, strict=True))
+        seen = [{"test": tests[0], "runs": failures, "kinds": ["stuck"], "position": END}]
+        if others:
+            seen.append({"test": tests[failures], "runs": others, "kinds": ["fell"], "position": OTHER_END})
         self.write(
             "baseline_finished",
             runs=runs,
@@ -204,7 +179,8 @@ class FakeRun:
             low=0.3,
             high=0.95,
             failure_test=tests[0],
-            position=[2.0, 0.4, 0.2],
+            position=END,
+            seen=seen,
             miss_chance=(1 - failures / runs) ** 4,
             iterations_95=2,
             outcomes=outcomes,
@@ -362,57 +338,16 @@ def guided(run: FakeRun) -> FakeRun:
     return run
 
 
-def certifying(run: FakeRun) -> FakeRun:
-    """The rounds left two models, and fresh runs show what they are worth."""
-    _rounds(run).start_certificate()
-    run.certify_all(2, None, "ssssss")
-    run.certify_all(0, None, "ssspss")
-    run.certify_all(2, "crate_00", "oppe")
-    run.live((run.certify(2, "crate_00", 4), 0.6), (run.certify(2, "crate_01"), 0.25))
+def confirming(run: FakeRun) -> FakeRun:
+    """The rounds left two models, and two full runs are made of what is left."""
+    _rounds(run).write("confirm_started", round=None)
+    run.finish(run.confirm(), "similar", 0.12, failure="stuck")
+    run.finish(run.confirm("crate_00"), "other", 2.3, failure="tipped over")
+    run.live((run.confirm("crate_00", 1), 0.6), (run.confirm("crate_01"), 0.25))
     return run
 
 
 def finished(run: FakeRun) -> FakeRun:
-    """A run that ended with two models, each shown to be needed."""
-    _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
-    return _claimed(run, claims)
-
-
-def uncertified(run: FakeRun) -> FakeRun:
-    """A run of a file of format 4, which ended with two models and without a certificate."""
-    _rounds(run).write("finished", minimal=True, reason="no single model can be removed")
-    return run
-
-
-def not_shown(run: FakeRun) -> FakeRun:
-    """A run that ended with two models, one of which may not be needed."""
-    _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
-    return _claimed(run, claims)
-
-
-def rarer(run: FakeRun) -> FakeRun:
-    """Round 2 in an environment that showed f in one of six runs."""
-    run.created().baseline()
-    run.start_round(2)
-    left, endings = run.elements[:6], ("pass", "similar", "pass", "other", "pass", "pass")
-    tests = [run.test(0, outcome, 0.12, number) for number, outcome in enumerate(endings)]
-    run.judge(0, "similar", tests)
-    run.reduce(0, left, tests[1])
-    run.start_round(3, left)
-    run.dissimilar(0)
-    run.live((run.start(1), 0.6))
-    return run
-
-
-def _claimed(run: FakeRun, claims: tuple) -> FakeRun:
-    """The runs of the current environment that each claim rests on, and the end."""
-    for without, _, outcomes in claims:
-        run.certify_all(2, without, outcomes)
-    run.finish_certificate(*claims)
-    certificate = fold(run.file.events()).certificates[-1]
-    run.write("finished", minimal=is_minimal(certificate), reason=verdict_on(certificate))
+    """A run that ended with two models."""
+    _rounds(run).write("finished", minimal=True, reason="no candidate showed f")
     return run

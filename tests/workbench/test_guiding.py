@@ -6,11 +6,12 @@ import sys
 import fake_run
 import pytest
 from attached import Attached, starts
-from textual.widgets import Input, Select
+from textual.widgets import Input, OptionList, Select
 
 from ddenv.guiding.commands import data_of
 from ddenv.guiding.offers import Pointed, offer
 from ddenv.guiding.situation import Situation
+from ddenv.runfile.atlas import atlas
 from ddenv.runfile.fold import fold
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import commands
@@ -20,6 +21,7 @@ from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.widgets.question import Question
+from tests.waiting import eventually
 
 
 def state_of(run):
@@ -142,7 +144,41 @@ async def test_another_failure_is_accepted_after_a_question(run):
         await session.press("n")
         assert session.asked() == []
         await session.press("a", "y")
-        assert session.asked() == [("accept_other", {"test": row.tests[0]})]
+        assert session.asked() == [("accept_other", {"test": row.tests[0], "instead": False})]
+
+
+async def test_a_branch_reduces_another_failure(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        await session.press("f")
+        dialog = session.app.screen
+        met = atlas(state_of(run))
+        assert met[0].name in str(dialog.query_one(OptionList).get_option_at_index(0).prompt)
+        assert f"{met[0].size} models (test {met[0].smallest}): " in session.dialog()
+        assert "f: stuck at (2.00, 0.40)" in session.dialog()
+        await session.press("enter")
+        assert isinstance(session.app.screen, Question)
+        words = " ".join(session.dialog().split())
+        assert "Reduce this failure in place of f? The run branches" in words
+        await session.press("n")
+        assert session.app.screen is dialog
+        await session.press("enter", "y")
+        assert session.asked() == [("accept_other", {"test": met[0].smallest, "instead": True})]
+        assert f"a branch reduces the failure of test {met[0].smallest}" in session.said()
+
+
+async def test_the_other_failures_follow_the_run(run):
+    fake_run.mid_round(run).hold()
+    state = state_of(run)
+    async with Attached(run) as session:
+        await session.press("f")
+        before = session.app.screen.query_one(OptionList).option_count
+        assert before == len(atlas(state))
+        run.finish(state.running_tests[0].id, "other", 3.0, failure="fell", end=(9.0, 9.0, 0.0))
+        await session.look()
+        listed = session.app.screen.query_one(OptionList)
+        await eventually(lambda: listed.option_count == before + 1)
+        assert "fell at (9.00, 9.00)" in str(listed.get_option_at_index(before).prompt)
 
 
 async def test_settings_are_changed_in_a_dialog_that_checks_them(run):
@@ -332,7 +368,7 @@ def test_the_nearest_other_failure_is_the_one_to_accept(run):
     run.start_round(2)
     tests = [run.test(0, "other", away, number, "tipped over") for number, away in enumerate((2.0, 0.5, 3.0))]
     state = state_of(run)
-    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1]})
+    assert meant("accept", state, state.round.candidates[0]) == ("accept_other", {"test": tests[1], "instead": False})
 
 
 def test_what_the_cursor_only_follows_is_not_accepted(run):
@@ -367,7 +403,7 @@ def test_before_f_is_known_nothing_is_tried_or_undone(run):
 
 
 def test_a_round_that_is_over_cannot_be_vetoed(run):
-    state = state_of(fake_run.certifying(run))
+    state = state_of(fake_run.confirming(run))
     assert why_not("veto", state) == "the rounds are over"
     run.write("finished", minimal=True, reason="no candidate showed f")
     state = state_of(run)

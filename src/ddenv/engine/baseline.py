@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,41 +10,79 @@ import numpy as np
 
 from ddenv.engine.judging import end_of
 from ddenv.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.robot.oracle import Failure, judge_trajectory, medoid
+from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
+from ddenv.runfile.failures import SeenFailure, grouped
 from ddenv.runfile.state import Test
+from ddenv.words import count
 from ddenv.world.scenario import FailureSpec
 
 
 def fix_failure(
-    tests: Sequence[Test], trajectories: Mapping[int, np.ndarray], spec: FailureSpec, iterations: int
+    tests: Sequence[Test],
+    trajectories: Mapping[int, np.ndarray],
+    spec: FailureSpec,
+    iterations: int,
+    wanted: int = 1,
 ) -> dict[str, Any] | str:
-    """The data of the `baseline_finished` event: f is the medoid of the failing end positions.
+    """The data of the `baseline_finished` event. `tests` are in the order of runs, `trajectories` those of the failing ones, by id.
 
-    `trajectories` are those of the failing tests, by id. If no run failed, returns a line that tells the user so. The rate
-    counts f only, not other failures.
+    f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
+    others. If no run failed, or if there is no such number, returns a line that tells the user so. The rate counts f only, not
+    other failures; runs that broke say nothing, and are not in it.
     """
-    failing = [test for test in tests if test.outcome == "failed" and test.end_pose is not None]
+    sound = [test for test in tests if test.outcome not in ("error", "timeout")]
+    failing = [test for test in sound if test.outcome == "failed" and test.end_pose is not None]
     if not failing:
         return _no_failure(tests)
-    first = failing[medoid(np.array([end_of(test) for test in failing]))]
-    failure = Failure(end_of(first), trajectories[first.id], spec.epsilon, spec.similarity)
-    judged = {test.id: judge_trajectory(trajectories[test.id], failure) for test in failing}
+    failures = [Failure(end_of(test), trajectories[test.id], spec.epsilon, spec.similarity) for test in failing]
+
+    def apart(first: int, second: int) -> float | None:
+        if not is_similar(failures[second].trajectory, failures[first]):
+            return None
+        return float(np.linalg.norm(np.subtract(failures[first].position, failures[second].position)))
+
+    # By the oracle alone, not by kind: what it judges as one failure cannot be reduced as two.
+    groups = grouped(len(failing), apart)
+    seen = [_seen([failing[one] for one in group]) for group in groups]
+    if wanted > len(seen):
+        return _no_such_failure(seen, wanted, len(sound))
+    f = groups[wanted - 1][0]
+    judged = {test.id: judge_trajectory(trajectories[test.id], failures[f]) for test in failing}
     similar = sum(judgement.outcome == "similar" for judgement in judged.values())
-    rate = similar / len(tests)
-    low, high = wilson_interval(similar, len(tests))
+    rate = similar / len(sound)
+    low, high = wilson_interval(similar, len(sound))
     return {
-        "runs": len(tests),
+        "runs": len(sound),
+        "broken": len(tests) - len(sound),
         "failures": similar,
         "rate": rate,
         "low": low,
         "high": high,
-        "failure_test": first.id,
-        "position": failure.position,
+        "failure_test": failing[f].id,
+        "position": failures[f].position,
         "miss_chance": miss_chance(rate, iterations),
         "iterations_95": iterations_needed(rate),
+        "seen": [{"test": one.test, "runs": one.runs, "kinds": one.kinds, "position": one.position} for one in seen],
         "outcomes": {str(id): judgement.outcome for id, judgement in judged.items()},
         "distances": {str(id): judgement.distance for id, judgement in judged.items()},
     }
+
+
+def goes_on(found: Mapping[str, Any], runs: int) -> bool:
+    """Whether a baseline that keeps the rate needs another run after so many `runs`: f is rare in what it `found`."""
+    return bool(found["failures"] < FEWEST_SHOWN and runs < LONGEST_BASELINE)
+
+
+def _seen(group: Sequence[Test]) -> SeenFailure:
+    """A group of failing tests, the one in their middle first."""
+    kinds = Counter(test.failure for test in group)
+    return SeenFailure(group[0].id, len(group), tuple(kind for kind, _ in kinds.most_common()), end_of(group[0]))
+
+
+def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str:
+    listed = "; ".join(f"{number}. {one.name} in {count(one.runs, 'run')}" for number, one in enumerate(seen, 1))
+    return f"there is no failure number {wanted}; {runs} runs of the whole world showed these: {listed}"
 
 
 def _no_failure(tests: Sequence[Test]) -> str:

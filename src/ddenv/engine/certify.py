@@ -72,7 +72,7 @@ class Certifier:
 
     def _claims(self) -> list[tuple[str | None, Claim]]:
         """What is known so far: of what is left, then of each model; up to a claim that ends the certificate."""
-        now, left, whole = self._certificate, self._left, frozenset(self.journal.state.elements)
+        now, left, whole = self._certificate, self._left, self.journal.whole
         error = now.error / 2
         first = self._settle(keeps(left, whole, Terms(now.keep_rate, now.rate, error, now.at_least)))
         claims: list[tuple[str | None, Claim]] = [(None, first)]
@@ -131,9 +131,11 @@ class Certifier:
 
     def _step_back(self, lost_rate: float) -> None:
         journal = self.journal
-        # Before another failure counted as f, rates were those of f alone.
+        # Before another failure counted as f, rates were others.
         path = journal.state.path
-        nodes = path[max(place for place, node in enumerate(path) if place == 0 or node.how == "accepted") :]
+        nodes = path[
+            max(place for place, node in enumerate(path) if place == 0 or node.how in ("accepted", "instead")) :
+        ]
         chain, now = [frozenset(node.environment) for node in nodes], self._certificate
         if len(chain) == 1:
             return

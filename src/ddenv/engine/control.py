@@ -17,6 +17,7 @@ from ddenv.guiding.pace import AcceptMode, Pause, Resume, Step, Stop
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
 from ddenv.guiding.situation import Situation, label_of, names_of, numbers_of
+from ddenv.runfile.atlas import models_of
 from ddenv.runfile.fold_decisions import failures_at
 from ddenv.runfile.store import Event
 from ddenv.world.scenario import FailureSpec
@@ -129,7 +130,7 @@ class Control:
         except UserError as error:
             return str(error)
         journal = self._journal
-        now = Situation(journal.state, search_due=journal.steered, models_of=journal.keep_of_test)
+        now = Situation(journal.state, search_due=journal.steered)
         why = refusal(command, now)
         if not why:
             _OBEYED[type(command)](self, command)
@@ -198,14 +199,16 @@ class Control:
 
     def _accept_other(self, asked: AcceptOther) -> None:
         journal, state = self._journal, self._journal.state
-        test, keep = state.tests[asked.test - 1], journal.keep_of_test(asked.test)
+        test, keep = state.tests[asked.test - 1], frozenset(models_of(state, state.tests[asked.test - 1]))
+        unnamed = asked.instead or test.phase == "hand"
         journal.record(
             "accepted_other",
             test=test.id,
-            what=f"test {test.id}" if test.phase == "hand" else label_of(state, test),
-            trial=test.trial,
-            environment=self._numbers(name for name in state.environment if name in keep),
-            **self._judged((*state.failures, test.id)),
+            what=f"test {test.id}" if unnamed else label_of(state, test),
+            trial=None if asked.instead else test.trial,
+            environment=self._numbers(name for name in state.elements if name in keep),
+            instead=asked.instead,
+            **self._judged((test.id,) if asked.instead else (*state.failures, test.id)),
         )
 
     # Going back, and other settings.

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from ddenv.claims import current, is_minimal, verdict_on
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.baseline import fix_failure, goes_on
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import Certifier
 from ddenv.engine.control import Control, Steered
@@ -163,22 +163,32 @@ class Driver:
 
     def _baseline(self) -> str:
         """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""
+        if self._journal.state.baseline is not None:
+            return ""
+        keeps_rate, runs = self._reduction.accept_rate == "kept", self._reduction.baseline_runs
+        found = self._found_in(runs)
+        # One run at a time, so that the number of workers changes nothing.
+        while keeps_rate and not isinstance(found, str) and goes_on(found, runs):
+            runs += 1
+            found = self._found_in(runs)
+        if isinstance(found, str):
+            return found
+        self._journal.record("baseline_finished", **found)
+        self._control.round_finished()
+        return ""
+
+    def _found_in(self, runs: int) -> dict[str, Any] | str:
+        """What the first `runs` of the whole world show, as `fix_failure` returns it; makes those that are missing."""
         journal, everything = self._journal, frozenset(self._journal.state.elements)
-        runs = range(self._reduction.baseline_runs)
 
         def wanted() -> Wanted:
-            return [(everything, run, None) for run in runs if (everything, run, False) not in journal.ledger]
+            return [(everything, run, None) for run in range(runs) if (everything, run, False) not in journal.ledger]
 
         self._bench.work("baseline", None, wanted)
-        if journal.state.baseline is None:
-            tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in runs]
-            trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-            found = fix_failure(tests, trajectories, self._failure_spec, self._reduction.iterations)
-            if isinstance(found, str):
-                return found
-            journal.record("baseline_finished", **found)
-            self._control.round_finished()
-        return ""
+        tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in range(runs)]
+        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
+        asked = self._reduction
+        return fix_failure(tests, trajectories, self._failure_spec, asked.iterations, asked.failure)
 
     def _round(self, number: int, round: Round) -> Candidate | None:
         """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""

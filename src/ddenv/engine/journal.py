@@ -11,6 +11,7 @@ from ddenv.reduction.acceptance import Acceptance, estimated_rate
 from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
+from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
 
@@ -127,11 +128,15 @@ class Journal:
         return Acceptance(most_misses, rate, reduction["keep_rate"], self._steps_back)
 
     def rate_of_whole(self) -> float:
-        """The estimated rate of f in the whole world."""
-        everything = frozenset(self.state.elements)
-        tests = [test for test in self.state.tests if self.keep_of_test(test.id) == everything]
+        """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
+        tests = [test for test in self.state.tests if self.keep_of_test(test.id) == self.whole]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
+
+    @property
+    def whole(self) -> Keep:
+        """The models in the world that f was seen in: what is left has to keep its rate."""
+        return frozenset(origin(self.state, self.state.node).environment)
 
     @property
     def has_broken(self) -> bool:
@@ -245,6 +250,7 @@ class Journal:
             follow(self, data)
         if event.kind in STEERED:
             self.steered = True
+        self.refused.count_as_f(self.state.failures)
 
     def _round_started(self, data: dict[str, Any]) -> None:
         self.partitions[data["round"]] = data["partitions"]
@@ -341,8 +347,7 @@ class Journal:
         if test.phase == "baseline":
             return frozenset(self.state.elements)
         if test.phase in FRESH:
-            node = self.state.node if test.node is None else test.node
-            return frozenset(self.state.nodes[node].environment) - {test.without}
+            return frozenset(self.state.nodes[test.node].environment) - {test.without}
         if test.phase == "hand":
             return frozenset(self.state.trials[(test.trial or 0) - 1].models)
         return self._keep_of(test.candidate or 0)

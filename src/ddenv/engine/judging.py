@@ -12,7 +12,8 @@ from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import Baseline, RunState, Test
+from ddenv.runfile.failures import Baseline
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.world.scenario import FailureSpec
 

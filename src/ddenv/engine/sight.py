@@ -31,7 +31,7 @@ def traits_of(model: Model) -> Traits:
 
 def _end(state: RunState, run: Test) -> tuple[float, float, float]:
     """Where f ended; if several failures count as f, the one that `run` showed."""
-    ends = [known_failure(state).position, *(end_of(state.tests[test - 1]) for test in state.failures[1:])]
+    ends = [end_of(state.tests[test - 1]) for test in state.failures]
     if run.end_pose is None:
         return ends[0]
     here = end_of(run)

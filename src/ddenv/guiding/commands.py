@@ -96,6 +96,10 @@ def _mode(_: str, value: Any) -> str:
     return str(value)
 
 
+def _yes(_: str, value: Any) -> bool:
+    return value is True
+
+
 def _settings(_: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise UserError(ONLY_CHANGEABLE)
@@ -109,5 +113,6 @@ _READ: dict[str, Callable[[str, Any], Any]] = {
     "models": _models,
     "unit": _unit,
     "mode": _mode,
+    "instead": _yes,
     "settings": _settings,
 }

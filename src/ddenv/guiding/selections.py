@@ -19,9 +19,9 @@ from ddenv.guiding.situation import (
     lacks_pinned,
     named,
     names_of,
-    row_of,
 )
 from ddenv.map.names import shortened
+from ddenv.runfile.atlas import models_of
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState, Test, Trial
 from ddenv.words import count
@@ -139,11 +139,15 @@ class Adopt:
 
 @dataclass(frozen=True, slots=True)
 class AcceptOther:
-    """Count another failure as f from here on; the models of its test become the environment."""
+    """Count another failure as f from here on; the models of its test become the environment.
+
+    With `instead` it is a branch from where the test was made: only that failure is f in it.
+    """
 
     kind: ClassVar[str] = "accept_other"
     offer: ClassVar[str] = "count as f"
     test: int
+    instead: bool = False
 
     def refusal(self, now: Situation) -> str:
         state = now.state
@@ -152,16 +156,22 @@ class AcceptOther:
         if not 0 < self.test <= len(state.tests):
             return "there is no such test"
         test = state.tests[self.test - 1]
-        if test.outcome != "other" or test.phase not in ("round", "hand") or test.end_pose is None:
+        if test.outcome != "other" or test.end_pose is None:
             return f"test {test.id} did not end in another failure"
-        models, label = now.tested_models(test), label_of(state, test)
-        if models is None or not frozenset(models) < frozenset(state.environment):
+        if self.instead:
+            return ""
+        models, label = models_of(state, test), label_of(state, test)
+        if not frozenset(models) < frozenset(state.environment):
             return f"{label} is not part of the current environment"
         lacking = lacks_pinned(state, models)
         return f"{label} {lacking}" if lacking else ""
 
     def words(self, state: RunState) -> Words:
         test = state.tests[self.test - 1]
+        if self.instead:
+            size = count(len(models_of(state, test)), "model")
+            said = f"a branch reduces the failure of test {test.id}, from {size} on"
+            return Words("branch to another failure", said, _question(state, test, self.instead))
         said = f"the other failure of {label_of(state, test)} counts as f, too"
         return Words("count another failure as f", said, _question(state, test))
 
@@ -173,16 +183,20 @@ def nearest_other(state: RunState, row: Row) -> Test | None:
     return min(others, key=lambda test: (test.distance is None, test.distance or 0.0), default=None)
 
 
-def _question(state: RunState, test: Test) -> str:
-    """What happened in the test, compared with f."""
-    row = row_of(state, test)
-    models = "" if row is None else f" ({count(row.size, 'model')})"
+def _question(state: RunState, test: Test, instead: bool = False) -> str:
+    """What happened in the test, compared with f, and what follows."""
+    label = f"test {test.id}" if instead else printable(label_of(state, test))
+    models = count(len(models_of(state, test)), "model")
     near = test.distance is not None and math.isfinite(test.distance)
     apart = f", {test.distance:.2f} m from f's end" if near else ""
-    f = "" if state.baseline is None else f"\nIn f it {deed(state.failure)} at {_position(state.baseline.position)}."
+    branch = (
+        "Reduce this failure in place of f? The run branches: these models become the environment, and only this failure counts as "
+        "f in the branch. Going back in the history (h) restores f, and all that was found for it."
+    )
+    too = "Count this failure as f, too? Then these models become the environment. u takes it back."
     return (
-        f"In {printable(label_of(state, test))}{models} the robot {deed(test.failure)} at {_position(test.end_pose)}{apart}.{f}"
-        "\n\nCount this failure as f, too? Then these models become the environment. u takes it back."
+        f"In {label} ({models}) the robot {deed(test.failure)} at {_position(test.end_pose)}{apart}."
+        f"\nIn f it {deed(state.failure)} at {_position(state.f_position)}.\n\n{branch if instead else too}"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,8 +27,7 @@ class Situation:
     """A run, and what else decides whether a command is possible.
 
     `barred` is why this viewer cannot guide the run at all, or "". `pending` is the kind of the viewer's last command until the
-    engine obeys it, or "". `search_due` says that the current search is over. `models_of` returns the models of a test, None if
-    they are not known; without it the state answers.
+    engine obeys it, or "". `search_due` says that the current search is over.
     """
 
     state: RunState
@@ -36,7 +35,6 @@ class Situation:
     barred: str = ""
     pending: str = ""
     search_due: bool = False
-    models_of: Callable[[int], Collection[str] | None] | None = None
 
     def needs_engine(self) -> str:
         """Why no engine can answer now, or ""."""
@@ -45,13 +43,6 @@ class Situation:
         if self.state.status == "finished":
             return FINISHED
         return "no engine is running; space starts one" if self.engine == "absent" else ""
-
-    def tested_models(self, test: Test) -> Collection[str] | None:
-        """The models of a test; None if they are not known."""
-        if self.models_of is not None:
-            return self.models_of(test.id)
-        row = row_of(self.state, test)
-        return None if row is None else row.models
 
 
 @dataclass(frozen=True, slots=True)

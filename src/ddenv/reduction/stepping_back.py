@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 
 from ddenv.reduction.certificate import Claim
 from ddenv.reduction.evidence import Partition
@@ -11,11 +11,16 @@ from ddenv.reduction.round import left_out
 
 
 class Refused(dict[frozenset[str], str]):
-    """Sub-environments that are not taken, with the word for why. Of those that lost the rate, no part is taken either."""
+    """Sub-environments that are not taken, with the word for why. Of those that lost the rate of f, no part is taken either."""
 
     def __init__(self) -> None:
         super().__init__()
         self._lost: list[frozenset[str]] = []
+        self._lost_of: dict[Hashable, list[frozenset[str]]] = {}
+
+    def count_as_f(self, failures: Hashable) -> None:
+        """From now on f is one of these `failures`: what lost the rate of others may be taken."""
+        self._lost = self._lost_of.setdefault(failures, [])
 
     def lose(self, models: frozenset[str]) -> None:
         """Neither `models` nor a part of them is taken any more."""

@@ -6,9 +6,10 @@ from collections import Counter
 
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, percent, plain, say, section, thousands
 from ddenv.report.run_data import Record
-from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.state import Baseline, RunState
-from ddenv.words import count
+from ddenv.runfile.events import DEEDS
+from ddenv.runfile.failures import Baseline
+from ddenv.runfile.state import RunState
+from ddenv.words import count, failed_in
 
 WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
 
@@ -41,13 +42,7 @@ MEANING = {
     "timeout": "the test took too long on the clock",
     "failed": "failed, before f was fixed",
 }
-PHASES = (
-    ("baseline", "whole world"),
-    ("round", "in rounds"),
-    ("hand", "by hand"),
-    ("certify", "fresh runs"),
-    ("confirm", "full runs at the end"),
-)
+PHASES = (("baseline", "whole world"), ("round", "in rounds"), ("hand", "by hand"), ("confirm", "full runs at the end"))
 
 
 def sureness(record: Record) -> Section | None:
@@ -55,7 +50,7 @@ def sureness(record: Record) -> Section | None:
     state = record.state
     if not state.tests_done:
         return None
-    return Section("How sure it is", (*_baseline(state), *_tests(state), *_mixed(state)))
+    return Section("How sure it is", (*_baseline(state), *_tests(state), *_confirmed(state), *_mixed(state)))
 
 
 def _mixed(state: RunState) -> list[Block]:
@@ -72,18 +67,27 @@ def _baseline(state: RunState) -> list[Block]:
     if base is None:
         return [say("The baseline has not ended: how often the whole world fails is not known yet.")]
     words = (
-        f"In the whole world the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')}: "
+        f"In the whole world the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')}: "
         f"{percent(base.rate)}, 95 % interval (Wilson) {percent(base.low)} to {percent(base.high)}."
     )
-    if state.other_failures:
-        words += f" {count(state.other_failures, 'run')} failed in another way."
-    if state.broken_runs:
-        words += f" {count(state.broken_runs, 'run')} broke."
+    if base.broken:
+        words += f" {count(base.broken, 'more run')} broke, and {'says' if base.broken == 1 else 'say'} nothing."
     return [
         say(words),
         Picture("interval", interval(base), "The failure rate with its interval."),
         *_missed(state, base),
+        *_seen(base),
     ]
+
+
+def _seen(base: Baseline) -> list[Block]:
+    """The failures of the whole world, if there are several."""
+    if not base.others:
+        return []
+    rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
+    f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
+    words = "The whole world shows several failures. The one in bold is f; --failure NUMBER reduces another one."
+    return [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
 
 
 def _missed(state: RunState, base: Baseline) -> list[Block]:
@@ -132,3 +136,19 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
     return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
+
+
+def _confirmed(state: RunState) -> list[Block]:
+    tests = [test for test in state.confirm_tests if test.is_finished]
+    if not tests:
+        return []
+    whole = [test for test in tests if test.without is None]
+    shown = sum(test.outcome == "similar" for test in whole)
+    without = [test for test in tests if test.without is not None]
+    missed = sum(test.outcome != "similar" for test in without)
+    return [
+        say(
+            f"Full runs of what was left at the end: f showed in {shown} of {len(whole)}; "
+            f"with one more model left out it did not show in {missed} of {len(without)}."
+        )
+    ]

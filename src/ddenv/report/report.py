@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ddenv.claims import ended
 from ddenv.errors import UserError
 from ddenv.page.blocks import (
     Paragraph,
@@ -23,14 +22,15 @@ from ddenv.page.blocks import (
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.by_hand import guiding
+from ddenv.report.others_met import others_met
 from ddenv.report.outcomes import sureness
 from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
-from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.state import Baseline, RunState
+from ddenv.runfile.failures import Place
+from ddenv.runfile.state import RunState
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
@@ -39,8 +39,8 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    result = (what_is_left(record), worth(record))
-    sections = (*result, way(record), guiding(record), sureness(record), settings(record), repeat(record))
+    about = (what_is_left, way, guiding, sureness, others_met, settings, repeat)
+    sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
@@ -55,13 +55,13 @@ def _verdict(state: RunState) -> str:
     left, all_of_them = len(state.environment), len(state.elements)
     if state.baseline is None:
         return "No failure is known yet"
-    if state.certified and not left:
+    if state.minimal and not left:
         return f"None of the {count(all_of_them, 'model')} is needed to make the robot fail"
     enough = "is" if left == 1 else "are"
     if left == all_of_them:
         return f"The robot fails among all {count(left, 'model')}; none is removed yet"
     words = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
-    return words if state.certified else f"{words} so far"
+    return words if state.minimal else f"{words} so far"
 
 
 def _damage(record: Record) -> list[Paragraph]:
@@ -74,11 +74,10 @@ def _standing(record: Record) -> list[Paragraph]:
     """Whether it is over, and why it ended."""
     state = record.state
     why = plain(state.reason).rstrip(".")
-    if state.status == "finished" and state.certified:
+    if state.status == "finished" and state.minimal:
         return [_minimal(state)]
     if state.status == "finished":
-        why = plain(ended(state)).rstrip(".") or "no reason is known"
-        return [say(Strong("Not shown to be minimal:"), f" {why}.", notice=True)]
+        return [say(Strong("Not minimal."), f" The run ended before that: {why or 'no reason is known'}.", notice=True)]
     if state.status == "stopped":
         return [
             say(Strong("Stopped"), f"{f': {why}' if why else ''}. This report shows what was known then.", notice=True)
@@ -95,39 +94,40 @@ def _standing(record: Record) -> list[Paragraph]:
 
 
 def _minimal(state: RunState) -> Paragraph:
+    sure = " Full runs confirm it." if state.confirming else ""
     if not state.environment:
-        return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
-    return say(Strong("Minimal:"), f" {plain(state.reason).rstrip('.')}.")
+        return say(Strong("Minimal."), f" Look at the robot, its goal, and the models that always stay.{sure}")
+    them = "it" if len(state.environment) == 1 else "any one of them"
+    return say(Strong("Minimal:"), f" without {them} the failure was not seen again.{sure}")
 
 
 def _failure(state: RunState) -> list[Paragraph]:
     """The scenario in its author's words, and how the robot failed in it."""
     description = plain(state.scenario.get("description", ""))
     described = [say(description)] if description else []
-    base = state.baseline
-    if base is None:
+    position = state.f_position
+    if position is None:
         seen = count(state.tests_done, "run")
         words = f"The whole world is run first to fix the failure: {seen} ended so far."
         return [*described, say(words)] if state.tests_done else described
-    words = f"The failure f: the robot {deed(state.failure)} at ({place(base.position)}) m"
-    words += f"{_short_of(state, base)}{_after(state, base)}."
+    words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
+    words += f"{_short_of(state, position)}{_after(state)}."
     return [*described, say(words)]
 
 
-def _short_of(state: RunState, base: Baseline) -> str:
+def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
     x, y = goal.get("x"), goal.get("y")
     if not isinstance(x, (int, float)) or not isinstance(y, (int, float)):
         return ""
-    away = math.dist((x, y), base.position[:2])
+    away = math.dist((x, y), position[:2])
     return f", {away:.1f} m short of the goal at ({x:g}, {y:g})" if math.isfinite(away) else ""
 
 
-def _after(state: RunState, base: Baseline) -> str:
-    number = base.failure_test
-    if not 0 < number <= len(state.tests) or state.failure not in DEEDS:
+def _after(state: RunState) -> str:
+    test = state.f_test
+    if test is None or state.failure not in DEEDS:
         return ""
-    test = state.tests[number - 1]
     if test.cut:
         return f"; this was certain after {test.simulated_seconds:.1f} s"
     return f"; it had {test.simulated_seconds:.1f} s" if state.failure in ("stuck", "out of time") else ""
@@ -139,8 +139,6 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
     figures = [(f"{before} → {after}" if after != before else str(before), "models")]
     if after < before:
         figures.append((percent(1 - after / before), "smaller"))
-    if state.baseline is not None and (shown := rate_of_left(state))[0]:
-        figures.append(shown)
     spent, rounds = state.working_seconds, len(record.rounds)
     if state.started_at is not None:
         spent += max(0.0, state.updated_at - state.started_at)

@@ -160,9 +160,9 @@ def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str) -
 
 def _places(record: Record) -> tuple[Any, Any, Any]:
     """Start, goal and f's end, each x, y (m) or None."""
-    scenario, base = record.state.scenario, record.state.baseline
+    scenario, position = record.state.scenario, record.state.f_position
     start, goal = section(section(scenario, "robot"), "spawn"), section(scenario, "goal")
-    end = {} if base is None else dict(zip("xy", base.position[:2], strict=True))
+    end = {} if position is None else dict(zip("xy", position[:2], strict=True))
     return _point(start), _point(goal), _point(end)
 
 

@@ -53,7 +53,7 @@ def read_run(path: Path) -> Record:
             raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
         world = _world(file, troubles)
-        first = None if state.baseline is None else state.baseline.failure_test
+        first = None if state.f_test is None else state.f_test.id
         original = _path(file, first, troubles)
         same = state.evidence_test == first
         evidence = original if same else _path(file, state.evidence_test, troubles)

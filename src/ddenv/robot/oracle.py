@@ -93,11 +93,6 @@ class Judgement:
     trajectory_distance: float
 
 
-def medoid(positions: Floats) -> int:
-    """The index of the medoid: the one of `positions` (N, 3) with the least sum of distances to all others."""
-    return int(np.argmin(np.linalg.norm(positions[:, None] - positions[None, :], axis=2).sum(axis=1)))
-
-
 def judge(result: RunResult, failure: Failure) -> Judgement:
     """The outcome of a run with regard to f (`is_similar_failure` of the paper)."""
     judgement = judge_trajectory(result.trajectory, failure)
@@ -108,10 +103,21 @@ def judge(result: RunResult, failure: Failure) -> Judgement:
 
 def judge_trajectory(trajectory: Floats, failure: Failure) -> Judgement:
     """Whether the trajectory (N, 8) of a failed run shows f ("similar") or another failure ("other")."""
-    distance = float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
     along = trajectory_distance(trajectory, failure.trajectory)
-    similar = distance <= failure.epsilon and (failure.similarity == "end-pose" or along <= failure.epsilon)
-    return Judgement("similar" if similar else "other", distance, along)
+    outcome = "similar" if is_similar(trajectory, failure) else "other"
+    return Judgement(outcome, _distance(trajectory, failure), along)
+
+
+def is_similar(trajectory: Floats, failure: Failure) -> bool:
+    """Whether the trajectory (N, 8) of a failed run shows f."""
+    if _distance(trajectory, failure) > failure.epsilon:
+        return False
+    return failure.similarity == "end-pose" or trajectory_distance(trajectory, failure.trajectory) <= failure.epsilon
+
+
+def _distance(trajectory: Floats, failure: Failure) -> float:
+    """Between the ends, m."""
+    return float(np.linalg.norm(trajectory[-1, 1:4] - failure.position))
 
 
 def trajectory_distance(a: Floats, b: Floats) -> float:

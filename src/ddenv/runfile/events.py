@@ -39,7 +39,8 @@ The kinds of events with their data. Models are indices into the run's `elements
     trial_started        trial, models [..]: the user tries a selection
     trial_judged         trial, verdict, tests [ids], known
     adopted              trial, environment [..], evidence_test
-    accepted_other       test, what, trial? or null, environment [..], outcomes {test: outcome}, distances {test: m}
+    accepted_other       test, what, trial? or null, environment [..], outcomes {test: outcome}, distances {test: m}, instead? (a
+                         branch: the failure is f from here on, in place of what was f)
     went_back            node, rejected (the node that is undone, or null), outcomes? and distances? of tests, if other failures
                          count as f there
     changed              settings {...}: keys of the scenario's section `reduction`

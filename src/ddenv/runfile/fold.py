@@ -7,12 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_certificates, fold_decisions, fold_rates
-from ddenv.runfile.events import Changes, Data, as_it_was, chance, moments, names, number, one_of, vector
-from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_outcomes, with_test
+from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions
+from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
+from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Forecast, Point
-from ddenv.runfile.state import Baseline, Candidate, Node, Round, RunState, Split, Test, Trial, many
+from ddenv.runfile.state import Candidate, Node, Round, RunState, Split, Test, Trial, many
 from ddenv.runfile.store import Event
 
 
@@ -59,7 +59,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "reason": "",
         "paused": False,
         "waiting_candidate": None,
-        "confirming": state.certificate is not None and not state.certificate.claims,
+        "confirming": False,
         "jobs": int(data["jobs"]),
         "engine_version": str(data["version"]),
         "simulator": str(data["simulator"]),
@@ -81,11 +81,10 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
         seed=int(data["seed"]),
         without=None if without is None else names(state.elements, [without])[0],
         trial=data.get("trial"),
-        node=data.get("node"),
+        node=data.get("node", state.node),
     )
-    if test.node is not None:
-        # Raises IndexError if there is none.
-        here(state, test.node)
+    # Raises IndexError if there is none.
+    here(state, test.node)
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
     changes = {"tests": state.tests.added(test), **counts(state, None, test)}
@@ -96,6 +95,7 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
     if round != _current(state).number:
         raise ValueError(round)
     one = _tried(state, candidate)
+    changes = {"tests": state.tests.added(replace(test, tried=one)), **counts(state, None, test)}
     return changes | _with_candidate(state, replace(one, tests=(*one.tests, test.id)))
 
 
@@ -113,43 +113,14 @@ def _test_finished(state: RunState, data: Data, _: float) -> Changes:
         "cut": bool(data["cut"]),
         "taken": "taken" in data,
     }
-    changes = with_test(state, int(data["test"]), values)
-    return changes | fold_rates.noted(state, changes["tests"][int(data["test"]) - 1])
+    if values["outcome"] not in ("similar", "other"):
+        # Few tests fail: the rounds of all others need not be kept.
+        values["tried"] = None
+    return with_test(state, int(data["test"]), values)
 
 
 def _test_lost(state: RunState, data: Data, _: float) -> Changes:
     return with_test(state, int(data["test"]), {"outcome": "lost"})
-
-
-def _baseline_finished(state: RunState, data: Data, _: float) -> Changes:
-    x, y, z = vector(data["position"], 3)
-    baseline = Baseline(
-        runs=int(data["runs"]),
-        failures=int(data["failures"]),
-        rate=chance(data["rate"]),
-        low=chance(data["low"]),
-        high=chance(data["high"]),
-        failure_test=int(data["failure_test"]),
-        position=(x, y, z),
-        miss_chance=chance(data["miss_chance"]),
-        iterations_95=int(data["iterations_95"]),
-    )
-    compared = with_outcomes(state, data)
-    point = Point(compared.tests_done, len(state.environment))
-    runs, shown = fold_rates.seen(compared.tests, (test.id for test in compared.tests if test.phase == "baseline"))
-    first = baseline.failure_test
-    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown),)
-    return {
-        "tests": compared.tests,
-        "tally": compared.tally,
-        "deflake_runs": compared.deflake_runs,
-        "baseline": baseline,
-        "evidence_test": first,
-        "failures": (first,),
-        "nodes": (*root, *state.nodes[1:]),
-        "history": (*state.history, point),
-        "status": state.status if state.paused else "running",
-    }
 
 
 def _round_started(state: RunState, data: Data, _: float) -> Changes:
@@ -215,7 +186,7 @@ def _reduced(state: RunState, data: Data, at: float) -> Changes:
     # One part alone shows f although several seemed to be needed: the lower bound was wrong.
     if winner.kind == "partition" and _current(state).missed > 1:
         state = state.changed(lower_bound=0)
-    changes = arrived(state, data, at, "reduced", winner.label, winner.tests)
+    changes = arrived(state, data, at, "reduced", winner.label)
     return changes | {"round": replace(_current(state), winner=winner.index)}
 
 
@@ -300,7 +271,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "test_started": _test_started,
     "test_finished": _test_finished,
     "test_lost": _test_lost,
-    "baseline_finished": _baseline_finished,
+    "baseline_finished": fold_baseline.baseline_finished,
     "round_started": _round_started,
     "forecast": _forecast,
     "candidate_judged": _candidate_judged,

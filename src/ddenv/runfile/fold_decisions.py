@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes, Data, names, number, one_of
-from ddenv.runfile.fold_rates import counted_again, seen
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import Decision, Node, RunState, Test, Trial, many
 
@@ -48,7 +47,7 @@ def adopted(state: RunState, data: Data, at: float) -> Changes:
     words = f"adopted {trial.label}: {many(trial.size)}"
     return {
         **_with_trial(state, trial),
-        **arrived(state, data, at, "adopted", trial.label, trial.tests),
+        **arrived(state, data, at, "adopted", trial.label),
         **decision(state, at, "adopt", words),
     }
 
@@ -60,24 +59,37 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
     trial = None if data.get("trial") is None else tried(state, data["trial"])
     what = trial.label if trial else str(data["what"])
     judged = with_outcomes(state, data)
-    judged = judged.changed(nodes=counted_again(judged.nodes, judged.tests))
+    if data.get("instead"):
+        return _branched(judged, test, data, at, what)
     changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
     return {
         "tests": judged.tests,
         "tally": judged.tally,
         "failures": (*state.failures, test.id),
         **changes,
-        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what, _beside(state, test, trial)),
+        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
         **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
     }
 
 
-def _beside(state: RunState, test: Test, trial: Trial | None) -> tuple[int, ...]:
-    """The tests of the try or candidate that a test was made for."""
-    if trial is not None:
-        return trial.tests
-    candidates = () if state.round is None else state.round.candidates
-    return next((each.tests for each in candidates if test.id in each.tests), (test.id,))
+def _branched(state: RunState, test: Test, data: Data, at: float, what: str) -> Changes:
+    """Another failure is f from now on, in place of what was f, in the environment that showed it."""
+    arrival = arrived(state, {**data, "evidence_test": test.id}, at, "instead", what, below=test.node)
+    gone = state.pinned.difference(arrival["environment"])
+    words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
+    return {
+        "tests": state.tests,
+        "tally": state.tally,
+        "failures": (test.id,),
+        "pinned": state.pinned - gone,
+        **arrival,
+        **decision(state, at, "accept_other", words),
+    }
+
+
+def _unpinned(state: RunState, gone: frozenset[str]) -> str:
+    """Models that are not in the new environment cannot stay pinned."""
+    return f"; unpinned {listed([name for name in state.elements if name in gone])}" if gone else ""
 
 
 def went_back(state: RunState, data: Data, at: float) -> Changes:
@@ -91,15 +103,10 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         last = nodes[here(state, undone).number]
         nodes[last.number] = replace(last, rejected=True)
         words = f"took back {last.what}: {many(len(node.environment))} again"
-    # Models that are not in this environment cannot stay pinned.
     gone = state.pinned.difference(node.environment)
-    if gone:
-        words += f"; unpinned {listed([name for name in state.elements if name in gone])}"
+    words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
-    judged = state
-    if "outcomes" in data:
-        judged = with_outcomes(state, data)
-        nodes = list(counted_again(nodes, judged.tests))
+    judged = with_outcomes(state, data) if "outcomes" in data else state
     return {
         **left_round(state),
         "tests": judged.tests,
@@ -139,14 +146,13 @@ def command_refused(state: RunState, data: Data, _: float) -> Changes:
     return {"refusal": (int(data["command"]), str(data["why"]))}
 
 
-def arrived(state: RunState, data: Data, at: float, how: str, what: str, tests: Iterable[int]) -> Changes:
-    """The run moves to another environment, a new node below the current one; `tests` ran it."""
+def arrived(state: RunState, data: Data, at: float, how: str, what: str, below: int | None = None) -> Changes:
+    """The run moves to another environment, a new node below the current one, or below node number `below`."""
     environment = names(state.elements, data["environment"])
     reduction = state.scenario.get("reduction", {})
-    runs, shown = seen(state.tests, tests)
     node = Node(
         number=len(state.nodes),
-        parent=state.node,
+        parent=state.node if below is None else below,
         how=how,
         what=what,
         environment=environment,
@@ -155,12 +161,10 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str, tests: 
         time=at,
         evidence_test=int(data["evidence_test"]),
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
-        runs=runs,
-        shown=shown,
     )
     inside = set(environment) <= set(state.environment)
     # Nothing is known yet about what another failure needs.
-    needed = min(state.lower_bound, len(environment)) if inside and how != "accepted" else 0
+    needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
     changes = {} if how == "reduced" else left_round(state)
     return changes | {
         "nodes": (*state.nodes, node),
@@ -180,14 +184,23 @@ def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
-    """The tests whose failures count as f in a node: that of f, and those accepted on the path to the node."""
+    """The tests whose failures count as f in a node: that of f in its branch, and those accepted on the way from there."""
     accepted: list[int] = []
-    node = state.nodes[number]
-    while node.parent is not None:
+    node, first = state.nodes[number], origin(state, number)
+    while node.parent is not None and node.number != first.number:
         if node.how == "accepted" and node.evidence_test is not None:
             accepted.append(node.evidence_test)
         node = state.nodes[node.parent]
-    return (*state.failures[:1], *reversed(accepted))
+    f = () if first.evidence_test is None else (first.evidence_test,)
+    return (*f, *reversed(accepted))
+
+
+def origin(state: RunState, number: int) -> Node:
+    """Where f in a node was seen first: the whole world, or the start of a branch that reduces another failure."""
+    node = state.nodes[number]
+    while node.how != "instead" and node.parent is not None:
+        node = state.nodes[node.parent]
+    return node
 
 
 def left_round(state: RunState) -> Changes:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import islice, takewhile
 from typing import Any
 
+from ddenv.runfile.failures import Baseline, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
@@ -91,24 +92,24 @@ class RunState:
         return state
 
     @property
+    def f_test(self) -> Test | None:
+        """The test whose end is f in the current node; None until f is fixed."""
+        known = self.failures and 0 < self.failures[0] <= len(self.tests)
+        return self.tests[self.failures[0] - 1] if known else None
+
+    @property
+    def f_position(self) -> Place | None:
+        """Where the robot ended in f, x, y, z m; None until f is fixed."""
+        base, test = self.baseline, self.f_test
+        if base is None or test is None or test.id == base.failure_test or test.end_pose is None:
+            return None if base is None else base.position
+        x, y, z = test.end_pose[:3]
+        return x, y, z
+
+    @property
     def failure(self) -> str:
         """How the robot failed in f, in a word; "" if unknown."""
-        if self.baseline is None or not 0 < self.baseline.failure_test <= len(self.tests):
-            return ""
-        test: Test = self.tests[self.baseline.failure_test - 1]
-        return test.failure
-
-    @property
-    def other_failures(self) -> int:
-        """How many baseline runs failed differently from f; 0 until f is fixed."""
-        baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
-        return sum(test.outcome == "other" for test in baseline)
-
-    @property
-    def broken_runs(self) -> int:
-        """How many baseline runs broke; they count as runs without f."""
-        baseline = takewhile(lambda test: test.phase == "baseline", self.tests)
-        return sum(test.outcome in ("error", "timeout") for test in baseline)
+        return "" if self.f_test is None else self.f_test.failure
 
     @property
     def cut_tests(self) -> int:
@@ -153,11 +154,6 @@ class RunState:
         return last if last is not None and last.node == self.node and not last.past else None
 
     @property
-    def certified(self) -> bool:
-        """Whether the run ended as minimal, and fresh runs show it; files of format 4 have no certificate."""
-        return self.minimal and self.certificate is not None
-
-    @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
         # Tries of the user may run between them.
@@ -185,12 +181,12 @@ class RunState:
 class Node:
     """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
 
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure) or
-    "certified" (its certificate showed that one more model can go); `what` names the candidate or trial. `tests` is the number of
-    tests finished by then, `time` is Unix time, s, `round` the round that ended in it. `evidence_test` is the run in it that
-    guides the next rounds, None before f is known. `method` is the algorithm and pair. `minimal`: the reduction ended here;
-    `rejected`: it was taken back; `lost_rate`: fresh runs showed that f is too rare in it. `runs` are the tests of
-    its environment that ended and did not break; `shown` of them showed f.
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure,
+    too), "instead" (from here on another failure is f) or "certified" (its certificate showed that one more model can go); `what`
+    names the candidate, trial or test. `tests` is the number of tests finished by then, `time` is Unix time, s, `round` the round
+    that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known. `method` is the
+    algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs showed that f
+    is too rare in it.
     """
 
     number: int
@@ -206,8 +202,6 @@ class Node:
     minimal: bool = False
     rejected: bool = False
     lost_rate: bool = False
-    runs: tuple[int, ...] = ()
-    shown: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,12 +310,12 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
-    "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of what is left, of that without the model
-    `without`, or of the environment of `node`. `run` is i in seed = base + i; above 0 in a round it is a re-run (deflaking).
-    `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of
-    the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or touched, with
-    the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `taken`: its result was
-    copied from another run.
+    "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of the environment of `node`, or of that
+    without the model `without`. In other phases `node` was the current one. `run` is i in seed = base + i; above 0 in a round it
+    is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says
+    how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
+    sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
+    `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.
     """
 
     id: int
@@ -342,7 +336,8 @@ class Test:
     without: str | None = None
     trial: int | None = None
     taken: bool = False
-    node: int | None = None
+    node: int = 0
+    tried: Candidate | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_finished(self) -> bool:
@@ -352,25 +347,6 @@ class Test:
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
         return self.phase == "round" and self.run > 0 and self.is_finished
-
-
-@dataclass(frozen=True, slots=True)
-class Baseline:
-    """The runs of the whole world. `failure_test` is the test whose end is f; `low`..`high` is Wilson's 95 % interval.
-
-    `miss_chance` is (1-p)^(1+iterations), the chance that all tests of a candidate miss f; `iterations_95` is the number of
-    iterations for a 95 % chance of seeing f. `position` is f's end, x, y, z m.
-    """
-
-    runs: int
-    failures: int
-    rate: float
-    low: float
-    high: float
-    failure_test: int
-    position: tuple[float, float, float]
-    miss_chance: float
-    iterations_95: int
 
 
 @dataclass(frozen=True, slots=True)

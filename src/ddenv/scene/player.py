@@ -130,9 +130,8 @@ class Player:
         self._evidence = self._state.evidence_test
         samples = None if self._evidence is None else self._run.motion(self._evidence)
         self._scenery.evidence(None if samples is None else _rows(samples))
-        if self._state.baseline is not None:
-            x, y, z = self._state.baseline.position
-            mark(self._stage, "failure", (x, y, z), self._epsilon, colors.FAILURE)
+        if self._state.f_position is not None:
+            mark(self._stage, "failure", self._state.f_position, self._epsilon, colors.FAILURE)
 
 
 def _rows(samples: array[float]) -> np.ndarray:

@@ -66,8 +66,7 @@ def _to_replay(state: RunState) -> Test | None:
 def _of_test(state: RunState, kind: str, test: Test) -> Shot:
     name, models = "baseline", frozenset(state.elements)
     if test.id == state.evidence_test and kind == "replay":
-        original = state.baseline is not None and test.id == state.baseline.failure_test
-        name = "the failure f" if original else "the failure in what is left"
+        name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)
     elif test.candidate is not None and state.round is not None and test.round == state.round.number:
         candidate = state.round.candidates[test.candidate]

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import IO
 
 from ddenv.errors import UserError
+from ddenv.runfile.failures import Baseline
 from ddenv.runfile.fold import apply
-from ddenv.runfile.state import FRESH, Baseline, RunState
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event, RunFile
 from ddenv.study.plan import Cell
 from ddenv.study.study_folder import check_path, run_path
@@ -227,5 +228,5 @@ def _story(events: Iterable[Event]) -> tuple[RunState, list[int], tuple[tuple[in
 
 
 def _counts_at_once(state: RunState, event: Event) -> bool:
-    """Tests of the baseline and with fresh seeds are made because they are needed, never ahead of time."""
-    return state.tests[event.data["test"] - 1].phase in ("baseline", *FRESH)
+    """Tests of the baseline and of the confirmation are made because they are needed, never ahead of time."""
+    return state.tests[event.data["test"] - 1].phase in ("baseline", "confirm")

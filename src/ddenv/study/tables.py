@@ -98,7 +98,7 @@ def _behind(row: Row) -> tuple[Cell, ...]:
 
 
 def _rate(row: Row) -> str:
-    runs = sum(each.baseline_runs for each in row.found)
+    runs = sum(each.baseline.runs for each in row.found if each.baseline)
     return f"{sum(each.baseline.failures for each in row.found if each.baseline)} of {runs}" if runs else "–"
 
 

@@ -67,8 +67,8 @@ def _sensed(state: RunState) -> list[tuple[str, float]]:
 def describe(state: RunState, each: Footprint, columns: int = 0) -> Text:
     """Name, part, size, distance to f and time first sensed, as much as fits in `columns` (0: all). Names are shortened."""
     words = [_standing(state, each.name), _size(each)]
-    if state.baseline is not None:
-        words.append(f"{each.distance(state.baseline.position[:2]):.1f} m from f")
+    if state.f_position is not None:
+        words.append(f"{each.distance(state.f_position[:2]):.1f} m from f")
     for number, (name, moment) in enumerate(_sensed(state), start=1):
         if name == each.name:
             words.append(f"sensed at {moment:.1f} s (no. {number})")

@@ -57,8 +57,8 @@ class Shown:
     @property
     def failure(self) -> Point | None:
         """Where the robot ended in f, m."""
-        base = self.snapshot.state.baseline
-        return None if base is None else (base.position[0], base.position[1])
+        position = self.snapshot.state.f_position
+        return None if position is None else position[:2]
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.claims import current, ended, promise
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.workbench.run.explain_certificate import certifying
+from ddenv.words import failed_in, other_failures
 from ddenv.workbench.run.explain_decisions import (
     arrival,
     by_hand,
     last_reduction,
     older_engine,
     out_of_budget,
-    rarer,
     to_adopt,
 )
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
@@ -46,7 +44,7 @@ def explain(snapshot: Snapshot) -> Explanation:
     shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
     if not snapshot.error:
-        sentences = (*older_engine(snapshot), *rarer(state), *to_adopt(state), *sentences, *by_hand(state))
+        sentences = (*older_engine(snapshot), *to_adopt(state), *sentences, *by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
 
@@ -68,7 +66,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
     if state.confirming:
-        return _with_pause(state, ("returned", certifying(snapshot)))
+        return _with_pause(state, ("returned", _confirming(snapshot)))
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
@@ -81,12 +79,13 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
     base = state.baseline
     if base is None:
         return ""
-    others = f"; {count(state.other_failures, 'run')} failed in another way" if state.other_failures else ""
-    others += f"; {count(state.broken_runs, 'run')} broke" if state.broken_runs else ""
+    broke = f"; {count(base.broken, 'more run')} broke" if base.broken else ""
     sentence = (
-        f"Baseline: the robot {deed(state.failure)} in {base.failures} of {count(base.runs, 'run')} "
-        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){others}."
+        f"Baseline: the robot {failed_in(state, base)} in {base.failures} of {count(base.runs, 'run')} "
+        f"({percent(base.rate)}, 95 % interval {percent(base.low)} to {percent(base.high)}){broke}."
     )
+    if also := other_failures(base):
+        sentence += f" {also[:1].upper()}{also[1:]}."
     if base.rate >= 1.0:
         return sentence
     tests = count(1 + iterations, "test")
@@ -148,6 +147,8 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     first = (
         f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
     )
+    if len(tests) >= options.baseline_runs:
+        first = "Few runs of the whole world show f: the robot runs in it until more do."
     if not tests:
         return (first,)
     return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
@@ -251,6 +252,16 @@ def _otherwise(test: Test) -> str:
     return f"the robot {deed(test.failure)}{'' if test.failure in DEEDS else ' elsewhere,'} {away} from f's end."
 
 
+def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
+    """The rounds are over; full runs confirm their result."""
+    first = "Confirming what is left with full runs: earlier tests ended as soon as the robot was stuck for good."
+    running = [test for test in snapshot.running if test.phase == "confirm"]
+    if not running:
+        return (first,)
+    what = f"all that is left except {plain(running[0].without)}" if running[0].without else "all that is left"
+    return (first, f"Now run {running[0].run + 1} of {what}.")
+
+
 def _reduced(state: RunState, candidate: Candidate, options: Settings) -> Happening:
     before, after = len(candidate.split.environment), candidate.size
     gone = "the others take no part in f" if before - after > 1 else "the other one takes no part in f"
@@ -269,26 +280,39 @@ def _finished(state: RunState) -> Happening:
     options, kept = settings(state), count(len(state.environment), "model")
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
-    base = baseline_sentence(state, options.iterations)
-    if not state.certified:
-        left = f"{kept} left: {_names(state)}."
-        return "returned", (_reason(state, "The run ended early."), *out_of_budget(state), left)
+    if not state.minimal:
+        return "returned", (
+            _reason(state, "The run ended early."),
+            *out_of_budget(state),
+            f"{kept} left: {_names(state)}.",
+        )
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
-        return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
+        return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
+    single = len(state.environment) == 1
     pinned = state.pinned.intersection(state.environment)
-    stays = (f"{count(len(pinned), 'model')} that you pinned always stayed; p unpins.",) if pinned else ()
-    certificate = current(state)
-    means = () if certificate is None else (_sentence(promise(certificate)),)
-    return "returned", (f"Minimal: {kept} left. {_reason(state, '')}", f"Kept: {_names(state)}.", *stays, *means, base)
+    if pinned:
+        return "returned", (f"Ended: {kept} left. {_proof_with_pins(state, len(pinned))}", f"Kept: {_names(state)}.")
+    proof = f"without {'it' if single else 'any one of them'} f no longer shows"
+    sure = "; full runs confirm it" if state.confirming else ""
+    return "returned", (
+        f"Minimal: {kept} left, and {proof}{sure}.",
+        f"Kept: {_names(state)}.",
+        baseline_sentence(state, options.iterations),
+    )
+
+
+def _proof_with_pins(state: RunState, pinned: int) -> str:
+    if pinned == len(state.environment):
+        what = "it is" if pinned == 1 else "all of them are"
+        return f"{what[:1].upper()}{what[1:]} pinned: fewer models were not tried. p unpins."
+    others = "the other one" if len(state.environment) - pinned == 1 else "any one of the others"
+    return f"Without {others} f no longer shows; {count(pinned, 'model')} that you pinned always stayed."
 
 
 def _reason(state: RunState, otherwise: str) -> str:
-    return _sentence(plain(ended(state)) or otherwise)
-
-
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + ("" if words.endswith(".") else ".")
+    text = plain(state.reason) or otherwise
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
 
 
 def _names(state: RunState) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ddenv.claims import drift, has_dropped
 from ddenv.guiding.situation import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
@@ -12,6 +11,7 @@ from ddenv.workbench.wording import count, plain
 HOW = {
     "adopted": "You adopted {what}",
     "accepted": "You accepted the other failure of {what} as f",
+    "instead": "You branched: the failure of {what} is f here",
 }
 
 
@@ -53,15 +53,6 @@ def _under_way(state: RunState, trial: Trial) -> str:
         return f"{what} is the next test, before the round goes on."
     again = f"re-run {running.run} of {most - 1}" if running.run else "first run"
     return f"{what} is being tested: {again}."
-
-
-def rarer(state: RunState) -> tuple[str, ...]:
-    """A warning where f shows clearly less often than in the whole world."""
-    here = state.here
-    if not (has_dropped(state) and drift(state)) or here is None or here.parent is None:
-        return ()
-    before = count(len(state.nodes[here.parent].environment), "model")
-    return (f"f is rarer than it was: {drift(state)[0]}. u goes back to {before}.",)
 
 
 def arrival(state: RunState) -> str:

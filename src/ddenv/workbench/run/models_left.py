@@ -64,7 +64,7 @@ def rows(state: RunState, prints: Sequence[Footprint]) -> tuple[Row, ...]:
     parts = {name: place for place, part in enumerate(_partitions(state)) for name in part}
     sensed = _sensed(state)
     places = {each.name: each for each in prints}
-    f = None if state.baseline is None else (state.baseline.position[0], state.baseline.position[1])
+    f = None if state.f_position is None else state.f_position[:2]
     found = []
     for name in state.environment:
         part = "+" if name in state.pinned else partition_letter(parts[name]) if name in parts else ""

@@ -11,6 +11,7 @@ from textual.screen import Screen
 
 from ddenv.guiding.course import GoBack
 from ddenv.guiding.pace import Stop
+from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.run_settings import settings
 from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
@@ -54,6 +55,17 @@ class Opening:
         ask = self._asking.ask
         # The history asked the question already.
         self._screen.app.push_screen(history, lambda node: None if node is None else ask(GoBack(node), sure=True))
+
+    def failures(self) -> None:
+        """Lists the other failures that the tests met, to reduce one of them in a branch."""
+        from ddenv.workbench.run.failures_dialog import FailuresMet
+
+        def chosen(test: int | None) -> None:
+            if test is not None:
+                # The list asked the question already.
+                self._asking.ask(AcceptOther(test, instead=True), sure=True)
+
+        self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
 
     def layers(self, then: Callable[[], None]) -> None:
         """Asks what the map shows; `then` is called when that is chosen."""

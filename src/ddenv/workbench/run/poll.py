@@ -237,7 +237,7 @@ class Poll:
         return self._evidence[1]
 
     def _first_motion(self, state: RunState) -> array[float] | None:
-        test = None if state.baseline is None else state.baseline.failure_test
+        test = state.f_test.id if state.f_test is not None else None
         if test != self._original[0]:
             self._original = (test, None if test is None else self.file.motion(test))
         return self._original[1]

@@ -92,6 +92,13 @@ _KEYS = [
     Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks whether to stop the engine"),
     _hidden("S", "guide('step_round')", "round", "run.round", "run to the end of the round, then pause"),
     _hidden("t", "guide('mode')", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
+    _hidden(
+        "f",
+        "failures",
+        "failures",
+        "run.failures",
+        "other failures that the tests met: each with its smallest environment; reduce one in a branch",
+    ),
     _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
     _hidden("l", "layers", "layers", "run.layers", "choose what the map shows"),
     _hidden("y", "copy", "copy", "run.copy", "copy the names of the models left, or the command to come back"),

@@ -177,8 +177,6 @@ class RunScreen(Screen[None]):
         self.query_one(Header).show(snapshot)
         self._show_map()
         self._show_models()
-        # Its rows are wider than those of candidates.
-        self.set_class(snapshot.state.certificate is not None, "-certificate")
         title = round_title(snapshot.state)
         # Even the same words would have the panel drawn again, with all that is in it.
         if title != self._title:
@@ -230,6 +228,9 @@ class RunScreen(Screen[None]):
 
     def action_history(self) -> None:
         self._opening.history()
+
+    def action_failures(self) -> None:
+        self._opening.failures()
 
     def action_find(self) -> None:
         names = [each.name for each in self._map.place.prints]

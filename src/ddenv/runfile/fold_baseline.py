@@ -1,0 +1,47 @@
+"""Folds the end of the baseline: f is fixed, and all failures of the whole world are counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ddenv.runfile.events import Changes, Data, chance, vector
+from ddenv.runfile.failures import Baseline, SeenFailure
+from ddenv.runfile.fold_decisions import with_outcomes
+from ddenv.runfile.progress import Point
+from ddenv.runfile.state import RunState
+
+
+def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
+    x, y, z = vector(data["position"], 3)
+    baseline = Baseline(
+        runs=int(data["runs"]),
+        failures=int(data["failures"]),
+        rate=chance(data["rate"]),
+        low=chance(data["low"]),
+        high=chance(data["high"]),
+        failure_test=int(data["failure_test"]),
+        position=(x, y, z),
+        miss_chance=chance(data["miss_chance"]),
+        iterations_95=int(data["iterations_95"]),
+        broken=int(data.get("broken", 0)),
+        seen=tuple(map(_seen, data.get("seen", ()))),
+    )
+    compared = with_outcomes(state, data)
+    point = Point(compared.tests_done, len(state.environment))
+    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=baseline.failure_test),)
+    return {
+        "tests": compared.tests,
+        "tally": compared.tally,
+        "deflake_runs": compared.deflake_runs,
+        "baseline": baseline,
+        "evidence_test": baseline.failure_test,
+        "failures": (baseline.failure_test,),
+        "nodes": (*root, *state.nodes[1:]),
+        "history": (*state.history, point),
+        "status": state.status if state.paused else "running",
+    }
+
+
+def _seen(data: Data) -> SeenFailure:
+    x, y, z = vector(data["position"], 3)
+    return SeenFailure(int(data["test"]), int(data["runs"]), tuple(map(str, data["kinds"])), (x, y, z))

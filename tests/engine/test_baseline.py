@@ -1,0 +1,162 @@
+"""What the baseline makes of its runs: which failure is f, how often it shows, and when there are enough runs."""
+
+from __future__ import annotations
+
+import random
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddenv.engine.baseline import fix_failure
+from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import Test as Ran
+from ddenv.runfile.store import RunFile
+from ddenv.world.scenario import FailureSpec
+from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.test_driver import Killed
+
+SPEC = FailureSpec(epsilon=0.5)
+
+
+def way(*points) -> np.ndarray:
+    return np.array([(float(time), *point, 0.0, 1.0, 0.0, 0.0, 0.0) for time, point in enumerate(points)])
+
+
+def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1):
+    """What runs show; each is "pass", "error", or the way of a run that failed, with how it failed."""
+    tests, ways = [], {}
+    for run, one in enumerate(outcomes):
+        outcome, kind, rows = (
+            (one, "broken" if one == "error" else "", None) if isinstance(one, str) else ("failed", *one)
+        )
+        end = None if rows is None else tuple(rows[-1, 1:])
+        tests.append(Ran(run + 1, "baseline", None, None, run, run, outcome, kind, end_pose=end))
+        if rows is not None:
+            ways[run + 1] = rows
+    return fix_failure(tests, ways, spec, 3, wanted)
+
+
+def stuck(x: float, kind: str = "stuck"):
+    return kind, way((0, 0), (x, 0))
+
+
+def test_f_is_the_end_that_most_runs_share():
+    found = ran(stuck(9), stuck(20), stuck(30), stuck(0.2), stuck(0.1), stuck(-20), stuck(-30), stuck(0), stuck(0.1))
+    assert (found["failure_test"], found["failures"], found["runs"]) == (5, 4, 9)
+    assert found["position"] == (0.1, 0.0, 0.0)
+    assert [each["runs"] for each in found["seen"]] == [4, 1, 1, 1, 1, 1]
+
+
+def test_runs_that_broke_are_not_in_the_rate():
+    found = ran("error", stuck(1), "pass", stuck(1), "error")
+    assert (found["failures"], found["runs"], found["broken"], found["rate"]) == (2, 3, 2, pytest.approx(2 / 3))
+    assert "all 1 baseline runs (1 more broke" in ran("error", "pass")
+
+
+def test_the_way_there_decides_where_the_oracle_asks_for_it():
+    detours = [("stuck", way((0, 0), (1, side), (2, 0))) for side in (-5, 5, 5, -5, 5)]
+    found = ran(*detours, spec=FailureSpec(epsilon=0.5, similarity="trajectory"))
+    assert (found["failure_test"], found["failures"]) == (2, 3)
+    assert [each["runs"] for each in found["seen"]] == [3, 2]
+    assert ran(*detours)["failures"] == 5
+
+
+def test_another_failure_can_be_chosen_by_its_number():
+    runs = (
+        stuck(5, "fell"),
+        stuck(1),
+        stuck(1.1),
+        "pass",
+        stuck(1, "out of time"),
+        stuck(5, "fell"),
+        stuck(-9, "lost"),
+    )
+    assert [(each["test"], each["runs"], each["kinds"]) for each in ran(*runs)["seen"]] == [
+        (2, 3, ("stuck", "out of time")),
+        (1, 2, ("fell",)),
+        (7, 1, ("lost",)),
+    ]
+    second = ran(*runs, wanted=2)
+    assert (second["failure_test"], second["failures"], second["position"]) == (1, 2, (5.0, 0.0, 0.0))
+    assert second["outcomes"] == {
+        "1": "similar",
+        "2": "other",
+        "3": "other",
+        "5": "other",
+        "6": "similar",
+        "7": "other",
+    }
+    assert ran(*runs, wanted=4) == (
+        "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "
+        "2. fell at (5.00, 0.00) in 2 runs; 3. lost at (-9.00, 0.00) in 1 run"
+    )
+
+
+def rare(rate: float, salt: int):
+    """In this part of its runs the wall stops the robot; in others it ends elsewhere, or the simulation breaks."""
+
+    def oracle(keep, seed):
+        luck = random.Random(f"{salt} {seed}").random()
+        if luck < rate:
+            return "similar" if "wall" in keep else "pass"
+        return "other" if luck < rate + 0.05 else "error" if luck > 0.95 else "pass"
+
+    return oracle
+
+
+def last_baseline(folder, salt: int, jobs: int, kill_every: int):
+    """The baseline, and the runs made in it, of an engine that is killed and started again all the time."""
+    path = new_run(folder, accept_rate="kept", baseline_runs=4, iterations=1)
+    for _ in range(40):
+        pool = FakePool(rare(0.2, salt), jobs, salt)
+        with suppress(Killed):
+            drive(path, pool, prepare=lambda file: _kill_at_end_of_baseline(file, kill_every))
+            break
+        with RunFile(path) as file:
+            state = fold(file.events())
+        if state.baseline is not None:
+            break
+    with RunFile(path) as file:
+        state = fold(file.events())
+    runs = {test.run for test in state.tests if test.phase == "baseline" and test.is_finished}
+    if state.baseline is None:
+        return None, state.status, sorted(runs)
+    # The numbers of tests depend on how often an engine was killed.
+    seen = [(state.tests[one.test - 1].run, one.runs, one.kinds, one.position) for one in state.baseline.seen]
+    return replace(state.baseline, failure_test=0, seen=()), seen, sorted(runs)
+
+
+def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:
+    """No more than so many events are written, and none after the baseline."""
+    append, written = file.append, []
+
+    def appended(kind, data, motions=None):
+        written.append(kind)
+        event = append(kind, data, motions)
+        if len(written) > events or kind == "baseline_finished":
+            raise Killed
+        return event
+
+    file.append = appended
+
+
+@pytest.mark.parametrize("salt", range(6))
+def test_where_few_runs_show_f_the_baseline_goes_on_in_the_same_way_for_all_engines(tmp_path, salt):
+    usual = last_baseline(tmp_path, salt, 1, 10_000)
+    found, status, runs = usual
+    assert last_baseline(tmp_path, salt, 3, 10_000) == last_baseline(tmp_path, salt, 2, 25) == usual
+    if found is None:
+        assert (status, runs) == ("finished", [0, 1, 2, 3])
+    else:
+        assert len(runs) == found.runs + found.broken
+        # No run more than needed.
+        assert len(runs) == 4 or (found.failures == FEWEST_SHOWN) or (len(runs) == LONGEST_BASELINE)
+        assert found.failures >= FEWEST_SHOWN or len(runs) == LONGEST_BASELINE
+
+
+def test_the_papers_baseline_never_goes_on(tmp_path):
+    state = drive(new_run(tmp_path, baseline_runs=4, iterations=1), FakePool(rare(0.2, 2), 2))
+    assert sum(test.phase == "baseline" for test in state.tests) == 4
