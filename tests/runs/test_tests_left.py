@@ -1,9 +1,16 @@
 """How many tests are left of a run, by the engine's forecast, and how many a reduction takes roughly."""
 
+from random import Random
+from statistics import median
+
 import pytest
 
+from ddenv.reduction.certificate import Terms, error_of, falls, keeps, settle
 from ddenv.runfile.fold import fold
-from ddenv.runs.tests_left import remaining, rough_tests
+from ddenv.runs.tests_left import certificate_tests, remaining, rough_run, rough_tests
+from ddenv.settings import PRINTED
+from ddenv.world.load import load_scenario
+from tests.conftest import DATA
 from tests.workbench import fake_run
 
 # Mean tests of random worlds (docs/benchmarks.md): models, with a failure that always shows, and with one in 80 % of the runs.
@@ -35,7 +42,7 @@ def left(run, at_work=True):
 def test_a_rough_interval_holds_what_random_worlds_took(algorithm, as_printed, cells):
     for models, steady, flaky in cells:
         for tests, iterations in ((steady, 0), (flaky, 3)):
-            low, likely, high = rough_tests(models, algorithm, iterations, as_printed)
+            low, likely, high = rough_tests(models, algorithm, 1 + iterations, as_printed)
             assert low <= tests <= high
             assert low <= likely <= high
 
@@ -43,8 +50,45 @@ def test_a_rough_interval_holds_what_random_worlds_took(algorithm, as_printed, c
 @pytest.mark.parametrize("models", [0, 1, 2, 3])
 @pytest.mark.parametrize("algorithm", ["ddenv", "ddmin", "probdd", "splitting", "theirs"])
 def test_tiny_worlds_take_few_tests(models, algorithm):
-    low, likely, high = rough_tests(models, algorithm, 3, as_printed=True)
+    low, likely, high = rough_tests(models, algorithm, 4, as_printed=True)
     assert 0 <= low <= likely <= high < 60
+
+
+def certified(rate, keep_rate, left, at_least, random):
+    """The tests of a certificate of so many needed models that keep the whole world's rate, as the engine makes it."""
+    whole, end = frozenset("whole"), frozenset("end")
+    shown = {}
+
+    def show(subject, number):
+        return shown.setdefault((subject, number), subject in (whole, end) and random.random() < rate)
+
+    error = error_of(1) / 2
+    settle(keeps(end, whole, Terms(keep_rate, rate, error, at_least)), show)
+    for model in range(left):
+        terms = Terms(keep_rate, rate, error / left, at_least)
+        settle(falls(frozenset([str(model)]), whole, terms), show)
+    return len(shown)
+
+
+@pytest.mark.parametrize("keep_rate", [0.8, 0.5])
+@pytest.mark.parametrize("rate", [1.0, 0.95, 0.8, 0.5])
+@pytest.mark.parametrize("left", [1, 3])
+def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, keep_rate, left):
+    random = Random(1)
+    made = [certified(rate, keep_rate, left, 10, random) for _ in range(25)]
+    low, likely, high = certificate_tests(rate, keep_rate, left, 10)
+    assert low <= median(made) <= high
+    assert 0.5 <= likely / median(made) <= 2
+
+
+def test_a_rough_run_has_its_certificate():
+    asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10})
+    kept, printed = rough_run(43, asked), rough_run(43, asked.model_copy(update=PRINTED))
+    assert kept.certificate == printed.certificate == certificate_tests(10.5 / 11, 0.8, 3, 10)
+    assert kept.tests[1] == kept.search[1] + kept.certificate[1]
+    assert kept.search[1] < printed.search[1]
+    assert rough_run(1, asked).certificate[1] < kept.certificate[1]
+    assert rough_run(0, asked).tests[0] >= 10
 
 
 def test_each_test_leaves_one_less(run):
@@ -56,11 +100,38 @@ def test_each_test_leaves_one_less(run):
     assert before.seconds[1] == pytest.approx(before.tests[1] * 2 / 1.9)
 
 
-def test_the_tests_that_run_are_left_at_least(run):
+# After three of four baseline runs with f.
+CERTIFICATE = certificate_tests(3.5 / 5, 0.8, 3, 4)
+
+
+def test_the_certificate_is_left_after_the_search(run):
     fake_run.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 9], tests_done=10)
-    assert left(run).tests == (2, 2, 9)
-    assert left(run, at_work=False).tests == (0, 1, 9)
+    assert left(run).tests == tuple(a + b for a, b in zip((0, 1, 9), CERTIFICATE, strict=True))
+
+
+def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
+    fake_run.mid_round(run)
+    terms = {"rate": 0.99, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
+    run.write("certificate_started", certificate=1, run=10_000, **terms)
+    low, likely, high = certificate_tests(0.99, 0.8, 6, 4)
+    assert left(run).tests == (low, likely, high)
+
+    def make(number):
+        test = 1 + len(state_of(run).tests)
+        place = {"phase": "certify", "round": None, "candidate": None, "node": 1}
+        run.write("test_started", test=test, **place, run=number, seed=number)
+        run.finish(test, "similar", 0.1)
+
+    make(10_000)
+    assert left(run).tests == (low - 1, likely - 1, high - 1)
+    for number in range(1, high - 1):
+        make(10_000 + number)
+    # The two tests that run are left at least.
+    assert left(run).tests == (2, 2, 2)
+    assert left(run, at_work=False).tests == (0, 0, 1)
+    make(20_000)
+    assert left(run) is None
 
 
 def test_no_time_is_said_while_nothing_runs(run):
@@ -72,8 +143,8 @@ def test_no_time_is_said_while_nothing_runs(run):
 
 def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
     assert left(run) is None
-    fake_run.confirming(run)
-    assert left(run) is None
+    fake_run.mid_round(run)
+    assert left(run) is not None
     run.write("finished", minimal=True, reason="")
     assert left(run) is None
 

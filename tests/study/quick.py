@@ -1,10 +1,7 @@
-"""Engines and checks in threads of this process, on a simulator that costs nothing: what a study starts as programs."""
+"""Engines in threads of this process, on a simulator that costs nothing: what a study starts as programs."""
 
 from __future__ import annotations
 
-import io
-import json
-import subprocess
 import threading
 import time
 from argparse import Namespace
@@ -13,7 +10,6 @@ from pathlib import Path
 
 from ddenv.engine import __main__ as program
 from ddenv.errors import UserError
-from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import ENGINE_SAYS
@@ -70,29 +66,15 @@ class Lab:
         self.oracle = oracle
         self.before: Callable[[Path, int], None] = lambda run, made: None
         self.started: list[tuple[str, int]] = []
-        self.checks: list[str] = []
         self.made = 0
         monkeypatch.setattr(work, "POLL", 0.002)
         monkeypatch.setattr(work, "start_engine", self.start_engine)
-        monkeypatch.setattr(work, "start_check", self.start_check)
         monkeypatch.setattr(program, "Pool", self._pool)
         monkeypatch.setattr(program, "read_parts", self._parts)
 
     def start_engine(self, run: Path, jobs: int, accept_mode: str = "automatic", share: Path | None = None) -> Engine:
         self.started.append((run.stem, jobs))
         return Engine(self, run, jobs, share)
-
-    def start_check(self, run: Path, cell, jobs: int) -> tuple[subprocess.Popen, io.StringIO]:
-        """What `ddenv test --minimal --leave-each-out --json` prints, at once."""
-        self.checks.append(cell.name)
-        with RunFile(run) as file:
-            left = fold(file.events()).environment
-        told = [
-            {"without": without, "outcome": self.oracle(cell.scenario.name, frozenset(left) - {without}, cell.seed)}
-            for without in (None, *left)
-            for _ in range(1 + cell.scenario.reduction.iterations)
-        ]
-        return Ended(), io.StringIO(f"a warning of a library\n{json.dumps({'runs': told})}\n")
 
     def _parts(self, file: RunFile):
         scenario, world, robot = _read_parts(file)
@@ -103,16 +85,6 @@ class Lab:
 
 
 _read_parts = program.read_parts
-
-
-class Ended:
-    """A program that is over."""
-
-    def poll(self) -> int:
-        return 0
-
-    def terminate(self) -> None:
-        pass
 
 
 class _Pool(FakePool):

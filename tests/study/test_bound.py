@@ -49,8 +49,8 @@ def optimum(models, needed, iterations, sizes):
 def test_who_knows_how_many_are_needed_takes_as_many_as_it_takes_to_find_them(models, iterations):
     for needed in range(1, models + 1):
         best = optimum(models, needed, iterations, (needed,))
-        shown = least_to_show(models, needed, iterations, 0)
-        assert shown <= least_to_find(models, needed, iterations, 0) <= max(best, shown)
+        shown = least_to_show(models, needed, 1 + iterations, 0)
+        assert shown <= least_to_find(models, needed, 1 + iterations, 0) <= max(best, shown)
 
 
 @pytest.mark.parametrize("iterations", [0, 2])
@@ -58,17 +58,19 @@ def test_who_knows_how_many_are_needed_takes_as_many_as_it_takes_to_find_them(mo
 def test_who_knows_nothing_beforehand_has_to_show_it_too(models, iterations):
     for needed in range(1, models + 1):
         best = optimum(models, needed, iterations, range(models + 1))
-        assert least_to_show(models, needed, iterations, 0) <= least_to_find(models, needed, iterations, 0) <= best
+        assert (
+            least_to_show(models, needed, 1 + iterations, 0) <= least_to_find(models, needed, 1 + iterations, 0) <= best
+        )
 
 
 def test_some_strategies_need_no_more():
     """The bound can be reached: halving finds one model; if all are needed, each is left out without success."""
-    assert least_to_show(1, 1, 3, 10) == least_to_find(1, 1, 3, 10) == 10 + 4
-    assert least_to_show(4, 4, 1, 3) == least_to_find(4, 4, 1, 3) == 3 + 8
-    assert least_to_show(16, 2, 3, 10) == 10 + 1 + 8
+    assert least_to_show(1, 1, 4, 10) == least_to_find(1, 1, 4, 10) == 10 + 4
+    assert least_to_show(4, 4, 2, 3) == least_to_find(4, 4, 2, 3) == 3 + 8
+    assert least_to_show(16, 2, 4, 10) == 10 + 1 + 8
     for models in (4, 8, 1024):
-        assert least_to_find(models, 1, 0, 0) == math.log2(models)
-    assert optimum(5, 2, 0, (2,)) == least_to_find(5, 2, 0, 0) == 4
+        assert least_to_find(models, 1, 1, 0) == math.log2(models)
+    assert optimum(5, 2, 0, (2,)) == least_to_find(5, 2, 1, 0) == 4
 
 
 @given(MANY, st.integers(0, 2000), st.integers(0, 50))
@@ -76,14 +78,14 @@ def test_without_reruns_a_test_tells_one_bit(models, needed, baseline_runs):
     needed = min(needed, models)
     bits = (math.comb(models, needed) - 1).bit_length()
     shown = needed + (needed < models)
-    assert least_to_find(models, needed, 0, baseline_runs) == baseline_runs + max(shown, bits)
+    assert least_to_find(models, needed, 1, baseline_runs) == baseline_runs + max(shown, bits)
 
 
 @pytest.mark.parametrize("bound", [least_to_show, least_to_find])
-@given(MANY, st.integers(0, 2000), st.integers(0, 20), st.integers(0, 50))
-def test_more_reruns_never_make_it_less(bound, models, needed, iterations, baseline_runs):
+@given(MANY, st.integers(0, 2000), st.integers(1, 20), st.integers(0, 50))
+def test_more_reruns_never_make_it_less(bound, models, needed, misses, baseline_runs):
     needed = min(needed, models)
-    least = bound(models, needed, iterations, baseline_runs)
-    assert baseline_runs <= least <= bound(models, needed, iterations + 1, baseline_runs)
+    least = bound(models, needed, misses, baseline_runs)
+    assert baseline_runs <= least <= bound(models, needed, misses + 1, baseline_runs)
     # Each test of a tree without re-runs becomes as many at the most.
-    assert least - baseline_runs <= (1 + iterations) * bound(models, needed, 0, 0)
+    assert least - baseline_runs <= misses * bound(models, needed, 1, 0)

@@ -1,16 +1,15 @@
 """What a cell came to is read of its run file, and of any file a problem at the most."""
 
 import json
-import math
 import shutil
 import sqlite3
 
 import pytest
 
 from ddenv.study.results import read_cell
-from ddenv.study.study_folder import RUNS, check_path, run_path
+from ddenv.study.study_folder import RUNS, run_path
 from ddenv.version import __version__
-from tests.study.made import LEFT, TESTS, begun, checked, crates, never_failed, plan_of, reduced
+from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, never_failed, plan_of, reduced
 from tests.workbench import fake_run
 
 
@@ -43,16 +42,18 @@ def run(tmp_path, cell):
     made.close()
 
 
-def test_a_minimal_cell(tmp_path, cell, run):
-    fake_run.finished(run)
-    found = read_cell(tmp_path, cell)
+def test_a_minimal_cell(done):
+    found = read_cell(*done)
     assert (found.minimal, found.problem, found.left) == (True, "", LEFT)
     assert len(found.elements) == 11 and found.smaller == 1 - 2 / 11
-    # The baseline, two reductions of one test, and two vain candidates with three re-runs each; every test took 2 s.
-    assert (found.tests, found.reruns, found.seconds) == (4 + 2 + 8, 6, 28.0)
-    assert found.sizes == ((4, 11), (5, 6), (6, 2), (14, 2))
-    assert (found.ahead, found.taken, found.version) == (0, 0, __version__)
+    # The baseline, a reduction of one test, and two vain candidates with three re-runs each; every test took 2 s.
+    assert (found.tests, found.reruns, found.seconds, found.misses) == (TESTS, 6, 2.0 * TESTS, 4)
+    assert (found.certificate_tests, found.certificate_seconds) == (FRESH, 2.0 * FRESH)
+    assert found.sizes == ((4, 11), (5, 2), (13, 2))
+    # One fresh run was ahead of time.
+    assert (found.ahead, found.taken, found.steps_back, found.version) == (1, 0, 0, __version__)
     assert (found.baseline.failures, found.baseline.runs) == (3, 4)
+    assert (found.whole_shown, found.whole_runs) == (3 + 2, 4 + 2)
 
 
 def test_tests_made_ahead_of_time_do_not_count(tmp_path, cell, run):
@@ -77,14 +78,53 @@ def test_tests_made_ahead_of_time_do_not_count(tmp_path, cell, run):
     assert found.seconds == 2.0 * found.tests
 
 
-def test_full_runs_at_the_end_count(tmp_path, cell, run):
-    fake_run.confirming(run)
-    for test in (17, 18):
-        run.finish(test, "pass")
+def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
+    """The first certificate shows that the rate is lost; the second one holds."""
+    run.created().baseline()
+    run.start_round(2)
+    run.reduce(0, list(LEFT), run.similar(0))
+    run.start_round(2, list(LEFT))
+    run.reduce(0, ["crate_00"], run.similar(0))
+    certified(run, {None: ("lost", "spppppp")})
+    earlier = run.tests
+    run.write("rate_lost", node=1, lost=2, again=[], tests=[earlier - 1, earlier])
+    run.write("leg_started", round=3, n_partitions=2)
+    certified(run, holds(LEFT), number=2)
+    assert read_cell(tmp_path, cell).problem == "has not ended"
+    ended(run)
+    found = read_cell(tmp_path, cell)
+    assert (found.minimal, found.left, found.steps_back) == (True, LEFT, 1)
+    assert found.sizes == ((4, 11), (5, 2), (6, 1), (6, 2), (6, 2))
+    # The second test named by the step back had been ahead of time before.
+    assert (found.tests, found.certificate_tests) == (6, 2 + 7 + 1 + FRESH)
+
+
+@pytest.mark.parametrize(
+    ("claims", "problem"),
+    [
+        ({None: ("lost", "ssppppppppppp")}, "f is too rare in what is left: f in 2 of 13 fresh runs (4 % to 42 %);"),
+        (
+            {None: ("not shown", "sssp")},
+            "not shown that what is left keeps 80 % of the whole world's rate: f in 3 of 4",
+        ),
+        (holds(LEFT) | {"crate_01": ("not shown", "sppp")}, "undecided without crate_01"),
+        (holds(LEFT) | {"crate_01": ("unknown", "eppp")}, "tests broke without crate_01"),
+        (holds(LEFT) | {"crate_01": ("not needed", "ssss")}, "not minimal: f shows as often without crate_01"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_not_certified_is_not_minimal_and_says_why(tmp_path, cell, claims, problem):
+    found = reduced(tmp_path, cell, claims=claims)
+    assert not found.minimal
+    assert problem in found.problem
+    assert found.certificate is not None and found.tests == TESTS
+
+
+def test_without_a_certificate_nothing_is_minimal(tmp_path, cell, run):
+    run.created().baseline()
     run.write("finished", minimal=True, reason="no candidate showed f")
     found = read_cell(tmp_path, cell)
-    assert (found.tests, found.reruns) == (14 + 4, 6)
-    assert found.sizes[-1] == (18, 2)
+    assert (found.minimal, found.problem, found.certificate) == (False, "it has no certificate", None)
 
 
 def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
@@ -139,6 +179,8 @@ DAMAGED = {
     "no such candidate": ("candidate_judged", {"candidate": 7, "verdict": "similar", "tests": [], "known": 0}),
     "tests that are not there": ("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [99], "known": 0}),
     "test zero": ("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [0], "known": 0}),
+    "a certificate of tests that are not there": ("certificate_finished", {"claims": [], "tests": [99]}),
+    "a certificate of no tests": ("certificate_finished", {"claims": [], "tests": [None]}),
     "tests that are no numbers": (
         "candidate_judged",
         {"candidate": 0, "verdict": "similar", "tests": [[1]], "known": 0},
@@ -158,33 +200,6 @@ def test_a_run_without_events_is_a_problem(done):
     with sqlite3.connect(run_path(*done)) as db:
         db.execute("DELETE FROM event")
     assert not read_cell(*done).minimal and "damaged run file" in read_cell(*done).problem
-
-
-def test_what_came_of_leaving_each_out_once_more(done):
-    assert read_cell(*done).check is None
-    checked(*done, 4, {"crate_00": 0, "crate_01": 0})
-    check = read_cell(*done).check
-    assert (check.seed, check.runs, check.shown, check.without) == (100_000, 4, 4, {"crate_00": 0, "crate_01": 0})
-    assert check.holds
-
-
-def test_f_that_is_a_matter_of_chance_is_told(done):
-    for shown, without in ((0, 0), (4, 1)):
-        checked(*done, shown, {"crate_00": 0, "crate_01": without})
-        assert not read_cell(*done).check.holds
-
-
-def test_what_is_no_check_of_these_models_is_none(done):
-    right = {"seed": 100_000, "runs": 4, "all": 4, "without": {"crate_00": 0, "crate_01": 0}}
-    wrong = (
-        *({"without": {"crate_00": 0, "crate_05": 0}}, {"seed": 3}, {"runs": 1}),
-        *({"without": None}, {"without": {"crate_00": [], "crate_01": 0}}, {"all": "many"}, {"seed": math.inf}),
-    )
-    texts = ["", "[]", "3", "{", "[" * 100_000, *(json.dumps(right | each) for each in wrong)]
-    for text in texts:
-        check_path(*done).write_text(text)
-        found = read_cell(*done)
-        assert (found.check, found.minimal, found.tests) == (None, True, TESTS)
 
 
 def test_a_cell_whose_robot_did_not_fail_has_no_sizes(tmp_path, cell):

@@ -11,12 +11,15 @@ from ddenv.study.conduct import seconds_left
 from ddenv.study.plan import sizes
 from ddenv.study.study_folder import RUNS, run_path
 from ddenv.study.work import Work
-from tests.study.made import TESTS, crates, plan_of, reduced
+from tests.study.made import FRESH, TESTS, crates, plan_of, reduced
+
+# One test was ahead of time.
+MADE = TESTS + FRESH + 1
 
 
 @pytest.fixture
 def made(tmp_path):
-    """A plan of two cells, and what was made of the first: `TESTS` tests of 2 s."""
+    """A plan of two cells, and what was made of the first: `MADE` tests of 2 s."""
     plan = plan_of(crates(tmp_path))
     (tmp_path / RUNS).mkdir()
     reduced(tmp_path, plan.cells[0])
@@ -33,14 +36,14 @@ def left(plan, ended, jobs=2, running=()):
 
 def test_another_pair_takes_what_the_first_one_took(made):
     plan, first = made
-    assert left(plan, [first]) == pytest.approx(TESTS * 2.0 / 2)
-    assert left(plan, [first], jobs=1) == pytest.approx(TESTS * 2.0)
+    assert left(plan, [first]) == pytest.approx(MADE * 2.0 / 2)
+    assert left(plan, [first], jobs=1) == pytest.approx(MADE * 2.0)
 
 
 def test_tests_that_were_taken_over_took_no_time(made):
     plan, first = made
     tests = PersistentTuple.of(replace(test, taken=number < 4) for number, test in enumerate(first.state.tests))
-    assert left(plan, [replace(first, state=first.state.changed(tests=tests))]) == pytest.approx((TESTS - 4) * 2.0 / 2)
+    assert left(plan, [replace(first, state=first.state.changed(tests=tests))]) == pytest.approx((MADE - 4) * 2.0 / 2)
 
 
 def test_without_a_test_nothing_tells(made):
@@ -54,4 +57,4 @@ def test_without_a_test_nothing_tells(made):
 def test_one_that_failed_tells_only_what_a_test_takes(made):
     plan, first = made
     broken = replace(first, state=first.state.changed(status="failed"))
-    assert left(plan, [broken], jobs=1) > TESTS * 2.0
+    assert left(plan, [broken], jobs=1) > MADE * 2.0

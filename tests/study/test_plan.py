@@ -1,12 +1,18 @@
 """Which cells a study consists of, and what is told of names that make no sense."""
 
+from itertools import pairwise
+
 import pytest
 
 from ddenv import schemas
+from ddenv.engine.certify import MOST_STEPS_BACK
 from ddenv.errors import UserError
+from ddenv.reduction.acceptance import LONGEST_BASELINE, MOST_RUNS
+from ddenv.reduction.certificate import MOST_ALONE, MOST_BROKEN, MOST_PAIRS
+from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.study.plan import PAIRS, make_plan
 from ddenv.study.rows import theirs
-from ddenv.study.study_folder import check_path, run_path
+from ddenv.study.study_folder import run_path
 from tests.study.made import LONGEST, crates, plan_of
 
 LONGEST_FILE_NAME = 255
@@ -87,14 +93,24 @@ def test_what_makes_fewer_tests_is_asked_for_where_nobody_says_otherwise(tmp_pat
     assert asked(said, as_printed=False) == ("steady", "implied")
 
 
-@pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (2, 6), (1, 0)])
+@pytest.mark.parametrize(("baseline_runs", "iterations"), [(10, 3), (1000, 1000), (1, 0)])
 def test_no_run_of_one_seed_is_a_run_of_another(tmp_path, baseline_runs, iterations):
     plan = plan_of(
         crates(tmp_path, baseline_runs=baseline_runs, iterations=iterations, seed=7), pairs=PAIRS[0], seeds=4
     )
-    used = [cell.seed + run for cell in plan.cells for run in range(max(baseline_runs, 1 + iterations))]
-    assert len(used) == len(set(used))
-    assert used[0] == 7
+    # The search, and all certificates that a run can make.
+    one = max(baseline_runs, 1 + iterations, LONGEST_BASELINE, MOST_RUNS)
+    assert one < FIRST_FRESH_RUN
+    steps = 1 + MOST_STEPS_BACK
+    last = FIRST_FRESH_RUN + steps * (MOST_ALONE + MOST_PAIRS + MOST_BROKEN + 1)
+    seeds = [cell.seed for cell in plan.cells]
+    assert seeds[0] == 7
+    assert all(after - before > last for before, after in pairwise(seeds))
+
+
+def test_a_seed_beyond_the_last_one_is_refused(tmp_path):
+    with pytest.raises(UserError, match="the last seed of crates would be 2147583647; the maximum is 2147483647"):
+        plan_of(crates(tmp_path, seed=2**31 - 1), seeds=2)
 
 
 HOSTILE = {
@@ -112,7 +128,7 @@ def test_the_names_of_files_are_files_names(tmp_path, name):
     plan = plan_of(crates(tmp_path, name), pairs="all", algorithms="all", seeds=2)
     assert len({cell.name for cell in plan.cells}) == len(plan.cells)
     for cell in plan.cells:
-        assert run_path(tmp_path, cell).parent == check_path(tmp_path, cell).parent == tmp_path / "runs"
+        assert run_path(tmp_path, cell).parent == tmp_path / "runs"
         # Beside it lie its log and its lock, and for a moment what is being written.
         assert len(f".{cell.name}.ddenv.scene.log.01234567".encode()) <= LONGEST_FILE_NAME
         assert cell.name.isprintable() and not set(cell.name) & set("/\\ .:|?*~")

@@ -25,7 +25,18 @@ echo 1,2,0,0,0,0,0,1
 grep -q 'model name="deck"' $1 && grep -q 'model name="wall"' $1 && exit 1
 exit 0
 """
-WORDS = ("--pairs", "model2model/sequential", "--algorithms", "splitting", "--jobs", "1", "-o", "study")
+WORDS = (
+    "--pairs",
+    "model2model/sequential",
+    "--algorithms",
+    "splitting",
+    "--jobs",
+    "1",
+    "-o",
+    "study",
+    "--keep-rate",
+    "0.5",
+)
 
 
 @pytest.fixture
@@ -56,7 +67,7 @@ def engine_of(run):
 def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, monkeypatch):
     (tmp_path / "robot.sh").write_text(ROBOT)
     made, most = tmp_path / "made", tmp_path / "most"
-    plan = plan_of(wall(tmp_path, oracle="sh robot.sh {world}"), pairs=WORDS[1], algorithms=WORDS[3])
+    plan = plan_of(wall(tmp_path, oracle="sh robot.sh {world}"), pairs=WORDS[1], algorithms=WORDS[3], keep_rate=0.5)
     folder, run = tmp_path / "study", run_path(tmp_path / "study", plan.cells[0])
 
     def stands_at(number):
@@ -80,7 +91,7 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     second.send_signal(signal.SIGINT)
     said, complained = second.communicate(timeout=PATIENCE)
     assert (second.returncode, complained) == (130, "interrupted; the same command continues\n")
-    assert "0 of 1 cell minimal; wrote study/study.html" in said
+    assert "0 of 1 cell certified; wrote study/study.html" in said
     assert (folder / "study.html").exists() and not engine_is_alive(run)
 
     # Nothing in its way any more.
@@ -88,14 +99,13 @@ def test_whatever_happens_to_a_study_it_comes_to_the_same_end(tmp_path, start, m
     third = start()
     said, complained = third.communicate(timeout=PATIENCE)
     assert (third.returncode, complained) == (0, "")
-    assert "1 of 1 cell minimal; wrote study/study.html" in said
+    assert "1 of 1 cell certified; wrote study/study.html" in said
     assert len(sittings(folder)) == 3
 
     # Of the tests that were in flight nothing is left, and no other one was made twice.
     (row,) = csv.DictReader((folder / "study.csv").read_text().splitlines())
-    checks = int(row["check_runs"]) + int(row["check_without"])
-    assert len(made.read_text()) == int(row["tests"]) + checks + 2
-    assert (row["check_f"], row["check_without_f"]) == (row["check_runs"], "0")
+    assert len(made.read_text()) == int(row["tests"]) + int(row["certificate_tests"]) + 2
+    assert (row["left_f"], row["without_most"]) == (row["left_runs"], "0.0")
 
     Lab(monkeypatch, fails)
     assert study(tmp_path / "alone", plan, jobs=1)[0] == 0

@@ -8,9 +8,10 @@ import pytest
 
 from ddenv.page.blocks import Strong, Table
 from ddenv.runfile.failures import Baseline
+from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.figures import chart
 from ddenv.study.plan import PAIRS, make_plan
-from ddenv.study.results import APART, Check, Found
+from ddenv.study.results import Found
 from ddenv.study.rows import groups, spread
 from ddenv.study.study_page import content
 from ddenv.study.tables import behind, best, numbers
@@ -21,8 +22,19 @@ FIVE = "model2model/random,model2model/sequential,model2model/timestep,timeseg/r
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+def certificate(left, *verdicts):
+    """A certificate of the models `left`: with other `verdicts` for some claims, first for what is left."""
+    names = (None, *MODELS[:left])
+    verdicts = (*verdicts, *("kept", *["needed"] * left)[len(verdicts) :])
+    claims = [
+        Claim(name, verdict, 0 if name else 20, 10 if name else 20, 0.0 if name else 0.84, 0.28 if name else 1.0)
+        for name, verdict in zip(names, verdicts, strict=True)
+    ]
+    return Certificate(1, 1, 10_000, 0.8, 0.95, 0.03, 10, tuple(claims))
+
+
 def found(cell, tests, left=1, **other):
-    """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each."""
+    """A minimal cell of 16 models, half of whose tests are re-runs, of 3 s each; 40 more of its certificate."""
     values = {
         "ended": True,
         "minimal": True,
@@ -35,16 +47,31 @@ def found(cell, tests, left=1, **other):
         "baseline": Baseline(10, 9, 0.9, 0.6, 1.0, 1, (0.0, 0.0, 0.0), 0.0, 1),
         "baseline_runs": 10,
         "sizes": ((10, 16), (tests, left)),
-        "check": Check(cell.seed + APART, 4, 4, dict.fromkeys(MODELS[:left], 0)),
+        "certificate": certificate(left),
+        "certificate_tests": 40,
+        "certificate_seconds": 120.0,
+        "whole_shown": 19,
+        "whole_runs": 20,
+        "misses": 4,
     }
     return Found(cell, **(values | other))
 
 
 def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
-    """The groups of two scenarios; `tests` are those of each cell in the order of the tables, None where there is no end."""
+    """The groups of two scenarios; `tests` are those of each cell in the order of the tables: None where there is no end, below
+    zero where the certificate fails.
+    """
     plan = plan_of(crates(tmp_path, "one"), crates(tmp_path, "two"), pairs=pairs, seeds=seeds)
-    made = [Found(cell) if each is None else found(cell, each) for cell, each in zip(plan.cells, tests, strict=True)]
+    made = [
+        Found(cell) if each is None else found(cell, abs(each)) for cell, each in zip(plan.cells, tests, strict=True)
+    ]
+    made = [uncertified(each) if tests[place] and tests[place] < 0 else each for place, each in enumerate(made)]
     return plan, made, groups(plan, made)
+
+
+def uncertified(each, verdict="not shown"):
+    """The same cell with a certificate that does not show that the rate is kept."""
+    return replace(each, minimal=False, problem="it is not shown", certificate=certificate(len(each.left), verdict))
 
 
 def test_the_papers_numbers_stand_beside_ours():
@@ -53,10 +80,11 @@ def test_the_papers_numbers_stand_beside_ours():
     table = numbers(group)
     assert table.head == (
         "partitioning, prioritization",
-        *("tests", "paper", "% reduction", "paper", "minutes", "paper"),
+        *("search tests", "paper", "certificate tests", "% reduction", "paper"),
+        *("search minutes", "paper", "certificate minutes", "certified"),
     )
-    assert table.rows[0] == (PAIRS[0], "60", "268", "88 %", "84 %", "3.0", "420")
-    assert table.rows[1] == (PAIRS[1], "60", "82", "88 %", "95 %", "3.0", "108")
+    assert table.rows[0] == (PAIRS[0], "60", "268", "40", "88 %", "84 %", "3.0", "420", "2.0", "yes")
+    assert table.rows[1] == (PAIRS[1], "60", "82", "40", "88 %", "95 %", "3.0", "108", "2.0", "yes")
 
 
 def test_what_the_paper_does_not_have_stands_alone():
@@ -80,9 +108,51 @@ def test_the_claim_counts_what_is_better_than_the_paper():
 
 def test_seeds_of_a_method_make_one_row(tmp_path):
     _, _, (one, two) = cells(tmp_path, 40, 30, 50, 20, 21, None, pairs="model2model/random", seeds=3)
-    assert numbers(one).rows == (("model2model/random", "40 (30 to 50)", "94 %", "2.0 (1.5 to 2.5)"),)
-    assert numbers(two).rows == (("model2model/random", "20.5 (20 to 21)", "94 %", "1.0 (1.0 to 1.1)"),)
-    assert behind(two).rows[0][:3] == ("model2model/random", "49 % (48 % to 50 %)", "18 of 20")
+    assert numbers(one).rows == (
+        ("model2model/random", "40 (30 to 50)", "40", "94 %", "2.0 (1.5 to 2.5)", "2.0", "3 of 3"),
+    )
+    assert numbers(two).rows == (
+        ("model2model/random", "20.5 (20 to 21)", "40", "94 %", "1.0 (1.0 to 1.1)", "2.0", "2 of 3"),
+    )
+    assert behind(two).rows[0][:2] == ("model2model/random", "49 % (48 % to 50 %)")
+
+
+def test_the_rate_of_what_is_left_stands_beside_the_whole_worlds(tmp_path):
+    _, _, (one, two) = cells(tmp_path, 40, 30, 50, None, pairs="model2model/random", seeds=2)
+    rates = ("38 of 40 (83 % to 99 %)", "40 of 40 (91 % to 100 %)", "at most 0 of 10 (0 % to 28 %)")
+    assert behind(one).head[3:] == (
+        *("f in the whole world", "f in what is left", "f without one of them", "steps back", "least tests"),
+    )
+    assert behind(one).rows[0][3:] == (*rates, "0", "9")
+    assert behind(two).rows[0][3:5] == ("19 of 20 (76 % to 99 %)", "20 of 20 (84 % to 100 %)")
+
+
+def test_what_is_not_certified_is_shown_and_is_no_success(tmp_path):
+    """The cell with the fewest tests has lost the rate."""
+    pairs = FIVE.rpartition(",")[0]
+    plan, made, both = cells(tmp_path, *(-10, 20, 30, 90), *(40, 50, 60, 70), pairs=pairs)
+    assert [row[-1] for row in numbers(both[0]).rows] == ["no", "yes", "yes", "yes"]
+    assert numbers(both[0]).rows[0][1] == "10"
+    section = best(both)
+    rows = ranking(section)
+    assert rows[-1] == ("model2model/random", "not certified", Strong("40 ◂"), "–")
+    assert rows[2][:2] == ("model2model/sequential", Strong("20 ◂"))
+    assert "with the fewest tests, 20;" in section.blocks[0].parts[1]
+    report = content(plan, made, (), tmp_path)
+    assert report.verdict == "7 of 8 worlds are minimal: 94 % smaller on average"
+    assert report.figures[0] == ("7 of 8", "certified")
+    assert "1 cell not certified: the tables say why." in report.lead[-1].parts
+    words = [text.text for text in ElementTree.fromstring(chart(both[0])).iter(f"{SVG}text")]
+    assert "model2model/random: 1 model left after 10 tests, not certified" in words
+
+
+def test_half_a_success_is_none(tmp_path):
+    pairs = FIVE.rpartition(",")[0]
+    _, _, both = cells(tmp_path, *(10, -12), *(20, 22), *(30, 30), *(90, 90), *([50] * 8), pairs=pairs, seeds=2)
+    assert numbers(both[0]).rows[0][-1] == "1 of 2"
+    rows = ranking(best(both))
+    assert rows[-1][:2] == ("model2model/random", "10 (1 of 2 certified)")
+    assert rows[2][1] == Strong("21 ◂")
 
 
 @pytest.mark.parametrize(
@@ -91,14 +161,6 @@ def test_seeds_of_a_method_make_one_row(tmp_path):
 )
 def test_one_value_or_the_median_with_the_range(values, told):
     assert spread(values, lambda value: f"{value:.0f}") == told
-
-
-def test_what_could_not_be_tried_again_does_not_count_as_tried(tmp_path):
-    plan, made, _ = cells(tmp_path, 40, 30, 50, 20, pairs="model2model/random", seeds=2)
-    made[1:] = [replace(each, check=None) for each in made[1:]]
-    one, two = groups(plan, made)
-    assert behind(one).rows[0][4] == "f in 0 of 4; with all in 4 of 4"
-    assert behind(two).rows[0][4] == "–"
 
 
 def ranking(section):
@@ -110,7 +172,7 @@ def test_which_is_best_where(tmp_path):
     """In the first scenario the last method needs the fewest tests, on the whole the second one does."""
     _, _, both = cells(tmp_path, 40, 20, 30, 90, 19, *(40, 20, 30, 90, 80))
     rows = ranking(best(both))
-    # The baseline's four, f once, and the model left out without success; log2(16) bits: a test that costs 1 or 4 gives 0.46.
+    # The baseline's four, f once, and the model left out without success; log2(16) bits: a candidate that costs 1 or 4 gives 0.46.
     assert [row[1:] for row in rows[:2]] == [("9", "9", "1.0"), ("13", "13", "–")]
     assert [row[0] for row in rows[2:]] == [
         *(
@@ -135,7 +197,7 @@ def test_seeds_without_an_end_are_told_in_the_ranking(tmp_path):
     pairs = FIVE.rpartition(",")[0]
     _, _, both = cells(tmp_path, *(40, None), *(20, 22), *(30, 30), *(90, 90), *([50] * 8), pairs=pairs, seeds=2)
     rows = {row[0]: row for row in ranking(best(both))}
-    assert rows["model2model/random"][1] == "40 (1 of 2 seeds)"
+    assert rows["model2model/random"][1] == "40 (1 of 2 certified)"
     assert rows["model2model/sequential"][1] == Strong("21 ◂")
 
 

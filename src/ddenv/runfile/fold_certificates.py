@@ -26,6 +26,7 @@ def certificate_started(state: RunState, data: Data, _: float) -> Changes:
 
 
 def certificate_finished(state: RunState, data: Data, _: float) -> Changes:
+    _check_tests(state, data)
     claims = tuple(_claim(state, claim) for claim in data["claims"])
     last = replace(state.certificates[-1], claims=claims)
     return {"certificates": (*state.certificates[:-1], last)}
@@ -46,8 +47,16 @@ def _claim(state: RunState, data: Data) -> Claim:
     )
 
 
+def _check_tests(state: RunState, data: Data) -> None:
+    """The tests that it rests on have to be there."""
+    for test in data.get("tests", ()):
+        if not 0 < test <= len(state.tests):
+            raise ValueError(test)
+
+
 def rate_lost(state: RunState, data: Data, _: float) -> Changes:
     """What is left shows f too rarely: the run goes back to the last environment that keeps the rate."""
+    _check_tests(state, data)
     node, lost = here(state, data["node"]), here(state, data["lost"])
     for group in data["again"]:
         names(state.elements, group)

@@ -1,4 +1,7 @@
-"""How many tests a run takes: those still left by the engine's forecast, and a rough number before there is a run."""
+"""How many tests a run takes: those still left by the engine's forecast, and a rough number before there is a run.
+
+Both count the certificate, which ends every run.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,9 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
+from ddenv.settings import SETTINGS, Reduction, read
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST, BUSY = 50, 0.9
@@ -21,6 +26,15 @@ SCALE = {
 # Most candidates do not show f, and get all their re-runs.
 # Eight of ten random worlds took between `FEWER` and `MORE` times as many tests.
 RERUN, FEWER, MORE = 0.75, 0.35, 2.3
+# Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
+FEWEST_MISSES = 2
+# A certificate takes so many times the expected number of tests. From the rate `SURE` on, what is left runs alone.
+SHORTER, LONGER, SURE = 0.7, 2.2, 0.93
+# The maximum number of pairs, for what is left and for a removal; and how many models are left, if nothing is known.
+MOST_PAIRS, MOST_REMOVAL_PAIRS, SURVIVORS = 600, 120, 3
+# Logarithms of the wealth that the first certificate asks for, with what it costs to bet in several ways at once: that the rate is
+# kept, and that a single model is needed.
+FOR_KEPT, FOR_NEEDED = 4.4, 4.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,24 +46,53 @@ class Remaining:
 
 
 def remaining(state: RunState, at_work: bool) -> Remaining | None:
-    """What is left of a run. None if unknown: before the first round, after more tests than the engine expected, while
-    the result is confirmed, and at the end.
+    """What is left of a run: of its search, and its certificate. None if unknown: before the first round, after more tests than
+    were expected, and at the end.
 
     Without an engine `at_work` nothing runs, and the time is not known.
     """
-    forecast = state.forecast
-    if forecast is None or state.ended or state.confirming:
+    expected = None if state.ended else _expected(state)
+    if expected is None:
+        return None
+    running = len(state.running_tests) if at_work else 0
+    most = math.inf if state.budget is None else max(0, state.budget - state.tests_done)
+    low, likely, high = (int(min(most, max(running, each))) for each in expected)
+    each = _seconds_of_a_test(state) if at_work else None
+    return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
+
+
+def _expected(state: RunState) -> tuple[int, int, int] | None:
+    """How many tests are left, as (low, likely, high); None if unknown, or after more than were expected."""
+    if state.confirming:
+        now = state.certificate
+        return None if now is None else _of_certificate(state, now)
+    forecast, baseline = state.forecast, state.baseline
+    if forecast is None or baseline is None:
         return None
     done = state.tests_done - forecast.tests_done
     if done >= forecast.high:
         return None
-    running = len(state.running_tests) if at_work else 0
-    most = math.inf if state.budget is None else max(0, state.budget - state.tests_done)
-    low, likely, high = (
-        int(min(most, max(running, each - done))) for each in (forecast.low, forecast.likely, forecast.high)
-    )
-    each = _seconds_of_a_test(state) if at_work else None
-    return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))
+    left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
+    rate = (baseline.failures + 0.5) / (baseline.runs + 1)
+    certificate = certificate_tests(rate, _keep_rate(state), left, baseline.runs)
+    search = (max(0, each - done) for each in (forecast.low, forecast.likely, forecast.high))
+    low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
+    return low, likely, high
+
+
+def _of_certificate(state: RunState, now: Certificate) -> tuple[int, int, int] | None:
+    if now.claims:
+        return None
+    left = len(state.environment) - len(state.pinned.intersection(state.environment))
+    low, likely, high = certificate_tests(now.rate, now.keep_rate, left, now.at_least)
+    done = sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+    return None if done >= high else (max(0, low - done), max(0, likely - done), high - done)
+
+
+def _keep_rate(state: RunState) -> float:
+    """As it is in the run's settings; its default where they make no sense."""
+    value = read(state.scenario, SETTINGS["keep_rate"])
+    return value if isinstance(value, float) else float(str(SETTINGS["keep_rate"].default))
 
 
 def _seconds_of_a_test(state: RunState) -> float | None:
@@ -61,11 +104,59 @@ def _seconds_of_a_test(state: RunState) -> float | None:
     return sum(times) / len(times) / (1 + BUSY * (max(1, state.jobs) - 1)) if times else None
 
 
-def rough_tests(models: int, algorithm: str, iterations: int, as_printed: bool = False) -> tuple[int, int, int]:
-    """Tests of a reduction of this number of `models`, as (low, likely, high), without the baseline, for an unknown world."""
+def rough_tests(models: int, algorithm: str, runs: int, as_printed: bool = False) -> tuple[int, int, int]:
+    """Tests of a search in this number of `models`, as (low, likely, high), without the baseline, for an unknown world.
+
+    A candidate without f takes `runs` tests.
+    """
     key = "ddenv as printed" if algorithm == "ddenv" and as_printed else algorithm
     factor, power = SCALE.get(key, SCALE["ddenv"])
-    likely = factor * models**power * (1 + RERUN * iterations)
+    likely = factor * models**power * (1 + RERUN * (runs - 1))
     # A few models make few different candidates.
-    likely = min(likely, models**1.5 * (1 + iterations))
+    likely = min(likely, models**1.5 * runs)
     return math.floor(FEWER * likely), round(likely), math.ceil(MORE * likely)
+
+
+@dataclass(frozen=True, slots=True)
+class Rough:
+    """Tests of a whole run, as (low, likely, high): of the `search`, the baseline included, and of the `certificate`."""
+
+    search: tuple[int, int, int]
+    certificate: tuple[int, int, int]
+
+    @property
+    def tests(self) -> tuple[int, int, int]:
+        low, likely, high = (sum(each) for each in zip(self.search, self.certificate, strict=True))
+        return low, likely, high
+
+
+def rough_run(models: int, asked: Reduction) -> Rough:
+    """Before there is a run: of `models` that can be removed, if all runs of the baseline show f."""
+    runs = 1 + asked.iterations
+    runs = runs if asked.accept_rate == "first" else min(runs, FEWEST_MISSES)
+    search = rough_tests(models, asked.algorithm, runs, asked.growth == "paper")
+    low, likely, high = (asked.baseline_runs + each for each in search)
+    rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
+    certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs)
+    return Rough((low, likely, high), certificate)
+
+
+def certificate_tests(rate: float, keep_rate: float, left: int, at_least: int) -> tuple[int, int, int]:
+    """Tests of a certificate of `left` needed models that keep all of `rate`, as (low, likely, high).
+
+    Of what is left, alone or in pairs with the whole world, and without each model, in pairs as well; pairs of the whole world
+    are the same for all. The numbers follow `ddenv.reduction.certificate`: wealth grows as the square of the mean gain of a
+    pair over twice its second moment.
+    """
+    rate = min(max(rate, 0.05), 0.985)
+    needs = FOR_NEEDED + math.log(max(1, left))
+    removals = min(MOST_REMOVAL_PAIRS, max(at_least, needs / math.log(1 + 0.95 * keep_rate) / rate)) if left else 0
+    if rate >= SURE:
+        of_left, of_whole = max(at_least, 1.15 * FOR_KEPT / -math.log(keep_rate)), removals
+    else:
+        mean = rate * (1 - keep_rate)
+        moment = rate**2 * (1 - keep_rate) ** 2 + rate * (1 - rate) * (1 + keep_rate**2)
+        of_left = min(MOST_PAIRS, max(at_least, FOR_KEPT * 2 * moment / mean**2))
+        of_whole = max(of_left, removals)
+    likely = of_left + of_whole + left * removals
+    return math.floor(SHORTER * likely), round(likely), math.ceil(LONGER * likely)

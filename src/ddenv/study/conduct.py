@@ -17,7 +17,7 @@ from rich.cells import cell_len, set_cell_size
 
 from ddenv.errors import printable
 from ddenv.runfile.state import RunState
-from ddenv.runs.tests_left import remaining, rough_tests
+from ddenv.runs.tests_left import remaining, rough_run
 from ddenv.study.plan import Cell, Plan, Size, longest_first, sizes
 from ddenv.study.results import read_cell
 from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
@@ -42,10 +42,9 @@ def seconds_left(
 def _of_running(each: Work) -> float | None:
     """What one worker still needs, s; None if unknown."""
     left = remaining(each.state, True)
-    if left is not None and left.seconds is not None:
-        return left.seconds[1] * max(1, each.state.jobs)
-    # Full runs at the end, and the check: a handful of tests.
-    return 0.0 if each.check is not None or each.state.confirming else None
+    if left is None or left.seconds is None:
+        return None
+    return left.seconds[1] * max(1, each.state.jobs)
 
 
 def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> float | None:
@@ -65,13 +64,7 @@ def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> 
         one = [mean(costs)] if costs else []
     if not one:
         return None
-    return mean(one) * _expected(cell, size.models)
-
-
-def _expected(cell: Cell, models: int) -> int:
-    asked = cell.scenario.reduction
-    _, likely, _ = rough_tests(models, asked.algorithm, asked.iterations, asked.growth == "paper")
-    return asked.baseline_runs + likely
+    return mean(one) * rough_run(size.models, cell.scenario.reduction).tests[1]
 
 
 def _spent(state: RunState) -> float:
@@ -155,8 +148,9 @@ class Progress:
         if found.baseline is None:
             return found.problem
         sizes = f"{len(found.elements)} → {count(len(found.left), 'model')}"
-        doubt = f"; {'' if found.minimal else 'not minimal: '}{found.trouble}" if found.trouble else ""
-        return f"{sizes}, {count(found.tests, 'test')}, {duration(each.state.working_seconds)}{doubt}"
+        tests = f"{count(found.tests, 'test')} and {found.certificate_tests} for the certificate"
+        doubt = "" if found.minimal else f"; not certified: {found.problem}"
+        return f"{sizes}, {tests}, {duration(each.state.working_seconds)}{doubt}"
 
 
 def _fully(each: Work) -> str:
@@ -169,11 +163,10 @@ def _short(each: Work) -> str:
 
 def _doing(each: Work) -> str:
     state = each.state
-    if each.check is not None:
-        return "leaving each out once more"
     if state.baseline is None:
         return f"{state.tests_done} of {each.cell.scenario.reduction.baseline_runs} baseline runs"
-    return f"{len(state.environment)} of {len(state.elements)} models, {state.tests_done} tests"
+    models = f"{len(state.environment)} of {len(state.elements)} models"
+    return f"{models}, {'certificate, ' if state.confirming else ''}{state.tests_done} tests"
 
 
 # Time between two records of the study's time so far, s.
@@ -183,7 +176,7 @@ WRITE_PERIOD = 10.0
 def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
     """Makes the missing cells of a study in `folder` with `jobs` workers, and writes its results; returns the exit code.
 
-    0 means that every cell is minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
+    0 means that every cell is certified to be minimal, 1 that not all are, 130 that it was interrupted. Raises UserError.
     """
     worlds = sizes(plan)
     with opened(folder):
@@ -195,10 +188,10 @@ def conduct(plan: Plan, folder: Path, jobs: int, out: TextIO) -> int:
             interrupted = True
         page, found = write_study(plan, folder, sittings(folder))
     for each in found:
-        if each.trouble and each.cell.name in names:
-            print(printable(f"{each.cell.label}, seed {each.cell.seed}: {each.trouble}"), file=out)
-    minimal = sum(each.holds for each in found)
-    print(printable(f"{minimal} of {count(len(found), 'cell')} minimal; wrote {page}"), file=out, flush=True)
+        if each.problem and each.cell.name in names:
+            print(printable(f"{each.cell.label}, seed {each.cell.seed}: {each.problem}"), file=out)
+    minimal = sum(each.minimal for each in found)
+    print(printable(f"{minimal} of {count(len(found), 'cell')} certified; wrote {page}"), file=out, flush=True)
     if interrupted:
         print("interrupted; the same command continues", file=sys.stderr)
         return 130

@@ -23,9 +23,9 @@ WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
 
 
 def chart(group: Group) -> str:
-    """The chart of a scenario that has at least one minimal environment."""
+    """The chart of a scenario with at least one cell that came to an end."""
     named, others = _looks(group)
-    last = max(1, *(each.tests for each in group.minimal))
+    last = max(1, *(each.tests for each in group.over))
     most = max(1, group.models)
 
     def at(tests: float, models: float) -> tuple[float, float]:
@@ -47,18 +47,18 @@ def chart(group: Group) -> str:
 
 def _looks(group: Group) -> tuple[list[Row], list[Row]]:
     """The rows with their own colour, and all others: of many, the paper's methods and those with the fewest tests."""
-    rows = [row for row in group.rows if row.minimal]
+    rows = [row for row in group.rows if row.over]
     if len(rows) <= len(WIDTHS):
         return rows, []
     first = [row for row in rows if theirs(row.found[0].cell) is not None]
-    best = sorted((row for row in rows if row not in first), key=lambda row: row.tests or 0.0)
+    best = sorted((row for row in rows if row not in first), key=lambda row: (not row.certified, row.tests or 0.0))
     named = [*first, *best][: len(WIDTHS)]
     return named, [row for row in rows if row not in named]
 
 
 def _lines(row: Row, at: At, look: str, width: float | None = None) -> Iterator[str]:
     wide = "" if width is None else f' stroke-width="{width:g}"'
-    for each in row.minimal:
+    for each in row.over:
         corners = [at(*corner) for corner in steps(each.sizes)]
         line = "L".join(f"{x:.1f} {y:.1f}" for x, y in corners)
         title = escape(f"{plain(each.cell.label)}, seed {each.cell.seed}")
@@ -83,9 +83,10 @@ def _legend(named: Sequence[Row], others: Sequence[Row]) -> Iterator[str]:
 
 def _line_end(row: Row) -> str:
     if len(row.found) > 1:
-        return f"{row.method.label}, {len(row.minimal)} of {len(row.found)} seeds"
-    (only,) = row.minimal
-    return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}"
+        return f"{row.method.label}, {len(row.minimal)} of {len(row.found)} seeds certified"
+    (only,) = row.over
+    doubt = "" if only.minimal else ", not certified"
+    return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}{doubt}"
 
 
 # The maximum number of worlds drawn for a scenario, and of models named for each.
@@ -93,21 +94,22 @@ MOST_WORLDS, MOST_NAMES = 4, 12
 
 
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
-    """A map of each set of models that is left, the most frequent first; `file` is part of the pictures' names."""
+    """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
     sets: dict[tuple[str, ...], list[Found]] = {}
-    for each in group.minimal:
+    for each in group.over:
         sets.setdefault(each.left, []).append(each)
-    ranked = sorted(sets.items(), key=lambda one: -len(one[1]))
+    ranked = sorted(sets.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
     for number, (left, cells) in enumerate(ranked[:MOST_WORLDS], start=1):
-        yield say(*_said(left, len(cells), len(group.minimal)))
+        yield say(*_said(left, cells, len(group.over)))
         yield from _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
     if len(ranked) > MOST_WORLDS:
-        yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more minimal world')}, which fewer cells found.")
+        yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')}, which fewer cells found.")
 
 
-def _said(left: tuple[str, ...], cells: int, of_them: int) -> Iterator[Part]:
-    yield "The minimal world (the paper's Figure 3)"
-    yield f", the end of {cells} of {of_them} cells: " if of_them > 1 else ": "
+def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterator[Part]:
+    minimal = any(each.minimal for each in cells)
+    yield f"{'The minimal world' if minimal else 'What is left, not shown to be minimal'} (the paper's Figure 3)"
+    yield f", the end of {len(cells)} of {of_them} cells: " if of_them > 1 else ": "
     if not left:
         yield "nothing that can be removed"
     for number, name in enumerate(left[:MOST_NAMES]):

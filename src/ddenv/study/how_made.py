@@ -17,22 +17,31 @@ from ddenv.world.scenario import Scenario
 OF_A_CELL = ("algorithm", "pair", "seed", "budget")
 COLUMNS = (
     (
-        "tests",
-        "runs of the robot: the baseline, those behind each verdict, and the full runs at the end where tests were ended "
-        "early. Runs that idle workers made ahead of time and that were not needed do not count.",
+        "search tests",
+        "runs of the robot: the baseline, and those behind each verdict of the search. Runs that idle workers made ahead of time "
+        "and that were not needed do not count.",
+    ),
+    (
+        "certificate tests",
+        "runs with fresh seeds that the certificate rests on: of what is left, of that without each of its models, and of the "
+        "whole world; with steps back, those of all certificates.",
     ),
     ("% reduction", "the part of the models that was removed."),
-    ("minutes", "the time of these tests, one after another, as the paper made its tests."),
-    ("re-runs", "the share of tests that repeat a candidate whose first test did not show f (the paper's deflaking)."),
-    ("f in the whole world", "runs of the whole world that ended as f did."),
+    ("search minutes, certificate minutes", "the time of these tests, one after another, as the paper made its tests."),
     (
-        "left out once more",
-        "after the reduction: what is left, run again with unused seeds, and again without each of its models.",
+        "certified",
+        "whether the certificate shows that what is left keeps the rate of f (keep rate, above), and that it does not without any "
+        "one of its models.",
     ),
+    ("re-runs", "the share of the search tests that repeat a candidate (the paper's deflaking)."),
+    ("f in the whole world", "all runs of the whole world that ended as f did, with Wilson's 95 % interval."),
+    ("f in what is left", "runs with fresh seeds that ended so, with the interval."),
+    ("f without one of them", "the highest of these rates without one of the models that are left."),
+    ("steps back", "how often the search went back because a certificate showed that the rate of f was lost."),
     (
         "least tests",
-        "the minimum for any method: the baseline, f once in what is left, and each of its models left out without success, "
-        "with all re-runs.",
+        "the minimum for any search: the baseline, f once in what is left, and each of its models left out without success, with "
+        "as many runs as a candidate without f takes.",
     ),
 )
 
@@ -119,5 +128,5 @@ def _again(plan: Plan, folder: Path) -> list[Block]:
     example = plain(f"{start}/{RUNS}/{plan.cells[0].name}.ddenv")
     return [
         say("Each cell is a run that can be watched, continued and reported:"),
-        Code((f"ddenv open {shlex.quote(example)}", f"ddenv test {shlex.quote(example)} --minimal --leave-each-out")),
+        Code((f"ddenv open {shlex.quote(example)}", f"ddenv certify {shlex.quote(example)}")),
     ]

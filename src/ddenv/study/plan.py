@@ -10,6 +10,7 @@ from typing import Any
 
 from ddenv import schemas
 from ddenv.errors import UserError
+from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runs.scenarios import load_parts, with_options
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
@@ -19,6 +20,8 @@ SCENARIOS = ("ditch", "rubble", "friction")
 PAIRS = ("model2model/failure-proximal", "model2model/avg-trajectory-proximal", "timeseg/avg-trajectory-proximal")
 # A seed is less.
 MOST_SEED = 2**31
+# Between the seeds of a scenario. Run i has seed + i: the search has few runs, certificates have those from `FIRST_FRESH_RUN` on.
+SEEDS_APART = 10 * FIRST_FRESH_RUN
 # Characters that must not stand in the name of a file.
 NO_NAME = re.compile(r"[^\w-]+")
 # Bytes of a scenario's name in the names of files.
@@ -166,9 +169,9 @@ def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method
 
 
 def _cell(scenario: Scenario, method: Method, number: int) -> Cell:
-    """The seeds of a scenario: so far apart that two cells share either all runs or none."""
+    """The seeds of a scenario are so far apart that two cells share either all runs or none."""
     reduction = scenario.reduction
-    seed = reduction.seed + number * max(reduction.baseline_runs, 1 + reduction.iterations)
+    seed = reduction.seed + number * SEEDS_APART
     if seed >= MOST_SEED:
         raise UserError(f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}")
     asked = reduction.model_copy(update={"algorithm": method.algorithm, "pair": method.pair, "seed": seed})

@@ -56,19 +56,29 @@ class Row:
     found: tuple[Found, ...]
 
     @property
+    def over(self) -> tuple[Found, ...]:
+        """The cells that came to an end, whatever its certificate shows."""
+        return tuple(each for each in self.found if each.certificate is not None)
+
+    @property
     def minimal(self) -> tuple[Found, ...]:
-        """The cells with a minimal environment."""
+        """The cells whose certificate shows that their end is minimal."""
         return tuple(each for each in self.found if each.minimal)
 
     @property
+    def certified(self) -> bool:
+        """Whether all cells are minimal: only then its numbers are those of a success."""
+        return all(each.minimal for each in self.found)
+
+    @property
     def bound(self) -> float | None:
-        """The minimum of tests for any method to show this result, the median of the seeds; None if nothing is minimal."""
+        """The minimum of tests for any method to find this result, the median of the seeds; None if nothing is minimal."""
         bounds = [least_of(each, least_to_show) for each in self.minimal]
         return median(bounds) if bounds else None
 
     @property
     def tests(self) -> float | None:
-        """Their median."""
+        """Their median, without those of certificates; None if nothing is minimal."""
         return median(each.tests for each in self.minimal) if self.minimal else None
 
 
@@ -80,8 +90,13 @@ class Group:
     rows: tuple[Row, ...]
 
     @property
+    def over(self) -> tuple[Found, ...]:
+        """All cells that came to an end."""
+        return tuple(each for row in self.rows for each in row.over)
+
+    @property
     def minimal(self) -> tuple[Found, ...]:
-        """All cells that have a minimal environment."""
+        """All cells that are minimal."""
         return tuple(each for row in self.rows for each in row.minimal)
 
     @property
@@ -101,8 +116,7 @@ def groups(plan: Plan, found: Sequence[Found]) -> tuple[Group, ...]:
 
 def least_of(found: Found, bound: Callable[[int, int, int, int], int]) -> int:
     """One of the bounds for a cell that is minimal."""
-    reduction = found.cell.scenario.reduction
-    return bound(len(found.elements), len(found.left), reduction.iterations, reduction.baseline_runs)
+    return bound(len(found.elements), len(found.left), found.misses, found.cell.scenario.reduction.baseline_runs)
 
 
 def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
@@ -114,24 +128,24 @@ def spread(values: Sequence[float], said: Callable[[float], str]) -> str:
     return middle if low == high else f"{middle} ({low} to {high})"
 
 
-def least_to_show(models: int, needed: int, iterations: int, baseline_runs: int) -> int:
-    """The minimum of tests to show that `needed` of `models` models are minimal, for any method.
+def least_to_show(models: int, needed: int, misses: int, baseline_runs: int) -> int:
+    """The minimum of tests for a search that ends at `needed` of `models` models, for any method, without its certificate.
 
     After the baseline, f has to show once in what is left, and each of its models has to be left out without success, with
-    `1 + iterations` tests each.
+    `misses` tests each.
     """
-    return baseline_runs + (1 if needed < models else 0) + needed * (1 + iterations)
+    return baseline_runs + (1 if needed < models else 0) + needed * misses
 
 
-def least_to_find(models: int, needed: int, iterations: int, baseline_runs: int) -> int:
+def least_to_find(models: int, needed: int, misses: int, baseline_runs: int) -> int:
     """The minimum of tests to find them, on average, if each set of that size is equally likely.
 
-    A candidate without f costs 1 + iterations tests, one with f at least one. So a test gives at most log2(1/x) bits, where
-    x + x^(1 + iterations) = 1 (Kraft's inequality; one bit a test without re-runs), and log2 C(n, k) bits are needed. A
-    method that knows more, such as that models near f are likelier, may need less.
+    A candidate without f costs `misses` tests, one with f at least one. So a test gives at most log2(1/x) bits, where
+    x + x^misses = 1 (Kraft's inequality; one bit a test if one miss is enough), and log2 C(n, k) bits are needed. A method that
+    knows more, such as that models near f are likelier, may need less.
     """
-    least = math.log(math.comb(models, needed)) / -math.log(_root(1 + iterations))
-    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, iterations, baseline_runs))
+    least = math.log(math.comb(models, needed)) / -math.log(_root(misses))
+    return max(baseline_runs + math.ceil(least - 1e-9), least_to_show(models, needed, misses, baseline_runs))
 
 
 def _root(cost: int) -> float:

@@ -45,11 +45,6 @@ def run_path(folder: Path, cell: Cell) -> Path:
     return folder / RUNS / f"{cell.name}{SUFFIX}"
 
 
-def check_path(folder: Path, cell: Cell) -> Path:
-    """The file with the check of a cell: what is left, run again without each of its models."""
-    return folder / RUNS / f"{cell.name}.check.json"
-
-
 @contextmanager
 def opened(folder: Path) -> Iterator[None]:
     """Creates the folder if needed, and locks it against other studies. Raises UserError."""

@@ -25,7 +25,7 @@ from ddenv.world.files.access import write_file
 def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:
     """The page of a study; `found` are the cells of `plan` in its order."""
     rows = groups(plan, found)
-    minimal = [each for each in found if each.holds]
+    minimal = [each for each in found if each.minimal]
     sections = [best(rows), *(section(folder, group) for group in rows), making(plan, found, sittings, folder)]
     return Report(
         name="ddenv study",
@@ -51,7 +51,8 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
         say(
             "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
             "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, "
-            "and stops when no single model can be left out."
+            "and stops when no single model can be left out. Runs with fresh seeds then certify what is left: it keeps at least "
+            f"{_shares(found)} of the whole world's failure rate, and less without any one of its models."
         )
     ]
     pairs = [(each, theirs(each.cell)) for each in minimal]
@@ -60,10 +61,12 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
         better = sum(each.smaller >= paper.smaller for each, paper in beside)
         fewer = sum(each.tests <= paper.tests for each, paper in beside)
         ours, hours = sum(each.seconds for each, _ in beside), sum(paper.minutes for _, paper in beside) / 60
+        more = sum(each.certificate_seconds for each, _ in beside)
         lead.append(
             say(
                 f"Compared with the same {count(len(beside), 'cell')} of the paper: at least as much removed in {better}, not more "
-                f"tests in {fewer}. They took {hours:.0f} hours there; here their tests take {duration(ours)}, one after another. "
+                f"tests in {fewer}. They took {hours:.0f} hours there; here the searches take {duration(ours)}, one test after "
+                f"another, and the certificates, which the paper does not have, {duration(more)}. "
                 "The worlds follow the paper's descriptions but are not its worlds, and the simulator differs: compare the methods "
                 "with each other, and the minutes only roughly with the paper's."
             )
@@ -71,21 +74,27 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
     if missing := len(found) - len(minimal):
         lead.append(
             say(
-                f"{count(missing, 'cell')} without a world that is shown to be minimal: the tables say why.",
+                f"{count(missing, 'cell')} not certified: the tables say why.",
                 notice=True,
             )
         )
     return lead
 
 
+def _shares(found: Sequence[Found]) -> str:
+    """The shares of the whole world's rate that have to be kept."""
+    return " or ".join(percent(share) for share in sorted({each.cell.scenario.reduction.keep_rate for each in found}))
+
+
 def _figures(
     found: Sequence[Found], minimal: Sequence[Found], sittings: Sequence[Sitting]
 ) -> tuple[tuple[str, str], ...]:
     seconds, jobs = sum(each.seconds for each in sittings), sorted({each.jobs for each in sittings})
-    figures = [(f"{len(minimal)} of {len(found)}", "minimal")]
+    figures = [(f"{len(minimal)} of {len(found)}", "certified")]
     if minimal:
         figures.append((percent(mean(each.smaller for each in minimal)), "smaller, mean"))
-    figures.append((thousands(sum(each.tests for each in found)), "tests"))
+    figures.append((thousands(sum(each.tests for each in found)), "search tests"))
+    figures.append((thousands(sum(each.certificate_tests for each in found)), "certificate tests"))
     if sittings:
         workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
         made = thousands(sum(each.tests for each in sittings))
@@ -96,18 +105,10 @@ def _figures(
 STEM = "study"
 # The columns of `study.csv`.
 HEADER = (
-    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "minimal", "problem"),
-    *("models", "left", "reduction", "names", "tests", "reruns", "ahead", "taken_over", "seconds"),
-    *(
-        "baseline_runs",
-        "baseline_f",
-        "least_to_show",
-        "least_to_find",
-        "check_runs",
-        "check_f",
-        "check_without",
-        "check_without_f",
-    ),
+    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "certified", "problem"),
+    *("models", "left", "reduction", "names", "tests", "reruns", "certificate_tests", "ahead", "taken_over"),
+    *("seconds", "certificate_seconds", "steps_back", "baseline_runs", "baseline_f", "least_to_show", "least_to_find"),
+    *("keep_rate", "whole_runs", "whole_f", "left_runs", "left_f", "left_low", "left_high", "without_most"),
     *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
 )
 
@@ -133,19 +134,16 @@ def table(folder: Path, found: Sequence[Found]) -> str:
 
 
 def _row(folder: Path, each: Found) -> tuple[object, ...]:
-    cell, base, check, paper = each.cell, each.baseline, each.check, theirs(each.cell)
+    cell, base, paper = each.cell, each.baseline, theirs(each.cell)
     used = dict(zip(("partitioning", "prioritization"), cell.method.parts, strict=True))
-    of_check: tuple[object, ...] = ("", "", "", "")
-    if check is not None:
-        without = check.runs * len(check.without), sum(check.without.values())
-        of_check = (check.runs, check.shown, *without)
     return (
-        *(cell.scenario.name, cell.method.algorithm, *used.values(), cell.seed, each.minimal, each.trouble),
+        *(cell.scenario.name, cell.method.algorithm, *used.values(), cell.seed, each.minimal, each.problem),
         *(len(each.elements), len(each.left), round(each.smaller, 4), " ".join(each.left)),
-        *(each.tests, each.reruns, each.ahead, each.taken, round(each.seconds, 2)),
+        *(each.tests, each.reruns, each.certificate_tests, each.ahead, each.taken),
+        *(round(each.seconds, 2), round(each.certificate_seconds, 2), each.steps_back),
         *(("", "") if base is None else (base.runs, base.failures)),
         *((least_of(each, least_to_show), least_of(each, least_to_find)) if each.minimal else ("", "")),
-        *of_check,
+        *_of_certificate(each),
         *(("", "", "") if paper is None else (paper.tests, paper.smaller, paper.minutes)),
         *(
             each.version,
@@ -153,3 +151,14 @@ def _row(folder: Path, each: Found) -> tuple[object, ...]:
             run_path(folder, cell).relative_to(folder),
         ),
     )
+
+
+def _of_certificate(each: Found) -> tuple[object, ...]:
+    """The share to keep; the runs of the whole world and of what is left; the highest rate without one of its models."""
+    if each.certificate is None:
+        return ("",) * 8
+    left, *removals = each.certificate.claims
+    most = max((claim.shown / claim.runs for claim in removals if claim.runs), default=None)
+    of_left = (left.runs, left.shown, round(left.low, 4), round(left.high, 4))
+    whole = (each.certificate.keep_rate, each.whole_runs, each.whole_shown)
+    return (*whole, *of_left, "" if most is None else round(most, 4))

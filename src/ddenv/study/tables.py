@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, plain, say
+from ddenv.rates import wilson_interval
 from ddenv.study.figures import chart, worlds
 from ddenv.study.plan import Method, file_name
 from ddenv.study.results import Found
@@ -31,34 +32,48 @@ def section(folder: Path, group: Group) -> Section:
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
     blocks.append(numbers(group))
     blocks += _problems(group)
-    if group.minimal:
+    if group.over:
         blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
-        title = "Models left after each test, a line for each method (the paper's Figure 2):"
-        blocks += [say(title), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), title)]
+        caption = "Models left after each test of the search, a line for each method (the paper's Figure 2):"
+        blocks += [say(caption), Picture(f"figure-2-{file_name(group.scenario)}", chart(group), caption)]
     blocks += worlds(folder, group, file_name(group.scenario))
     return Section(title, tuple(blocks))
 
 
 def numbers(group: Group) -> Table:
-    """Tests, reduction and minutes, beside the paper's if it has them."""
+    """Tests, reduction and minutes, beside the paper's if it has them, and whether the result is certified."""
     beside = _has_theirs(group)
-    head: tuple[str, ...] = ("partitioning, prioritization", "tests", "% reduction", "minutes")
+    search, certificate = ("search tests", "certificate tests"), ("search minutes", "certificate minutes")
+    head: tuple[str, ...] = ("partitioning, prioritization", *search, "% reduction", *certificate, "certified")
     if beside:
-        head = (head[0], "tests", "paper", "% reduction", "paper", "minutes", "paper")
+        ours = (search[0], "paper", search[1], "% reduction", "paper", certificate[0], "paper", certificate[1])
+        head = (head[0], *ours, head[-1])
     rows = tuple(_numbers(row, beside) for row in group.rows)
-    return Table(head, rows, frozenset(range(1, len(head))))
+    return Table(head, rows, frozenset(range(1, len(head) - 1)))
 
 
 def _numbers(row: Row, beside: bool) -> tuple[Cell, ...]:
-    minimal = row.minimal
-    tests = spread([each.tests for each in minimal], _whole)
-    smaller = spread([each.smaller for each in minimal], percent)
-    minutes = spread([each.seconds / 60 for each in minimal], _minutes)
+    over = row.over
+    tests = spread([each.tests for each in over], _whole)
+    fresh = spread([each.certificate_tests for each in over], _whole)
+    smaller = spread([each.smaller for each in over], percent)
+    minutes = spread([each.seconds / 60 for each in over], _minutes)
+    more = spread([each.certificate_seconds / 60 for each in over], _minutes)
     if not beside:
-        return row.method.label, tests, smaller, minutes
+        return row.method.label, tests, fresh, smaller, minutes, more, _certified(row)
     paper = theirs(row.found[0].cell)
-    beside_it = ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
-    return row.method.label, tests, beside_it[0], smaller, beside_it[1], minutes, beside_it[2]
+    one, two, three = (
+        ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
+    )
+    return row.method.label, tests, one, fresh, smaller, two, minutes, three, more, _certified(row)
+
+
+def _certified(row: Row) -> str:
+    if not row.over:
+        return "–"
+    if len(row.found) == 1:
+        return "yes" if row.certified else "no"
+    return f"{len(row.minimal)} of {len(row.found)}"
 
 
 def _whole(value: float) -> str:
@@ -73,44 +88,78 @@ def _has_theirs(group: Group) -> bool:
     return any(theirs(row.found[0].cell) is not None for row in group.rows)
 
 
+BEHIND = (
+    *("method", "re-runs", "models left", "f in the whole world", "f in what is left", "f without one of them"),
+    *("steps back", "least tests"),
+)
+
+
 def behind(group: Group) -> Table:
-    """Details: re-runs, how often the whole world fails, what is left, and the check of it."""
-    head = ("method", "re-runs", "f in the whole world", "models left", "left out once more", "least tests")
-    return Table(head, tuple(_behind(row) for row in group.rows), frozenset({1, 2, 5}))
+    """Details: re-runs, what is left, how often f shows in it, in the whole world and without one of the models."""
+    return Table(BEHIND, tuple(_behind(row) for row in group.rows), frozenset({1, 6, 7}))
 
 
 def _in_short(group: Group) -> Iterator[Paragraph]:
     """The details of many methods, a sentence for each set of models that is left."""
     sets: dict[tuple[str, ...], list[Found]] = {}
-    for each in group.minimal:
+    for each in group.over:
         sets.setdefault(each.left, []).append(each)
     for left, cells in sets.items():
         reruns = spread([each.reruns / each.tests for each in cells], percent)
-        words = f" are left in {len(cells)} of {count(len(group.minimal), 'cell')}; re-runs {reruns} of the tests; "
-        yield say(*_names(left), f"{words}left out once more: {_again(tuple(cells))}.")
+        certified = f"certified in {sum(each.minimal for each in cells)} of them; re-runs {reruns} of the search tests"
+        rates = f"f in the whole world {_in_whole(cells)}, in what is left {_in_left(cells)}"
+        words = (
+            f" are left in {len(cells)} of {count(len(group.over), 'cell')}, {certified}; {rates}, without one of them "
+        )
+        yield say(*_names(left), f"{words}{_without(cells)}.")
 
 
 def _behind(row: Row) -> tuple[Cell, ...]:
-    minimal = row.minimal
-    reruns = spread([each.reruns / each.tests for each in minimal if each.tests], percent)
+    over = row.over
+    reruns = spread([each.reruns / each.tests for each in over if each.tests], percent)
     bound = "–" if row.bound is None else f"{row.bound:g}"
-    return row.method.label, reruns, _rate(row), _left(minimal), _again(minimal), bound
+    back = spread([each.steps_back for each in over], _whole)
+    rates = (_in_whole(row.found), _in_left(over), _without(over))
+    return row.method.label, reruns, _left(over), *rates, back, bound
 
 
-def _rate(row: Row) -> str:
-    runs = sum(each.baseline.runs for each in row.found if each.baseline)
-    return f"{sum(each.baseline.failures for each in row.found if each.baseline)} of {runs}" if runs else "–"
+def _in_whole(cells: Sequence[Found]) -> str:
+    """How often f showed in all runs of the whole world."""
+    return _rate(sum(each.whole_shown for each in cells), sum(each.whole_runs for each in cells))
 
 
-def _left(minimal: tuple[Found, ...]) -> Cell:
-    """Each set of models that is left, the most frequent first."""
-    if not minimal:
+def _in_left(cells: Sequence[Found]) -> str:
+    """How often f showed in fresh runs of what is left."""
+    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without is None]
+    return _rate(sum(claim.shown for claim in claims), sum(claim.runs for claim in claims))
+
+
+def _without(cells: Sequence[Found]) -> str:
+    """How often f showed in fresh runs without one of the models that are left: the highest of these rates."""
+    claims = [claim for each in cells if each.certificate for claim in each.certificate.claims if claim.without]
+    if not claims:
         return "–"
-    sets = Counter(each.left for each in minimal)
+    most = max(claims, key=lambda claim: claim.high)
+    return f"at most {_rate(most.shown, most.runs)}"
+
+
+def _rate(shown: int, runs: int) -> str:
+    """With Wilson's 95 % interval: "9 of 10 (60 % to 98 %)"."""
+    if not runs:
+        return "–"
+    low, high = wilson_interval(shown, runs)
+    return f"{shown} of {runs} ({percent(low)} to {percent(high)})"
+
+
+def _left(over: tuple[Found, ...]) -> Cell:
+    """Each set of models that is left, the most frequent first."""
+    if not over:
+        return "–"
+    sets = Counter(each.left for each in over)
     words: list[Part] = []
     for left, times in sets.most_common():
         words += ["; " if words else "", *_names(left)]
-        words += [f" ({times} of {len(minimal)})"] if len(sets) > 1 else []
+        words += [f" ({times} of {len(over)})"] if len(sets) > 1 else []
     return tuple(words)
 
 
@@ -124,27 +173,16 @@ def _names(left: tuple[str, ...]) -> Iterator[Part]:
         yield f" and {len(left) - MOST_NAMES} more"
 
 
-def _again(minimal: tuple[Found, ...]) -> str:
-    """How often f shows with new seeds: with all that is left, and without each model."""
-    checks = [each.check for each in minimal if each.check is not None]
-    if not checks:
-        return "–"
-    shown, runs = sum(check.shown for check in checks), sum(check.runs for check in checks)
-    without = sum(sum(check.without.values()) for check in checks)
-    of_them = sum(check.runs * len(check.without) for check in checks)
-    return f"f in {without} of {of_them}; with all in {shown} of {runs}"
-
-
 def _problems(group: Group) -> Iterator[Paragraph]:
-    """The cells without a minimal environment, and why."""
+    """The cells that are not certified, and why."""
     cells: dict[str, list[str]] = {}
     for row in group.rows:
         for each in row.found:
-            if problem := plain(each.trouble).rstrip("."):
+            if problem := plain(each.problem).rstrip("."):
                 cells.setdefault(problem, []).append(f"{row.method.label}, seed {each.cell.seed}")
     for problem, names in cells.items():
         which = "; ".join(names) if len(names) <= MOST_CELLS else count(len(names), "cell")
-        yield say(f"{which}: {problem}.", notice=True)
+        yield say(f"Not certified: {which}: {problem}.", notice=True)
 
 
 # A comparison needs at least this many methods.
@@ -157,12 +195,14 @@ def best(groups: Sequence[Group]) -> Section | None:
     if len(methods) < FEWEST or not any(group.minimal for group in groups):
         return None
     ranked = sorted(zip(methods, zip(*(group.rows for group in groups), strict=True), strict=True), key=_rank)
-    least = [min((row.tests for row in group.rows if row.tests is not None), default=None) for group in groups]
+    least = [
+        min((tests for row in group.rows if (tests := _certain(row)) is not None), default=None) for group in groups
+    ]
     rows = [_row(method, rows, least) for method, rows in ranked]
     shown, likely = (tuple(_bound(group, bound) for group in groups) for bound in (least_to_show, least_to_find))
     head = ("method", *(f"{plain(group.scenario.name)}, tests" for group in groups), "times the bound, mean")
     bounds = (
-        ("minimum to show that what is left is minimal", *shown, "1.0"),
+        ("minimum for a search that ends there", *shown, "1.0"),
         ("minimum to find it, if all sets are equally likely", *likely, "–"),
     )
     table = Table(head, (*bounds, *rows), frozenset(range(1, len(head))))
@@ -170,14 +210,14 @@ def best(groups: Sequence[Group]) -> Section | None:
 
 
 def _rank(entry: tuple[Method, tuple[Row, ...]]) -> tuple[bool, float]:
-    """By the mean ratio of tests to bound; methods that are not minimal everywhere come last."""
+    """By the mean ratio of tests to bound; methods that are not certified everywhere come last."""
     times = _times(entry[1])
     return times is None, times or 0.0
 
 
 def _times(rows: Sequence[Row]) -> float | None:
     """The geometric mean of tests to bound: each scenario has the same weight, whatever its number of tests."""
-    ratios = [row.tests / row.bound for row in rows if row.tests is not None and row.bound]
+    ratios = [tests / row.bound for row in rows if (tests := _certain(row)) is not None and row.bound]
     if len(ratios) < len(rows):
         return None
     return math.exp(sum(map(math.log, ratios)) / len(ratios))
@@ -189,12 +229,17 @@ def _row(method: Method, rows: Sequence[Row], least: Sequence[float | None]) -> 
     return method.label, *cells, "–" if times is None else f"{times:.1f}"
 
 
+def _certain(row: Row) -> float | None:
+    """The tests of a method that is certified with all seeds; None for another, which is no success."""
+    return row.tests if row.certified else None
+
+
 def _cell(row: Row, fewest: float | None) -> Cell:
     if row.tests is None:
-        return "not minimal" if any(each.elements for each in row.found) else "not made yet"
-    said = f"{row.tests:g}"
-    said = said if len(row.minimal) == len(row.found) else f"{said} ({len(row.minimal)} of {len(row.found)} seeds)"
-    return Strong(f"{said} ◂") if row.tests == fewest else said
+        return "not certified" if any(each.elements for each in row.found) else "not made yet"
+    if not row.certified:
+        return f"{row.tests:g} ({len(row.minimal)} of {len(row.found)} certified)"
+    return Strong(f"{row.tests:g} ◂") if row.tests == fewest else f"{row.tests:g}"
 
 
 def _bound(group: Group, bound: Callable[[int, int, int, int], int]) -> str:
@@ -205,31 +250,26 @@ def _bound(group: Group, bound: Callable[[int, int, int, int], int]) -> str:
     return str(bounds[0]) if len(bounds) == 1 else f"{bounds[0]} to {bounds[-1]}"
 
 
-def _fewest(row: Row) -> float:
-    return row.tests or 0.0
-
-
 def _words(groups: Sequence[Group]) -> list[Block]:
     lines: list[Block] = []
     for group in groups:
-        rows = [row for row in group.rows if row.tests is not None]
+        rows = [(tests, row) for row in group.rows if (tests := _certain(row)) is not None]
         if rows:
-            first, last = min(rows, key=_fewest), max(rows, key=_fewest)
-            equal = sum(row.tests == first.tests for row in rows) - 1
+            fewest, first = min(rows, key=lambda one: one[0])
+            most, last = max(rows, key=lambda one: one[0])
+            equal = sum(tests == fewest for tests, _ in rows) - 1
             also = f" and {count(equal, 'other')}" if equal else ""
-            words = (
-                f": {first.method.label}{also} with the fewest tests, {first.tests:g}; "
-                f"{last.method.label} with the most, {last.tests:g}."
-            )
+            words = f": {first.method.label}{also} with the fewest tests, {fewest:g}; {last.method.label} with the most, {most:g}."
             lines.append(say(Strong(plain(group.scenario.name)), words))
     return lines
 
 
 def _about_the_bound() -> Block:
     return say(
-        "Ranked by the ratio of tests to the first bound (geometric mean over the scenarios). No method needs fewer tests: after "
-        "the baseline, f has to show in what is left, and each of its models has to be left out without success, with all re-runs. "
-        "The second bound is for methods without any knowledge: the mean number of tests to find the needed set of models, if all "
-        "sets of that size are equally likely. A method that first tries models near the failure may need fewer. The mark (◂) "
-        "shows the fewest tests."
+        "Search tests, the baseline included; certificates cost about the same after each method. Ranked by the ratio of tests to "
+        "the first bound (geometric mean over the scenarios); a method that is not certified with every seed is not ranked. No "
+        "search needs fewer tests: after the baseline, f has to show in what is left, and each of its models has to be left out "
+        "without success, with as many runs as a candidate without f takes. The second bound is for methods without any "
+        "knowledge: the mean number of tests to find the needed set of models, if all sets of that size are equally likely. A "
+        "method that first tries models near the failure may need fewer. The mark (◂) shows the fewest tests."
     )

@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
 
+from ddenv.claims import current
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
@@ -19,8 +19,8 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
 from ddenv.study.plan import Cell
-from ddenv.study.results import difference, read_check, start_check, write_check
-from ddenv.study.study_folder import check_path, run_path
+from ddenv.study.results import difference
+from ddenv.study.study_folder import run_path
 
 POLL = 0.2
 # With more workers, most of the additional tests are not needed.
@@ -41,7 +41,6 @@ class Work:
     file: RunFile
     state: RunState = field(default_factory=RunState)
     engine: subprocess.Popen[bytes] | None = None
-    check: tuple[subprocess.Popen[bytes], IO[str]] | None = None
     problem: str = ""
     made_before: int = 0
     known: int = 0
@@ -63,9 +62,14 @@ def is_done(folder: Path, cell: Cell) -> bool:
         raise UserError(f"{error}; delete that file, or choose another folder with -o") from None
     if other:
         raise UserError(f"{path}: was made with {other}; choose another folder with -o, or delete {path.parent}")
-    if state.status != "finished" or _all_broke(state) or engine_is_alive(path):
-        return False
-    return not state.minimal or read_check(folder, cell, state.environment) is not None
+    return _is_over(state) and not _all_broke(state) and not engine_is_alive(path)
+
+
+def _is_over(state: RunState) -> bool:
+    """Whether an engine has nothing to do: it makes tests again that broke, if the certificate is open without them."""
+    certificate = current(state)
+    broke = certificate is not None and any(claim.verdict == "unknown" for claim in certificate.claims)
+    return state.status == "finished" and not broke
 
 
 def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
@@ -87,7 +91,7 @@ def work(folder: Path, cells: Sequence[Cell], jobs: int, look: Look) -> None:
                 workers = max(min(PER_CELL, free), free // len(waiting))
                 running.append(_begin(folder, waiting.pop(0), workers))
             for each in tuple(running):
-                if _has_ended(folder, each):
+                if _has_ended(each):
                     running.remove(each)
                     ended.append(each)
                     each.file.close()
@@ -117,22 +121,18 @@ def _begin(folder: Path, cell: Cell, workers: int) -> Work:
         if all_broke:
             path.unlink()
     if not path.exists():
-        # A check of an earlier run with this name does not hold for this one.
-        check_path(folder, cell).unlink(missing_ok=True)
         create_run(cell.scenario, path)
     each = Work(cell, path, workers, RunFile(path))
     each.state = fold(each.file.events())
     each.made_before = tests_made(each.state)
     each.known = each.state.revision
-    if not engine_is_alive(path) and each.state.status != "finished":
+    if not engine_is_alive(path) and not _is_over(each.state):
         each.engine = start_engine(path, workers, accept_mode="automatic", share=path.parent)
     return each
 
 
-def _has_ended(folder: Path, each: Work) -> bool:
-    """Reads a cell's new events, and starts its check when its reduction has ended."""
-    if each.check is not None:
-        return _check_has_ended(folder, each, *each.check)
+def _has_ended(each: Work) -> bool:
+    """Reads a cell's new events."""
     # This comes before the events are read, so none is missed. The engine of a killed study may have started just before ours, and
     # then ours gave up.
     at_work = (each.engine is not None and each.engine.poll() is None) or engine_is_alive(each.path)
@@ -143,21 +143,6 @@ def _has_ended(folder: Path, each: Work) -> bool:
         # If an engine died before it wrote anything, the reason in the file is an earlier engine's.
         ended = each.state.ended and each.state.revision > each.known
         each.problem = each.state.reason if ended else last_words(each.path)
-        return True
-    if not each.state.minimal or read_check(folder, each.cell, each.state.environment) is not None:
-        return True
-    each.check = start_check(each.path, each.cell, each.workers)
-    return False
-
-
-def _check_has_ended(folder: Path, each: Work, program: subprocess.Popen[bytes], output: IO[str]) -> bool:
-    if program.poll() is None:
-        return False
-    try:
-        write_check(folder, each.cell, output)
-    except UserError as error:
-        each.problem = str(error)
-    output.close()
     return True
 
 
@@ -173,12 +158,9 @@ def tests_made(state: RunState) -> int:
 
 
 def _stop(running: Sequence[Work]) -> None:
-    """Stops engines, which record it, and checks, which are made again later."""
-    for each in running:
-        if each.check is not None:
-            each.check[0].terminate()
+    """Stops engines, which record it."""
     # On cells without an engine of ours, the engine of an earlier, killed study works.
-    left = [each for each in running if each.check is None and each.engine is None and engine_is_alive(each.path)]
+    left = [each for each in running if each.engine is None and engine_is_alive(each.path)]
     for each in left:
         with contextlib.suppress(UserError):
             each.file.send("stop")

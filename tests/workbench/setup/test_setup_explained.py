@@ -63,7 +63,7 @@ async def test_each_field_says_what_it_means_and_costs(scenarios):
         session.screen.query_one("#iterations").focus()
         session.fill(iterations="7")
         await session.pilot.pause()
-        assert session.explained()[1].endswith("A candidate without f costs 8 tests.")
+        assert session.explained()[1].endswith("A candidate without f costs at most 8 tests.")
 
 
 UNUSED = {

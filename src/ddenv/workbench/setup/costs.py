@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.tests_left import rough_tests
+from ddenv.runs.tests_left import rough_run
 from ddenv.workbench.wording import count, duration
 
 if TYPE_CHECKING:
@@ -72,16 +72,18 @@ def _positive(value: Any) -> float | None:
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
-    rough = rough_tests(models, reduction.algorithm, reduction.iterations, reduction.growth == "paper")
-    low, middle, high = (tests + reduction.baseline_runs for tests in rough)
+    rough = rough_run(models, reduction)
+    low, middle, high = rough.tests
     budget = getattr(reduction, "budget", None)
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
-    words = f"about {count(middle, 'test')} ({low} to {high})"
+    words, parts = f"about {count(middle, 'test')} ({low} to {high})", f"about {rough.certificate[1]} the certificate"
     if budget is not None and middle >= budget:
-        words = f"{count(budget, 'test')} at most"
+        # The certificate may not be reached.
+        words, parts = f"{count(budget, 'test')} at most", ""
     if past.seconds is None:
-        return f"{words}; {UNKNOWN_TIME} of {count(reduction.baseline_runs, 'test')}"
+        of_them = f", of them {parts}" if parts else ""
+        return f"{words}{of_them}; {UNKNOWN_TIME} of {count(reduction.baseline_runs, 'test')}"
     spent = duration(middle * past.seconds / jobs)
-    before = f"{reduction.baseline_runs} of them the baseline; {past.seconds:.1f} s a test in earlier runs"
-    return f"{words}, {spent} with {count(jobs, 'job')}; {before}"
+    parts = ", ".join(filter(None, (f"{reduction.baseline_runs} of them the baseline", parts)))
+    return f"{words}, {spent} with {count(jobs, 'job')}; {parts}; {past.seconds:.1f} s a test in earlier runs"

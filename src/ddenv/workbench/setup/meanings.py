@@ -34,7 +34,7 @@ def cost(field: Field, texts: Mapping[str, str], now: Circumstances) -> str:
     number = _number(texts.get(field.id, ""))
     match field.id:
         case "iterations" if number is not None:
-            return f"A candidate without f costs {count(1 + int(number), 'test')}."
+            return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
         case "baseline_runs" if number is not None:
             return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
         case "timeout" if number is not None:
