@@ -75,10 +75,10 @@ def certified(rate, keep_rate, left, at_least, random):
 @pytest.mark.parametrize("left", [1, 3])
 def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, keep_rate, left):
     random = Random(1)
-    made = [certified(rate, keep_rate, left, 10, random) for _ in range(25)]
+    made = [certified(rate, keep_rate, left, 10, random) for _ in range(40)]
     low, likely, high = certificate_tests(rate, keep_rate, left, 10)
     assert low <= median(made) <= high
-    assert 0.5 <= likely / median(made) <= 2
+    assert low < likely < high
 
 
 def test_a_rough_run_has_its_certificate():

@@ -29,12 +29,12 @@ RERUN, FEWER, MORE = 0.75, 0.35, 2.3
 # Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
 FEWEST_MISSES = 2
 # A certificate takes so many times the expected number of tests. From the rate `SURE` on, what is left runs alone.
-SHORTER, LONGER, SURE = 0.7, 2.2, 0.93
+SHORTER, LONGER, SURE = 0.5, 2.2, 0.93
 # The maximum number of pairs, for what is left and for a removal; and how many models are left, if nothing is known.
-MOST_PAIRS, MOST_REMOVAL_PAIRS, SURVIVORS = 600, 120, 3
+MOST_PAIRS, MOST_REMOVAL_PAIRS, SURVIVORS = 600, 240, 3
 # Logarithms of the wealth that the first certificate asks for, with what it costs to bet in several ways at once: that the rate is
 # kept, and that a single model is needed.
-FOR_KEPT, FOR_NEEDED = 4.4, 4.5
+FOR_KEPT, FOR_NEEDED = 4.0, 4.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ def certificate_tests(rate: float, keep_rate: float, left: int, at_least: int) -
     needs = FOR_NEEDED + math.log(max(1, left))
     removals = min(MOST_REMOVAL_PAIRS, max(at_least, needs / math.log(1 + 0.95 * keep_rate) / rate)) if left else 0
     if rate >= SURE:
-        of_left, of_whole = max(at_least, 1.15 * FOR_KEPT / -math.log(keep_rate)), removals
+        of_left, of_whole = max(at_least, 1.27 * FOR_KEPT / -math.log(keep_rate)), removals
     else:
         mean = rate * (1 - keep_rate)
         moment = rate**2 * (1 - keep_rate) ** 2 + rate * (1 - rate) * (1 + keep_rate**2)
