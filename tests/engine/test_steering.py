@@ -1,5 +1,6 @@
 """A reduction that the user guides by hand: on a simulator that costs nothing."""
 
+import random
 import tempfile
 from pathlib import Path
 
@@ -207,6 +208,25 @@ def test_another_failure_is_reduced_in_a_branch_and_f_is_f_again_outside_of_it(t
     assert set(state.environment) == {"wall"}
     assert state.minimal
     assert len(pool.made) == len(set(pool.made))
+
+
+def test_a_branch_has_to_keep_the_rate_of_its_own_failure_where_it_begins(tmp_path):
+    def oracle(keep, seed):
+        luck = random.Random(f"{sorted(keep)} {seed}").random()
+        if {"wall", "beam"} <= keep:
+            return "similar"
+        return "other" if "wall" in keep and luck < 0.8 else "pass"
+
+    def guide():
+        state = yield from until(lambda state: any(test.outcome == "other" for test in state.tests))
+        other = next(test.id for test in state.tests if test.outcome == "other")
+        yield "accept_other", {"test": other, "instead": True}
+
+    path = new_run(tmp_path, accept_rate="kept", growth="steady", skip="implied", baseline_runs=10)
+    state = drive(path, Guided(path, oracle, guide(), 2))
+    assert (state.environment, state.minimal) == (("wall",), True)
+    # The whole world never showed it.
+    assert not any(test.outcome == "similar" for test in state.tests if test.phase == "baseline")
 
 
 def test_an_undone_reduction_is_not_made_again(tmp_path):

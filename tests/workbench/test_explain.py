@@ -148,6 +148,16 @@ def test_other_failures_in_the_baseline_are_named_and_counted(run):
     assert "95 %). Other failures: 2. fell at (3.00, 1.40) in 2 runs." in baseline_sentence(state, 3)
 
 
+def test_a_baseline_that_goes_on_says_why(run):
+    run.created()
+    for number in range(4):
+        run.test(None, "failed" if number == 1 else "pass", run=number, failure="stuck" if number == 1 else "")
+    assert "The robot runs in the whole world 4 times" in told(run)[1]
+    run.start(run=4)
+    assert "Few runs of the whole world show f: the robot runs in it until more do." in told(run)[1]
+    assert "Of 4 runs so far 1 failed and 3 reached the goal." in told(run)[1]
+
+
 def test_files_that_do_not_say_how_a_robot_failed_are_worded_too(run):
     run.created().baseline()
     run.start_round(2)

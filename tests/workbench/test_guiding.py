@@ -223,7 +223,7 @@ async def test_a_finished_run_goes_on_from_a_try(run, monkeypatch):
     fake_run.finished(run)
     async with Attached(run) as session:
         await session.press("r", "space", "s")
-        assert session.said().count("the run is finished; u, h, c, p, w and o go on from there") == 3
+        assert session.said().count("the run is finished; u, h, f, c, p, w and o go on from there") == 3
         await session.press("w", *"01", "enter")
         assert session.asked() == [("try", {"models": [0]})]
         assert len(started) == 1

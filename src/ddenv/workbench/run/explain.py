@@ -147,7 +147,7 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     first = (
         f"The robot runs in the whole world {count(options.baseline_runs, 'time')}, each with its own seed, to fix f."
     )
-    if len(tests) >= options.baseline_runs:
+    if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f: the robot runs in it until more do."
     if not tests:
         return (first,)
