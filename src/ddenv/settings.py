@@ -189,6 +189,12 @@ class Reduction:
         shown="more",
         cost="Lower is cheaper to show, and promises less.",
     )
+    keep_supports: bool = setting(
+        False,
+        "keep each model together with what it rests on: a stack is removed as a whole",
+        shown="more",
+        cost="On needs fewer tests, but may leave models that could be removed.",
+    )
     growth: Literal["paper", "steady"] = setting(
         "steady",
         "when n grows: after every round (paper), or only after a round without success (steady)",

@@ -11,6 +11,7 @@ from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
 
+SETTLING = "finding what rests on what"
 CONFIRMING = "confirming what is left with full runs"
 # A line names so many failures of the baseline.
 MOST_FAILURES = 3
@@ -19,6 +20,7 @@ SAID = {
     "paused": "paused",
     "resumed": "resumed",
     "confirm_started": CONFIRMING,
+    "supports_started": SETTLING,
 }
 # Hints for readers who see only these lines.
 HINTS = {
@@ -38,6 +40,8 @@ def headline(state: RunState) -> str:
 def _where(state: RunState) -> str:
     if state.confirming and not state.ended:
         return CONFIRMING
+    if state.settling and not state.ended:
+        return SETTLING
     return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
 
 
@@ -84,12 +88,21 @@ def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
     if kind == "trial_judged":
         changed = (one for one, was in zip(after.trials, before.trials, strict=True) if one != was)
         return "".join(_judged(after, one) for one in changed)
+    if kind == "supports":
+        return _supports(after)
     if kind == "command_refused":
         return f"not done: {after.refusal[1]}"
     # All other decisions of the user carry their own words.
     if len(after.decisions) > len(before.decisions):
         return after.decisions[-1].words
     return SAID.get(kind, "")
+
+
+def _supports(state: RunState) -> str:
+    if state.unsettled:
+        return f"what rests on what is unknown: {state.unsettled}"
+    resting = len({upper for upper, _ in state.supports})
+    return f"{count(resting, 'model')} of the world {'rests' if resting == 1 else 'rest'} on others" if resting else ""
 
 
 def _judged(state: RunState, one: Candidate | Trial) -> str:

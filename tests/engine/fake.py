@@ -54,6 +54,9 @@ class FakePool:
         self.oracle, self.jobs, self.random, self.cut = oracle, jobs, random.Random(seed), cut
         self.running: list[tuple[int, frozenset[str], int, bool]] = []
         self.made: list[tuple[frozenset[str], int]] = []
+        # What rests on what, and how often the driver asks before it is known.
+        self.supports: list[tuple[str, str]] | Broken = []
+        self.settling = 0
 
     @property
     def idle(self) -> int:
@@ -79,14 +82,19 @@ class FakePool:
         outcome, x = ENDS[shown]
         return [(test, result(outcome, seed, x, bool(cut)))]
 
+    def find_supports(self, elements: frozenset[str]) -> Callable[[], list[tuple[str, str]] | Broken | None]:
+        looks = iter([None] * self.settling)
+        return lambda: next(looks, self.supports)
+
     def live(self) -> list[Live]:
         return []
 
 
-def new_run(folder: Path, *, early_stop: bool = False, **reduction) -> Path:
+def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:
     """A run file of the small world, reduced as printed: the tests know the paper's rounds."""
     scenario = load_scenario(DATA / "wall.yaml")
     changed = {
+        "world": world,
         "reduction": scenario.reduction.model_copy(update=PRINTED | reduction),
         "failure": scenario.failure.model_copy(update={"early_stop": early_stop}),
     }

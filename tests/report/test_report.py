@@ -113,6 +113,16 @@ def test_models_that_are_left_have_place_and_size(run):
     assert [row[0] for row in rows] == ["crate_00", "crate_01"]
 
 
+def test_what_a_removal_drops_stands_in_the_table_of_models(run):
+    fake_run.piled(run)
+    rows = {words(row[0]): words(row[-1]) for row in table(content(read_run(run.path)), "removing it drops")}
+    assert {name: fallen for name, fallen in rows.items() if fallen} == {
+        "crate_02": "crate_01",
+        "crate_04": "crate_07",
+        "crate_05": "crate_01, crate_02",
+    }
+
+
 def test_rounds_as_they_ended(run):
     fake_run.guided(run)
     rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "round")]

@@ -208,6 +208,10 @@ class FakeRun:
         )
         self.write("forecast", round=self.round, tests=[12, 51, 72], tests_done=self.tests)
 
+    def supports(self, *pairs: tuple[str, str]) -> None:
+        """The first model of each pair rests on the second."""
+        self.write("supports", pairs=[self.numbers(list(pair)) for pair in pairs])
+
     def judge(self, candidate: int, verdict: str, tests: list[int], known: int = 0) -> None:
         self.write("candidate_judged", candidate=candidate, verdict=verdict, tests=tests, known=known)
 
@@ -281,6 +285,16 @@ def mid_round(run: FakeRun) -> FakeRun:
     first = run.start(1, 1)
     second = run.start(2, 0)
     run.live((first, 0.6), (second, 0.25))
+    return run
+
+
+def piled(run: FakeRun) -> FakeRun:
+    """A round in a world where crates lie on others, with one part judged."""
+    run.created().supports(("crate_02", "crate_05"), ("crate_01", "crate_02"), ("crate_07", "crate_04"))
+    run.baseline()
+    run.start_round(3)
+    run.dissimilar(0)
+    run.live((run.start(1, 0), 0.6))
     return run
 
 

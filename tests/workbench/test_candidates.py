@@ -75,6 +75,26 @@ def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
     assert (rows[3]["tests"], rows[3]["evidence"], rows[3]["time"]) == ("", "", "")
 
 
+def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
+    rows = rows_of(snapshot(fake_run.piled(run)))
+    # Parts: 00 to 03, 04 to 06, 07 to 10. 02 lies on 05, 01 on 02, and 07 on 04.
+    assert [(row["candidate"], row["verdict"].split(" ")[0]) for row in rows] == [
+        ("part A↓", "○"),
+        ("without A", "▶"),
+        ("part B", ""),
+        ("without B↓", "drops"),
+        ("part C↓", "drops"),
+        ("without C", ""),
+    ]
+    assert (rows[3]["verdict"], rows[4]["verdict"]) == ("drops 3 models", "drops crate_07")
+
+
+def test_what_a_try_drops_has_the_same_sign(run):
+    fake_run.piled(run)
+    run.try_out([name for name in run.elements if name != "crate_04"])
+    assert "try 1↓" in [row["candidate"] for row in rows_of(snapshot(run))]
+
+
 def test_what_waits_says_which_keys_decide(run):
     assert rows_of(snapshot(fake_run.waiting(run)))[0]["verdict"] == "? a or x"
 

@@ -83,6 +83,12 @@ def test_moments_of_a_run(snap_compare, run, moment, size):
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown())
 
 
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
+def test_what_a_candidate_drops(snap_compare, run, size):
+    fake_run.piled(run).hold()
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "down", "down"))
+
+
 @pytest.mark.screens
 def test_run_screen_without_its_engine(snap_compare, run):
     fake_run.mid_round(run)

@@ -5,6 +5,7 @@ Tries of the user come first.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,7 +14,7 @@ import numpy as np
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import BROKEN, Journal, Keep
 from ddenv.engine.judging import failures_of, result_data
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Broken, Pool, Supports
 from ddenv.engine.shared import SharingPool
 from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
@@ -53,6 +54,8 @@ def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str) -> None:
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
 LIVE_PERIOD = 0.1
+# What takes longer than this shows that it is under way, s.
+PATIENCE = 1.0
 # Maximum number of broken tests in a row. If the simulator itself does not work (no licence, no display, a full disk), all tests
 # break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
@@ -108,6 +111,17 @@ class Bench:
             self._started.add((keep, run, full))
             self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
             self._control.started()
+
+    def find_supports(self, elements: Keep, late: Callable[[], None]) -> Supports | Broken:
+        """Which of `elements` rest on which; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
+        found = self._pool.find_supports(elements)
+        until = time.monotonic() + PATIENCE
+        while (result := found()) is None:
+            if time.monotonic() > until:
+                until = math.inf
+                late()
+            self.tick()
+        return result
 
     def finish_trials(self) -> None:
         """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""

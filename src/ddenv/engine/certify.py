@@ -21,7 +21,8 @@ MOST_STEPS_BACK = 14
 
 @dataclass(frozen=True)
 class Certifier:
-    """Certifies the current environment. `free` are its models that can be left out. Each of its tests is made once.
+    """Certifies the current environment. Each of its tests is made once. `free` are its models that can be left out, or one of
+    each stack.
 
     With `moves` the run goes on where a claim fails: back to the last environment that keeps the rate, or without a model
     that is not needed. Then an event says so, and the journal wants a new search.
@@ -80,13 +81,13 @@ class Certifier:
             return claims
         for name in self.free:
             terms = Terms(now.keep_rate, now.rate, error / len(self.free), now.at_least)
-            claims.append((name, self._settle(falls(left - {name}, whole, terms))))
+            claims.append((name, self._settle(falls(self.journal.without(name), whole, terms))))
             if self.moves and claims[-1][1].verdict == "not needed" and self._can_go(name):
                 break
         return claims
 
     def _can_go(self, name: str) -> bool:
-        return self._left - {name} not in self.journal.refused
+        return self.journal.without(name) not in self.journal.refused
 
     def _settle(self, procedure: Procedure) -> Claim:
         first = self._certificate.first_run
@@ -104,7 +105,7 @@ class Certifier:
     def _plain(self, name: str | None, claim: Claim) -> dict[str, Any]:
         """A claim as data of an event."""
         journal, first = self.journal, self._certificate.first_run
-        keep = self._left if name is None else self._left - {name}
+        keep = self._left if name is None else journal.without(name)
         tests = [journal.ledger.get((keep, first + run, True)) for run in range(claim.runs)]
         outcomes = Counter(journal.state.tests[test - 1].outcome for test in tests if test is not None)
         runs = sum(number for outcome, number in outcomes.items() if outcome not in BROKEN)
@@ -165,7 +166,7 @@ class Certifier:
 
     def _leave_out(self, name: str) -> None:
         journal = self.journal
-        state, keep, first = journal.state, self._left - {name}, self._certificate.first_run
+        state, keep, first = journal.state, journal.without(name), self._certificate.first_run
         runs = range(first, journal.fresh_run)
         tests = [test for run in runs if (test := journal.ledger.get((keep, run, True))) is not None]
         journal.record(

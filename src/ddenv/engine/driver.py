@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -15,15 +16,19 @@ from ddenv.engine.certify import Certifier
 from ddenv.engine.control import Control, Steered
 from ddenv.engine.journal import BROKEN, Journal, Keep, other_way
 from ddenv.engine.judging import known_failure, rows_of
+from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Standing, standing
+from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
+from ddenv.words import count
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
@@ -35,6 +40,7 @@ class Driver:
     """One engine's work on one run. All decisions follow from the journal, so a resumed run continues in the same way."""
 
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
+        self._scenario, self._world = scenario, world
         self._reduction = scenario.reduction
         self._failure_spec = scenario.failure
         self._enough = AHEAD * max(1, journal.state.jobs)
@@ -54,7 +60,9 @@ class Driver:
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
         # Unknown names are refused before a robot runs.
-        self._begin(self._reduction, self._journal.state.elements)
+        self._stack(self._journal.state.elements, frozenset())
+        self._begin(self._reduction)
+        settle(self._scenario, self._world, self._journal, self._bench)
         reason = self._baseline()
         if reason:
             self._end(False, reason)
@@ -74,21 +82,20 @@ class Driver:
     def certify(self, at_least: int) -> None:
         """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
         state = self._journal.state
-        free = [name for name in state.environment if name not in state.pinned]
-        self._certify(free, at_least, moves=False, anew=True)
+        self._stack(state.environment, state.pinned)
+        self._certify(list(self._stacks.representatives), at_least, moves=False, anew=True)
 
     def _search(self) -> None:
         """Searches from the current environment to the end. Raises Steered if the user changes something."""
         leg = self._journal.begin_leg()
         self._reduction = Reduction.model_validate(leg.settings)
-        self._pinned = leg.pinned
         self._learnt = set(leg.tests)
         self._trials = [
             self._learnt_from(test) for test in leg.tests if self._journal.state.tests[test - 1].outcome not in BROKEN
         ]
         self._look_at(leg.evidence_test)
-        free = tuple(name for name in leg.environment if name not in leg.pinned)
-        algorithm = self._begin(self._reduction, free, leg.n_partitions, leg.again)
+        self._stack(leg.environment, leg.pinned)
+        algorithm = self._begin(self._reduction, leg.n_partitions, leg.again)
         number, winner = leg.first_round, None
         try:
             while True:
@@ -97,16 +104,22 @@ class Driver:
         except StopIteration as end:
             self._finish(end.value | self._pinned)
 
+    def _stack(self, environment: tuple[str, ...], pinned: Keep) -> None:
+        """What the search may leave out of `environment`: whole stacks, and none with a model that is pinned."""
+        together = Stacks.of(stacks_of(self._journal.state, environment))
+        self._pinned = pinned | together.of_any(pinned)
+        free = (stack for stack in together.by_first.values() if self._pinned.isdisjoint(stack))
+        self._stacks = Stacks.of(free)
+
     def _begin(
         self,
         asked: Reduction,
-        elements: tuple[str, ...],
         n_partitions: int | None = None,
         again: tuple[tuple[str, ...], ...] = (),
     ) -> Search:
         """The algorithm and the schemas by name; first it leaves out the groups `again`. Raises UserError for unknown names."""
         partitioning, prioritization = split_pair(asked.pair)
-        self._elements, self._memory = elements, Memory()
+        elements, self._memory = self._stacks.representatives, Memory()
         self._guide = make_guide(
             partitioning,
             prioritization,
@@ -120,8 +133,9 @@ class Driver:
         )
         guide = self._memory.of(self._guide)
         if not again:
-            return search(asked.algorithm, elements, guide)
-        return tried_again(elements, again, lambda environment: search(asked.algorithm, environment, guide))
+            return self._stacks.expand(search(asked.algorithm, elements, guide))
+        searched = partial(search, asked.algorithm, guide=guide)
+        return self._stacks.expand(tried_again(elements, again, searched))
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
@@ -135,10 +149,9 @@ class Driver:
     def _finish(self, kept: Keep) -> None:
         # Their results count, too.
         self._bench.finish_trials()
-        state = self._journal.state
-        free = [name for name in state.elements if name in kept - self._pinned]
+        free = [name for name in self._stacks.representatives if name in kept]
         # Whoever accepts each reduction by hand also goes back by hand.
-        moves = self._reduction.accept_rate == "kept" and state.accept_mode == "automatic"
+        moves = self._reduction.accept_rate == "kept" and self._journal.state.accept_mode == "automatic"
         self._certify(free, self._reduction.baseline_runs, moves)
 
     def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
@@ -151,8 +164,11 @@ class Driver:
         assert certificate is not None
         reason = verdict_on(certificate, len(self._pinned))
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
-        if any(journal.refused.get(frozenset(journal.state.environment) - {name}) for name in spare):
+        if any(journal.refused.get(journal.without(name)) for name in spare if name is not None):
             reason += "; to leave it out was vetoed or rejected"
+        if self._reduction.keep_supports:
+            stacks = stacks_of(journal.state, journal.state.environment)
+            reason += f"; stacks were kept together ({count(len(stacks), 'stack')})"
         self._end(is_minimal(certificate), reason)
 
     def _end(self, minimal: bool, reason: str) -> None:
@@ -237,8 +253,8 @@ class Driver:
         return Moment(
             self._reduction.algorithm,
             self._reduction.pair,
-            self._elements,
-            round.environment,
+            self._stacks.representatives,
+            self._stacks.collapsed(round.environment),
             self._guide,
             self._memory,
             replace(self._known(), trials=tuple(self._trials)),

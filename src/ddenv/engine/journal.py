@@ -14,6 +14,7 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.supports import stack_with, stacks_of
 
 Keep = frozenset[str]
 # After these events the search starts again from what the user left.
@@ -217,12 +218,16 @@ class Journal:
     def _subject(self, keep: Keep) -> dict[str, int]:
         """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
         state = self.state
-        environment = frozenset(state.environment)
-        if keep != environment and keep < environment and len(environment) - len(keep) == 1:
-            (without,) = environment - keep
-            return {"node": state.node, "without": state.elements.index(without)}
+        gone = tuple(name for name in state.environment if name not in keep)
+        if gone and gone in stacks_of(state, state.environment):
+            return {"node": state.node, "without": state.elements.index(gone[0])}
         path = [node.number for node in state.path if frozenset(node.environment) == keep]
         return {"node": path[-1]}
+
+    def without(self, name: str) -> Keep:
+        """The environment without a model, or without all of its stack."""
+        environment = self.state.environment
+        return frozenset(environment) - frozenset(stack_with(self.state, environment, name))
 
     def lose_running(self) -> None:
         """Records tests that were started and never ended as lost."""
@@ -347,7 +352,8 @@ class Journal:
         if test.phase == "baseline":
             return frozenset(self.state.elements)
         if test.phase in FRESH:
-            return frozenset(self.state.nodes[test.node].environment) - {test.without}
+            environment = self.state.nodes[test.node].environment
+            return frozenset(environment) - frozenset(stack_with(self.state, environment, test.without))
         if test.phase == "hand":
             return frozenset(self.state.trials[(test.trial or 0) - 1].models)
         return self._keep_of(test.candidate or 0)

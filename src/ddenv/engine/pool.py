@@ -7,12 +7,13 @@ import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -32,6 +33,10 @@ FOR_DRAKE = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
+
+# (upper, lower) where a model rests on another.
+Supports = list[tuple[str, str]]
+Result = TypeVar("Result")
 
 _one_at_a_time = threading.Lock()
 
@@ -139,11 +144,15 @@ class Pool:
             # A worker died while idle.
             self._start_again([job])
 
+    def _clear(self, slot: int) -> None:
+        """Makes a slot ready for new work."""
+        self._shared.progress[slot * COLUMNS] = math.nan
+        self._shared.reasons[slot * REASON : (slot + 1) * REASON] = bytes(REASON)
+        self._shared.begun[slot] = 0.0 if self._prepares else time.monotonic()
+        self._clocks[slot] = Stopwatch(LONGEST_LOOK)
+
     def _schedule(self, job: Job) -> None:
-        self._shared.progress[job.slot * COLUMNS] = math.nan
-        self._shared.reasons[job.slot * REASON : (job.slot + 1) * REASON] = bytes(REASON)
-        self._shared.begun[job.slot] = 0.0 if self._prepares else time.monotonic()
-        self._clocks[job.slot] = Stopwatch(LONGEST_LOOK)
+        self._clear(job.slot)
         work = (job.keep, job.seed, job.full, job.slot)
         self._running[self._pool.schedule(worker.run_test, args=work)] = job
 
@@ -170,7 +179,7 @@ class Pool:
         results = []
         try:
             for future, job in sorted(self._running.items(), key=lambda one: one[1].test):
-                result = self._result(future, job)
+                result = self._result(future, job.slot)
                 if result is not None:
                     del self._running[future]
                     self._free.append(job.slot)
@@ -180,30 +189,48 @@ class Pool:
             self._start_again([])
         return results
 
-    def _result(self, future: Future[RunResult], job: Job) -> RunResult | Broken | None:
-        """How a test ended; None if it is still running."""
-        start = job.slot * REASON
+    def _result(self, future: Future[Result], slot: int) -> Result | Broken | None:
+        """How the work in a slot ended; None if it is still running."""
+        start = slot * REASON
         # Its worker has ended itself. Pebble may not know that yet, or never: it misses a death that follows a start at once.
         if self._shared.reasons[start] != b"\0":
             reason = self._shared.reasons[start : start + REASON].rstrip(b"\0")
             return Broken("error", reason.decode(errors="ignore"))
         if not future.done():
-            return self._late(future, job)
+            return self._late(future, slot)
         try:
             return future.result()
         except ProcessExpired as error:
             return Broken("error", f"the simulator's process died (exit code {error.exitcode})")
 
-    def _late(self, future: Future[RunResult], job: Job) -> Broken | None:
-        """Kills a test that takes too long."""
-        begun = self._shared.begun[job.slot]
-        if begun and self._clocks[job.slot].since != begun:
-            self._clocks[job.slot] = Stopwatch(LONGEST_LOOK, begun)
+    def _late(self, future: Future[Result], slot: int) -> Broken | None:
+        """Kills what takes too long."""
+        begun = self._shared.begun[slot]
+        if begun and self._clocks[slot].since != begun:
+            self._clocks[slot] = Stopwatch(LONGEST_LOOK, begun)
         limit, what = (self._wall_timeout, "") if begun else (PREPARATION, " to prepare")
         # Pebble's threads do not survive that a test is cancelled before its worker has it.
-        if self._clocks[job.slot].look() <= limit or not future.running() or not future.cancel():
+        if self._clocks[slot].look() <= limit or not future.running() or not future.cancel():
             return None
         return Broken("timeout", f"took longer than {limit:g} s of wall clock{what}")
+
+    def find_supports(self, elements: frozenset[str]) -> Callable[[], Supports | Broken | None]:
+        """Lets an idle worker find which of `elements` rest on which. The result returns it, or None until it is known."""
+        slot = self._free.pop(0)
+        self._clear(slot)
+        future: Future[Supports] = self._pool.schedule(worker.find_supports, args=(elements, slot))
+
+        def found() -> Supports | Broken | None:
+            result: Supports | Broken | None
+            try:
+                result = self._result(future, slot)
+            except BrokenProcessPool:
+                result = Broken("error", "the simulator's process died")
+            if result is not None:
+                self._free.append(slot)
+            return result
+
+        return found
 
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""

@@ -7,7 +7,7 @@ controllers may not be deterministic, so their tests are not reused.
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.journal import Journal, Keep
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Broken, Pool, Supports
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import Test
@@ -142,6 +142,10 @@ class SharingPool:
         """Tests that have ended, waiting at most `seconds` for one."""
         ready, self._ready = self._ready, []
         return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
+
+    def find_supports(self, elements: Keep) -> Callable[[], Supports | Broken | None]:
+        """As `Pool.find_supports`."""
+        return self._pool.find_supports(elements)
 
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""

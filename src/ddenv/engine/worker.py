@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from dataclasses import dataclass
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn, Protocol, cast
 
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import Progress, RunResult
@@ -32,6 +32,12 @@ class Simulator(Protocol):
         progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult: ...
+
+
+class Settling(Protocol):
+    """A simulator that finds what rests on what."""
+
+    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,18 @@ def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResul
             raise _simulator
         return _simulator.run(keep, seed, report, full)
     # Drake raises SystemExit when one of its own checks fails.
+    except BaseException as error:
+        _break(error, slot)
+
+
+def find_supports(elements: frozenset[str], slot: int) -> list[tuple[str, str]]:
+    """Which of `elements` rest on which, as (upper, lower). The user's own simulator cannot say. Raises as `run_test`."""
+    if isinstance(_simulator, UserError):
+        raise _simulator
+    try:
+        if isinstance(_simulator, Exception):
+            raise _simulator
+        return cast(Settling, _simulator).supports(elements)
     except BaseException as error:
         _break(error, slot)
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, place, plain, say
 from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
+from ddenv.runfile.supports import drops_without
 from ddenv.words import count
 from ddenv.world.model import is_ground
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
 
-# The maximum number of models in the table, and of names in a list.
-MOST_MODELS, MOST_NAMES = 200, 12
+# The maximum number of models in the table, of names in a list, and of those that a removal drops.
+MOST_MODELS, MOST_NAMES, MOST_DROPPED = 200, 12, 3
 
 
 def what_is_left(record: Record) -> Section:
@@ -55,11 +57,17 @@ def _models(state: RunState, drawn: tuple[Drawn, ...]) -> list[Block]:
     by_name = {each.model.name: each for each in drawn}
     touched = _touched(state)
     names = state.environment
-    rows = tuple(_row(name, by_name.get(name), touched, state) for name in names[:MOST_MODELS])
+    carried = {name: drops_without(state, frozenset({name})) for name in names[:MOST_MODELS]}
+    drop = any(carried.values())
+    rows = tuple(
+        (*_row(name, by_name.get(name), touched, state), *((_named(fallen),) if drop else ()))
+        for name, fallen in carried.items()
+    )
     if not rows:
         return []
-    head = ("model", "kind", "centre x, y, z, m", "size x × y × z, m")
-    table = Table((*head, "first touched, s") if touched else head, rows, frozenset({2, 3, 4}))
+    head = ["model", "kind", "centre x, y, z, m", "size x × y × z, m"]
+    head += (["first touched, s"] if touched else []) + (["removing it drops"] if drop else [])
+    table = Table(tuple(head), rows, frozenset({2, 3, 4} if touched else {2, 3}))
     more = len(names) - len(rows)
     return [table, say(f"And {count(more, 'more model')}.")] if more else [table]
 
@@ -72,6 +80,15 @@ def _row(name: str, each: Drawn | None, touched: dict[str, float], state: RunSta
     size = " × ".join(f"{part:.2f}" for part in each.size) if each.outline.polygons else "no shapes"
     at = (f"{touched[name]:.1f}" if name in touched else "never",) if touched else ()
     return (shown, kind, place(each.center), size, *at)
+
+
+def _named(models: Sequence[str]) -> Cell:
+    """The names of `models`, the first ones if there are many."""
+    more = len(models) - MOST_DROPPED
+    words: list[Part] = []
+    for number, name in enumerate(models[:MOST_DROPPED]):
+        words += [", " if number else "", Name(name)]
+    return tuple([*words, f" and {more} more"] if more > 0 else words)
 
 
 def _touched(state: RunState) -> dict[str, float]:

@@ -7,6 +7,8 @@ The kinds of events with their data. Models are indices into the run's `elements
                          (Python and the processor)
     comparing            test: it is made again, because this engine computes with something else than the earlier ones
     compared             same: whether its bits are the same; if not, the user goes on with mixed tests
+    supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
+    supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled
     test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
                          trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,

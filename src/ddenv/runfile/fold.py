@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions
+from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, supports
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
@@ -60,6 +60,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "paused": False,
         "waiting_candidate": None,
         "confirming": False,
+        "settling": False,
         "jobs": int(data["jobs"]),
         "engine_version": str(data["version"]),
         "simulator": str(data["simulator"]),
@@ -268,6 +269,8 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "engine_started": _engine_started,
     "comparing": lambda *_: {},
     "compared": lambda state, data, _: {"physics": state.physics.compared(bool(data["same"]))},
+    "supports_started": supports.supports_started,
+    "supports": supports.supports,
     "test_started": _test_started,
     "test_finished": _test_finished,
     "test_lost": _test_lost,

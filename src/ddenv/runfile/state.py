@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import islice, takewhile
 from typing import Any
 
+from ddenv.resting import Supports
 from ddenv.runfile.failures import Baseline, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
@@ -39,6 +40,8 @@ class RunState:
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
+    `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
+    `settling`; `unsettled` says why it could not be found.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
@@ -74,6 +77,9 @@ class RunState:
     failures: tuple[int, ...] = ()
     certificates: tuple[Certificate, ...] = ()
     lower_bound: int = 0
+    supports: Supports = ()
+    settling: bool = False
+    unsettled: str = ""
     last_command: int = 0
     refusal: tuple[int, str] = (0, "")
     engine_version: str = ""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ddenv.map.names import shortened
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
+from ddenv.words import SETTLING
 from ddenv.words import count as count
 from ddenv.words import duration as duration
 from ddenv.words import percent as percent
@@ -17,6 +20,7 @@ from ddenv.words import percent as percent
 STATUS = {
     "created": ("○", "not started"),
     "starting": ("◌", "engine starts"),
+    "settling": ("▶", SETTLING),
     "baseline": ("▶", "baseline"),
     "running": ("▶", "running"),
     "confirming": ("▶", "confirming"),
@@ -96,3 +100,13 @@ def attach_name(run: Path) -> str:
 
     name = run.stem if find_run(run.stem) == run else str(run)
     return shlex.quote(plain(name))
+
+
+# What would fall once something that it rests on is gone, on the map and in the table.
+DROPS = "↓"
+
+
+def dropping(names: Sequence[str], width: int) -> str:
+    """That models drop, the first one by a name of at most `width` cells; "" for none."""
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    return f"drops {shortened(names[0], width)}{more}" if names else ""

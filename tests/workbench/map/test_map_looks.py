@@ -162,3 +162,10 @@ def test_the_palette_is_what_the_terminal_can_show(app, colors):
     palette = palette_of(app, Color(15, 20, 27), Color(213, 219, 229))
     assert palette.colors == colors
     assert palette.native == app.native_ansi_color
+
+
+def test_what_drops_is_marked_even_where_space_is_short():
+    prints = squares(3)
+    how = looks(prints, who_of(prints, dropped=frozenset({"m1"})), *DARK)
+    assert [text.startswith("↓") for text in how.labels] == [False, True, False]
+    assert how.signs.sure.tolist() == [False, True, False]

@@ -7,15 +7,14 @@ models that are out of the solver's problem and so have no contacts.)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
-from pydrake.geometry import GeometryId, QueryObject
+from pydrake.geometry import QueryObject
 
-from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.rehearsal import CALM, Rehearsals
+from ddenv.robot.piles.rehearsal import CALM, Rehearsals, Script
 
 # A contact carries where its normal points at least this far up (the cosine of 60 degrees): boards lean on steep edges.
 UPWARDS = 0.5
@@ -33,8 +32,7 @@ def supports(
     `present` are the models of the world. What rests on something that is no element, and so always stays, rests on what that
     rests on.
     """
-    touching = set(_contacts(context, rehearsals, present))
-    return sorted(_between(touching, elements))
+    return sorted(_between(_contacts(context, rehearsals, present), elements))
 
 
 def _between(pairs: set[Pair], elements: frozenset[str]) -> Iterator[Pair]:
@@ -51,42 +49,45 @@ def _between(pairs: set[Pair], elements: frozenset[str]) -> Iterator[Pair]:
         yield from ((upper, lower) for lower in reached & elements - {upper})
 
 
-def _contacts(context: RunContext, rehearsals: Rehearsals, present: frozenset[str]) -> Iterator[Pair]:
+def _contacts(context: RunContext, rehearsals: Rehearsals, present: frozenset[str]) -> set[Pair]:
     """Who rests directly on whom in the settled world."""
     built, hold, presence = context.built, context.hold, context.presence
     presence.remove(frozenset())
     settled = rehearsals.settle(present)
-    model_of = _model_of(built)
     moving = tuple(built.moving.values())
     hold.begin(others=(built.robot,))
     presence.join(moving, (), robot=False)
+    found: set[Pair] = set()
     try:
         for back in np.linspace(0.0, CALM, LOOKS):
             for pile, script in settled:
+                # A pile whose simulation breaks is taken as it starts.
                 if script is not None:
-                    ticks = context.clock.ticks[: len(script.states)]
-                    row = sum(tick.time < ticks[-1].time - back for tick in ticks)
-                    hold.put(hold.entries(pile), script.states[row])
+                    hold.put(hold.entries(pile), script.states[_row(context, script, back)])
             hold.apply()
-            query = cast(QueryObject, built.plant.get_geometry_query_input_port().Eval(context.plant_context))
-            for contact in query.ComputePointPairPenetration():
-                first, second = model_of.get(contact.id_A), model_of.get(contact.id_B)
-                if first is None or second is None or first == second:
-                    continue
-                # The normal points from the second to the first.
-                up = contact.nhat_BA_W[2]
-                upper, lower = (first, second) if up > 0 else (second, first)
-                if abs(up) >= UPWARDS and upper in built.moving:
-                    yield upper, lower
+            found.update(_carried(context))
     finally:
         presence.part(moving, ())
+    return found
 
 
-def _model_of(built: Built) -> dict[GeometryId, str]:
-    """The model of each geometry; the robot's are missing."""
-    return {shape: name for name, shapes in _shapes(built) for shape in shapes}
+def _row(context: RunContext, script: Script, back: float) -> int:
+    """The row of `script` that is `back` (s) before its end, or its first."""
+    ticks = context.clock.ticks[: len(script.states)]
+    return sum(tick.time < ticks[-1].time - back for tick in ticks)
 
 
-def _shapes(built: Built) -> Iterable[tuple[str, tuple[GeometryId, ...]]]:
-    bodies: Iterable[Body] = built.moving.values()
-    return [*built.static.items(), *((body.name, body.geometry) for body in bodies)]
+def _carried(context: RunContext) -> Iterator[Pair]:
+    """Each two models whose contact now carries the upper one, which can move."""
+    built = context.built
+    shapes = [*built.static.items(), *((body.name, body.geometry) for body in built.moving.values())]
+    # The robot's shapes are missing.
+    model_of = {shape: name for name, identities in shapes for shape in identities}
+    query = cast(QueryObject, built.plant.get_geometry_query_input_port().Eval(context.plant_context))
+    for contact in query.ComputePointPairPenetration():
+        first, second = model_of.get(contact.id_A), model_of.get(contact.id_B)
+        # The normal points from the second to the first.
+        up = contact.nhat_BA_W[2]
+        upper, lower = (first, second) if up > 0 else (second, first)
+        if upper and lower and upper != lower and upper in built.moving and abs(up) >= UPWARDS:
+            yield upper, lower

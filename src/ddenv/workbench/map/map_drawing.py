@@ -118,7 +118,15 @@ class MapDrawing:
             # The object changes after each of its tests, the models do not.
             looked_at = (candidate.split, candidate.kind, candidate.partition)
         split = state.round.split if state.round else None
-        made_of = (state.elements, state.environment, split, state.pinned, *looked_at, state.evidence_test)
+        made_of = (
+            state.elements,
+            state.environment,
+            state.supports,
+            split,
+            state.pinned,
+            *looked_at,
+            state.evidence_test,
+        )
 
         def gather() -> Kept:
             who = kept(state, candidate)

@@ -10,9 +10,11 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.map.names import shortened
+from ddenv.runfile.events import Names
 from ddenv.runfile.state import RunState, partition_letter
+from ddenv.runfile.supports import drops
 from ddenv.workbench.map.place import Shown
-from ddenv.workbench.wording import count
+from ddenv.workbench.wording import DROPS, count, dropping
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -27,7 +29,7 @@ LEGEND = (
     ("↗", "robot"),
     ("#", "protected"),
 )
-LONGEST_NAME = 40
+LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
 def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
@@ -40,6 +42,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
         ("A B", "parts"): bool(state.elements),
         ("*", "selected"): bool(shown.selection),
         ("+", "pinned"): bool(state.pinned) and "pinned" in layers,
+        (DROPS, "drops"): shown.candidate is not None and bool(drops(state, shown.candidate)),
         ("1 2", "order sensed"): "sensed" in layers and state.evidence_test is not None,
         ("⠒ ⠒", "path of f"): "original" in layers and not same_paths,
     }
@@ -108,11 +111,16 @@ class MapLines(Widget):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._legend: Callable[[int], Text] | None = None
-        self._made_of: tuple[int, tuple[str, int] | None, str] = (0, None, "")
+        self._made_of: tuple[int, tuple[str, int] | None, Names, str] = (0, None, (), "")
 
-    def show(self, selected: int, shown: Candidate | Trial | None, legend: Callable[[int], Text]) -> None:
-        """`selected` models are selected, those of `shown` stand out; `legend` makes the line of signs for a width."""
-        facts = (selected, None if shown is None else (shown.label, shown.size), legend(200).plain)
+    def show(
+        self, selected: int, shown: Candidate | Trial | None, fallen: Names, legend: Callable[[int], Text]
+    ) -> None:
+        """`selected` models are selected, those of `shown` stand out; `legend` makes the line of signs for a width.
+
+        `fallen` would drop without the selected ones, or without those that are not shown.
+        """
+        facts = (selected, None if shown is None else (shown.label, shown.size), fallen, legend(200).plain)
         if facts != self._made_of:
             self._made_of, self._legend = facts, legend
             self.refresh()
@@ -121,14 +129,17 @@ class MapLines(Widget):
         if self._legend is None:
             return Text()
         width = self.size.width
-        selected, shown, _ = self._made_of
-        text = Text(no_wrap=True)
+        selected, shown, fallen, _ = self._made_of
+        text, drop = Text(no_wrap=True), dropping(fallen, LONGEST_DROPPED if width > 44 else SHORT_DROPPED)
         if selected:
             text.append(f"{selected} selected", "bold")
             text.append(": p pin, w try without, o try only" if width > 44 else ": p, w or o", "dim")
+            text.append(f"  w {drop}" if drop else "", "bold")
         elif shown is not None:
             label, size = shown
-            text.append(f"{label}: {count(size, 'model')}", "bold")
-            text.append("  others in small letters" if width > 44 else "", "dim")
+            # Where there is little room, the table has the number.
+            words = [count(size, "model")] if width > 44 or not drop else []
+            text.append(f"{label}: {', '.join([*words, drop] if drop else words)}", "bold")
+            text.append("  others in small letters" if width > 44 and not drop else "", "dim")
         text.truncate(width, overflow="ellipsis")
         return text.append("\n").append_text(self._legend(width))

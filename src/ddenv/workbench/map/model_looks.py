@@ -13,6 +13,7 @@ from ddenv.map.cells import Signs
 from ddenv.map.paint import RGB, Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
+from ddenv.runfile.supports import drops
 from ddenv.workbench.map.map_colors import (
     FLOOR,
     FLOOR_OUT,
@@ -28,6 +29,7 @@ from ddenv.workbench.map.map_colors import (
     Tone,
     mixed,
 )
+from ddenv.workbench.wording import DROPS
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -55,11 +57,15 @@ class Looks:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """Who is in the environment, and the number of each model's part; `shown` are the models of the candidate looked at."""
+    """Who is in the environment, and the number of each model's part.
+
+    `shown` are the models of the candidate looked at, `dropped` those of them that lose what they rest on.
+    """
 
     elements: frozenset[str] = frozenset()
     environment: frozenset[str] = frozenset()
     shown: frozenset[str] | None = None
+    dropped: frozenset[str] = frozenset()
     parts: dict[str, int] = field(default_factory=dict)
     pinned: frozenset[str] = frozenset()
     selected: frozenset[str] = frozenset()
@@ -71,7 +77,8 @@ def kept(state: RunState, candidate: Candidate | Trial | None) -> Kept:
     partitions = state.round.partitions if state.round else ()
     parts = {name: index for index, part in enumerate(partitions) for name in part}
     shown = frozenset(candidate.models) if candidate else None
-    return Kept(frozenset(state.elements), frozenset(state.environment), shown, parts, state.pinned)
+    fallen = frozenset(drops(state, candidate)) if candidate else frozenset()
+    return Kept(frozenset(state.elements), frozenset(state.environment), shown, fallen, parts, state.pinned)
 
 
 def looks(prints: Sequence[Footprint], who: Kept, back: RGB, fore: RGB, palette: Palette | None = None) -> Looks:
@@ -96,7 +103,7 @@ def _known(prints: tuple[Footprint, ...]) -> tuple[list[str], np.ndarray]:
 
 
 def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept) -> Signs:
-    """A letter for each model of a part, with its number in the order of sensing if that is shown."""
+    """A letter for each model of a part, with its number in the order of sensing if that is shown, and whether it drops."""
     groups = kinds * (int(parts.max(initial=-1)) + 2) + parts + 1
     found, which = np.unique(groups, return_inverse=True)
     letters = [_label(*divmod(value, int(parts.max(initial=-1)) + 2)) for value in found.tolist()]
@@ -106,7 +113,10 @@ def _signs(names: Sequence[str], kinds: np.ndarray, parts: np.ndarray, who: Kept
         order = [who.sensed.get(name, 0) for name in names]
         rank = np.where(np.array(order) > 0, order, math.inf)
         texts = [f"{text}{number}" if number else text for text, number in zip(texts, order, strict=True)]
-    return Signs(texts, groups, rank, np.isin(kinds, (PINNED, SELECTED)))
+    falling = _among(names, who.dropped)
+    for number in np.flatnonzero(falling).tolist():
+        texts[number] = f"{DROPS}{texts[number]}"
+    return Signs(texts, groups, rank, np.isin(kinds, (PINNED, SELECTED)) | falling)
 
 
 def _label(kind: int, part: int) -> str:

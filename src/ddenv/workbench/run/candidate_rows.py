@@ -9,8 +9,9 @@ from itertools import takewhile
 from ddenv.map.names import shortened
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
+from ddenv.runfile.supports import drops
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import OUTCOME, VERDICT, brief, metres, outcome, plain
+from ddenv.workbench.wording import DROPS, OUTCOME, VERDICT, brief, dropping, metres, outcome, plain
 
 # Maximum width of a model's name, after a sign and a space, in cells.
 NAME = 8
@@ -132,16 +133,17 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     distances = [test.distance for test in done if test.distance is not None]
     seconds = sum(test.wall_seconds for test in done)
     candidate = item if isinstance(item, Candidate) else None
+    fallen = drops(snapshot.state, item)
     return {
         "#": str(candidate.index + 1) if candidate else "",
-        "candidate": item.label,
+        "candidate": f"{item.label}{DROPS}" if fallen else item.label,
         "models": str(item.size),
         "distance": metres(candidate.distance) if candidate else "",
         "tests": f"{len(done)}/{1 + settings(snapshot.state).iterations}" if done or running else "",
         "evidence": _evidence(done),
         "to f": metres(min(distances)) if distances else "",
         "time": brief(seconds) if done else "",
-        "verdict": _verdict(snapshot, item, tests),
+        "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
     }
 
 
@@ -165,6 +167,10 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if not running or snapshot.engine != "alive":
         return ""
     return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
+
+
+def _fallen(models: Sequence[str]) -> str:
+    return f"drops {len(models)} models" if len(models) > 1 else dropping(models, NAME)
 
 
 def _seconds(snapshot: Snapshot, test: Test) -> str:

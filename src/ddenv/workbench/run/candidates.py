@@ -32,7 +32,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     The cursor follows the run until it is moved by hand.
     """
 
-    HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long"
+    HELP = "evidence: ● f again   ◇ another failure   ○ goal reached   ✗ broke   ◷ took too long   ↓ drops a model"
     ALLOW_SELECT = False
     COMPONENT_CLASSES: ClassVar = {"candidates--header", "candidates--cursor"}
     DEFAULT_CSS = """

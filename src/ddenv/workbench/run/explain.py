@@ -23,6 +23,9 @@ from ddenv.workbench.wording import count, metres, percent, plain
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8
+_SETTLING = (
+    "Finding what rests on what: the piles fall and settle once, without the robot. Then it is known what a removal would drop.",
+)
 
 
 Happening = tuple[Step | None, tuple[str, ...]]
@@ -63,6 +66,8 @@ def _happening(snapshot: Snapshot) -> Happening:
         return _finished(state)
     if snapshot.status in STANDING:
         return None, STANDING[snapshot.status](state)
+    if state.settling:
+        return _with_pause(state, ("baseline", _SETTLING))
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
     if state.confirming:

@@ -15,6 +15,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.runfile.supports import drops, drops_without
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.map_words import MapLines
@@ -198,7 +199,9 @@ class RunScreen(Screen[None]):
         self._show_legend()
 
     def _show_legend(self) -> None:
-        self._legend.show(len(self._map.selection), self._map.candidate, self._map.legend)
+        selection, candidate, state = self._map.selection, self._map.candidate, self._map.snapshot.state
+        fallen = drops_without(state, selection) if selection else drops(state, candidate) if candidate else ()
+        self._legend.show(len(selection), candidate, fallen, self._map.legend)
 
     def _show_models(self) -> None:
         self.query_one(ModelsLeft).show(self.snapshot.state, self._map.place.prints)

@@ -148,6 +148,7 @@ def facts(
     """What the status line says, in its order."""
     state = snapshot.state
     status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
+    status = "settling" if status == "baseline" and state.settling else status
     sign, word = STATUS.get(status, ("·", status))
     if snapshot.gone:
         sign, word = "✗", "the run file is gone"

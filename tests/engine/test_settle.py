@@ -1,0 +1,147 @@
+"""What rests on what: found once before the first test, known to views, and kept together where the user asks for it."""
+
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.engine import bench
+from ddenv.engine.pool import Broken
+from ddenv.errors import UserError
+from ddenv.resting import stacks
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.words import news
+from ddenv.world.load import load_scenario
+from tests.conftest import DATA
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.test_certify import DRIFTING, _killed, _resumed, at_rates, claims
+from tests.engine.test_driver import needs, story
+from tests.engine.test_steering import Guided, numbers, until
+from tests.tiers import examples
+
+PAIRS = [("ball", "post"), ("beam", "far_box")]
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """The small world, where the ball can move."""
+    return _world(tmp_path_factory.mktemp("world"))
+
+
+def _world(folder):
+    text = (DATA / "wall.sdf").read_text()
+    before, after = text.split('<model name="ball">')
+    static = '<static>true</static>\n      <pose>4 4 0.3 0 0 0</pose>\n      <link name="link">'
+    assert static in after
+    inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+    path = Path(folder) / "moving.sdf"
+    free = after.replace(static, f'<pose>4 4 0.3 0 0 0</pose>\n      <link name="link">{inertial}', 1)
+    path.write_text(f'{before}<model name="ball">{free}')
+    return path
+
+
+def pool(oracle, jobs=2, seed=0, supports=PAIRS):
+    made = FakePool(oracle, jobs, seed)
+    made.supports = supports
+    return made
+
+
+def events(path):
+    with RunFile(path) as file:
+        return list(file.events())
+
+
+def test_it_is_found_before_the_first_test_and_once(tmp_path, world):
+    path = new_run(tmp_path, world=world, budget=1)
+    for _ in range(2):
+        with pytest.raises(Exception, match="budget"):
+            drive(path, pool(needs("wall")))
+    kinds = [event.kind for event in events(path)]
+    assert kinds.count("supports") == 1
+    assert kinds.index("supports") < kinds.index("test_started")
+    assert "supports_started" not in kinds
+    assert fold(events(path)).supports == (("ball", "post"), ("beam", "far_box"))
+
+
+def test_a_world_where_nothing_moves_needs_none(tmp_path):
+    path = new_run(tmp_path)
+    drive(path, pool(needs("wall")))
+    assert "supports" not in {event.kind for event in events(path)}
+
+
+def test_it_shows_that_it_takes_long(tmp_path, world, monkeypatch):
+    monkeypatch.setattr(bench, "PATIENCE", 0.0)
+    path, slow = new_run(tmp_path, world=world), pool(needs("wall"))
+    slow.settling = 3
+    assert not drive(path, slow).settling
+    said, state = [], fold([])
+    for event in events(path):
+        before, state = state, fold([event], state)
+        said.append(news(event.kind, before, state))
+        assert state.settling == (event.kind == "supports_started")
+    first = said.index("finding what rests on what")
+    assert said[first + 1] == "2 models of the world rest on others"
+
+
+def test_what_cannot_be_found_is_said_and_stops_only_who_needs_it(tmp_path, world):
+    broken = Broken("timeout", "took longer than 1 s of wall clock")
+    state = drive(new_run(tmp_path, world=world), pool(needs("wall"), supports=broken))
+    assert state.minimal
+    assert (state.supports, state.unsettled) == ((), broken.failure)
+    with pytest.raises(UserError, match=r"keep_supports: what rests on what is unknown: took longer than 1 s"):
+        drive(new_run(tmp_path, world=world, keep_supports=True), pool(needs("wall"), supports=broken))
+
+
+def test_another_simulator_does_not_know_it(tmp_path, world):
+    scenario = load_scenario(DATA / "wall.yaml")
+    other = {"world": world, "oracle": {"command": "true"}, "reduction": {"keep_supports": True}}
+    path = tmp_path / "other.ddenv"
+    create_run(type(scenario).model_validate(scenario.model_dump() | other), path)
+    with pytest.raises(UserError, match="only ddenv's own simulator"):
+        drive(path, pool(needs("wall")))
+
+
+@pytest.mark.parametrize("method", [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep"}], ids=str)
+def test_stacks_stay_whole_in_all_tests_of_a_run(tmp_path, world, method):
+    asked = {"keep_supports": True, "accept_rate": "kept", **method}
+    made = pool(needs("wall", "ball"))
+    state = drive(new_run(tmp_path, world=world, **asked), made)
+    assert state.minimal
+    assert set(state.environment) == {"wall", "post", "ball"}
+    assert "stacks were kept together (2 stacks)" in state.reason
+    for stack in stacks(ELEMENTS, state.supports):
+        assert all(keep.issuperset(stack) or keep.isdisjoint(stack) for keep, _ in made.made)
+    # A stack is left out as a whole in the certificate, too.
+    assert set(claims(state)) == {None, "wall", "post"}
+    assert (frozenset({"wall"}) in {keep for keep, _ in made.made}) and claims(state)["post"].verdict == "needed"
+
+
+def test_a_pinned_model_holds_its_whole_stack(tmp_path, world):
+    def guide():
+        yield from until(lambda state: state.round is not None)
+        yield "pin", {"models": numbers("far_box")}
+
+    path = new_run(tmp_path, world=world, keep_supports=True)
+    guided = Guided(path, needs("wall"), guide())
+    guided.supports = PAIRS
+    state = drive(path, guided)
+    assert set(state.environment) == {"wall", "far_box", "beam"}
+    assert set(claims(state)) == {None, "wall"}
+
+
+@given(salt=st.integers(0, 30), moments=st.lists(st.integers(1, 200), min_size=1, max_size=4), jobs=st.integers(1, 3))
+@examples(0.1)
+def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
+    oracle, asked = at_rates(salt, *DRIFTING), {"accept_rate": "kept", "keep_supports": True}
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as aside:
+        asked["world"] = _world(aside)
+        undisturbed = drive(new_run(Path(folder), **asked), pool(oracle, 1))
+        path = new_run(Path(folder), **asked)
+        _killed(path, pool(oracle, jobs, salt), moments)
+        state = _resumed(path, pool(oracle, jobs, salt))
+    assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
+    assert state.supports == undisturbed.supports
