@@ -20,9 +20,9 @@ def verdict_on(certificate: Certificate, pinned: int = 0) -> str:
     left, *removals = certificate.claims
     share = percent(certificate.keep_rate)
     if left.verdict == "lost":
-        return f"f is too rare in what is left: {rate(left)}; it has to keep {share} of the whole world's rate"
+        return f"f is too rare in what is left: {rate(left)}; it has to keep {share} of {_whole_rate(certificate)}"
     if left.verdict != "kept":
-        return f"not shown that what is left keeps {share} of the whole world's rate: {rate(left)}"
+        return f"not shown that what is left keeps {share} of {_whole_rate(certificate)}: {rate(left)}"
     for word, start in (
         ("unknown", "not shown that each model is needed: tests broke without"),
         ("not shown", "not shown that each model is needed: undecided without"),
@@ -46,15 +46,21 @@ def rate(claim: Claim) -> str:
 
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
-    share = percent(certificate.keep_rate)
+    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+    share = rate.removesuffix(" rate")
     return {
-        "kept": f"keeps {share} of the whole world's rate",
-        "lost": f"has lost the rate: below {share} of the whole world's",
-        "needed": f"needed: without it the rate falls below {share} of the whole world's",
-        "not needed": f"not needed: without it the rate keeps {share} of the whole world's",
+        "kept": f"keeps {rate}",
+        "lost": f"has lost the rate: below {share}",
+        "needed": f"needed: without it the rate falls below {share}",
+        "not needed": f"not needed: without it the rate keeps {share}",
         "not shown": "not shown: the runs do not decide",
         "unknown": "unknown: too many runs broke",
     }.get(claim.verdict, "")
+
+
+def _whole_rate(certificate: Certificate) -> str:
+    """The rate that what is left has to keep a part of."""
+    return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
 
 
 def current(state: RunState) -> Certificate | None:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.claims import meaning
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.runfile.atlas import atlas, models_of
@@ -225,6 +226,7 @@ def test_a_branch_has_to_keep_the_rate_of_its_own_failure_where_it_begins(tmp_pa
     path = new_run(tmp_path, accept_rate="kept", growth="steady", skip="implied", baseline_runs=10)
     state = drive(path, Guided(path, oracle, guide(), 2))
     assert (state.environment, state.minimal) == (("wall",), True)
+    assert meaning(state.certificate.claims[0], state.certificate) == "keeps 80 % of the rate where its branch begins"
     # The whole world never showed it.
     assert not any(test.outcome == "similar" for test in state.tests if test.phase == "baseline")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes, Data, chance, names, one_of
-from ddenv.runfile.fold_decisions import arrived, here, listed, searched_anew
+from ddenv.runfile.fold_decisions import arrived, here, listed, origin, searched_anew
 from ddenv.runfile.progress import Certificate, Claim, Point
 from ddenv.runfile.state import OUTCOMES, RunState
 
@@ -19,6 +19,7 @@ def certificate_started(state: RunState, data: Data, _: float) -> Changes:
         rate=chance(data["rate"]),
         error=chance(data["error"]),
         at_least=int(data["at_least"]),
+        branch=origin(state, state.node).parent is not None,
     )
     if one.number != len(state.certificates) + 1:
         raise ValueError(one.number)

@@ -11,7 +11,8 @@ class Certificate:
 
     `first_run` is the number of its first run. What is left must keep `keep_rate` of the whole world's rate, which was estimated as
     `rate`; all claims together are wrong with a probability of at most `error`. What is left is run `at_least` so often. `claims`
-    are empty while its tests are made. `past`: a search began since.
+    are empty while its tests are made. `past`: a search began since. `branch`: the environment is in a branch whose f is another
+    failure, so that the rate where that branch begins stands for the whole world's.
     """
 
     number: int
@@ -23,6 +24,7 @@ class Certificate:
     at_least: int
     claims: tuple[Claim, ...] = ()
     past: bool = False
+    branch: bool = False
 
 
 @dataclass(frozen=True, slots=True)
