@@ -13,6 +13,7 @@ from ddenv.engine.pool import PREPARATION, Broken, Pool
 from ddenv.errors import UserError
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import load_scenario
+from ddenv.world.read import read_world
 from tests.conftest import DATA
 from tests.waiting import wait_until
 
@@ -186,6 +187,29 @@ def test_progress_is_seen_while_a_test_runs(pool):
     assert ended[0][0] == 7
     assert all(live.test == 7 and math.isfinite(live.time) for live in seen)
     assert pool.live() == []
+
+
+def test_a_worker_finds_what_rests_on_what(tmp_path):
+    scenario, world, robot = parts()
+    text = (DATA / "wall.sdf").read_text()
+    # The ball lies on the deck, and can move.
+    fixed = text[text.index('<model name="ball">') : text.index('<model name="beam">')]
+    inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+    free = fixed.replace("<static>true</static>", "").replace("<collision", f"{inertial}<collision", 1)
+    path = tmp_path / "world.sdf"
+    path.write_text(text.replace(fixed, free.replace("4 4 0.3", "0 0.8 0.6")))
+    pool = Pool(scenario, read_world(path), robot, 1)
+    try:
+        found = pool.find_supports(frozenset(world.elements()))
+        assert pool.idle == 0
+        known = []
+        wait_until(lambda: known.append(found()) or known[-1] is not None, lambda: "it was not found")
+        assert known[-1] == [("ball", "deck")]
+        # The worker is free again.
+        pool.submit(1, EVERYTHING, 0)
+        assert result(pool)[1].outcome == "failed"
+    finally:
+        pool.close()
 
 
 def test_a_world_that_cannot_be_simulated_is_told():

@@ -55,6 +55,30 @@ def test_a_running_candidate_shows_its_own_environment(writer):
     assert found.title == "round 1 · part B · test 2 · re-run 1 · runs now"
 
 
+@pytest.mark.parametrize("together", [False, True])
+def test_a_fresh_run_shows_its_own_environment(writer, together):
+    writer.baseline()
+    writer.run.append("supports", {"pairs": [[1, 0]]})
+    number = [0]
+
+    def shown(**place):
+        number[0] += 1
+        test = {"test": 1 + number[0], "round": None, "candidate": None, "run": 10_000, "seed": 0}
+        writer.run.append("test_started", test | {"phase": "certify"} | place)
+        state = state_of(writer)
+        reduction = state.scenario["reduction"] | {"keep_supports": together}
+        state = state.changed(scenario=state.scenario | {"reduction": reduction})
+        found = shot(state, [live(1 + number[0])])
+        return found.models, found.title.split(" · ")[0]
+
+    elements = state_of(writer).elements
+    everything = frozenset(elements)
+    assert shown(node=0) == (everything, "the whole world, in full")
+    gone = frozenset(elements[: 1 + together])
+    more = " and 1 more" if together else ""
+    assert shown(node=0, without=0) == (everything - gone, f"the whole world without {elements[0]}{more}")
+
+
 def test_after_a_reduction_the_evidence_is_shown_in_what_is_left(writer):
     writer.baseline()
     writer.round()

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.state import FRESH, RunState, Test
 from ddenv.runfile.store import Live
+from ddenv.runfile.supports import stack_with
+from ddenv.words import first_of
 from ddenv.world.pose import Pose
 
 SPEED = 4.0  # of a replay, relative to real time
@@ -73,9 +75,12 @@ def _of_test(state: RunState, kind: str, test: Test) -> Shot:
         name, models = f"round {test.round} · {candidate.label}", frozenset(candidate.models)
     elif test.phase == "round":
         name, models = f"round {test.round}", frozenset(state.environment)
-    elif test.phase == "confirm":
-        name = f"what is left without {test.without}" if test.without else "what is left, in full"
-        models = frozenset(name for name in state.environment if name != test.without)
+    elif test.phase in FRESH:
+        environment = state.nodes[test.node].environment
+        gone = stack_with(state, environment, test.without)
+        whole = "the whole world" if len(environment) == len(state.elements) else "what is left"
+        name = f"{whole} without {first_of(gone, 1)}" if gone else f"{whole}, in full"
+        models = frozenset(environment) - frozenset(gone)
     words = [name, f"test {test.id}"]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")
