@@ -17,6 +17,7 @@ STUDY, README = DOCS / "study.md", DOCS.parent / "README.md"
 FIGURES = DOCS / "study"
 # The tables of a scenario: tests, reduction and time; what is behind them.
 NUMBERS, BEHIND = 0, 1
+CERTIFIED = "certified"
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
@@ -57,19 +58,27 @@ def marked(page: str, name: str) -> str:
 
 
 def headline(nine: str) -> str:
-    """One row for each scenario of the table `nine`: each column's range, without the columns of scenario and method."""
+    """One row for each scenario of the table `nine`: each column's range over the certified methods, and how many these are."""
     head, sides, *rows = ([cell.strip() for cell in line.strip("| \n").split("|")] for line in nine.splitlines())
-    found = {
-        scenario: [row[2:] for row in rows if row[0] == scenario] for scenario in dict.fromkeys(row[0] for row in rows)
-    }
+    numbers = slice(2, head.index(CERTIFIED) if CERTIFIED in head else None)
     lines = [[head[0], *head[2:]], [sides[0], *sides[2:]]]
-    lines += [[scenario, *map(_range, zip(*cells, strict=True))] for scenario, cells in found.items()]
+    for scenario in dict.fromkeys(row[0] for row in rows):
+        every = [row for row in rows if row[0] == scenario]
+        certified = [row[numbers] for row in every if CERTIFIED not in head or _is_certified(row[-1])]
+        ranges = [_range(column) for column in zip(*certified, strict=True)] or ["–"] * len(head[numbers])
+        lines.append([scenario, *ranges, *([f"{len(certified)} of {len(every)}"] if CERTIFIED in head else [])])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def _range(cells: tuple[str, ...]) -> str:
+def _is_certified(cell: str) -> bool:
+    """Whether all cells of a row are certified: "yes", or such as "3 of 3"."""
+    certified, _, cells = cell.partition(" of ")
+    return cell == "yes" or certified == cells
+
+
+def _range(column: tuple[str, ...]) -> str:
     """Such as "40 to 64", or "95 %" where all are the same."""
-    low, *_, high = sorted(cells, key=lambda cell: float(cell.split()[0]))
+    low, *_, high = sorted((*column, *column), key=lambda cell: float(cell.split()[0]))
     return low if low == high else f"{low.split()[0]} to {high}"
 
 

@@ -25,6 +25,25 @@ def test_the_headline_figures_are_those_of_the_study():
     assert marked(README.read_text(encoding="utf-8"), "headline") == headline(marked(STUDY.read_text(), "nine"))
 
 
+def test_the_headline_has_no_numbers_of_what_is_not_certified():
+    nine = """| scenario | method | search tests | paper | certified |
+| --- | --- | ---: | ---: | --- |
+| ditch | one | 60 | 268 | yes |
+| ditch | two | 10 | 82 | no |
+| ditch | three | 40 (30 to 50) | 359 | 3 of 3 |
+| rubble | one | 8 | 179 | 2 of 3 |
+| rubble | two | – | 178 | – |
+"""
+    assert (
+        headline(nine)
+        == """| scenario | search tests | paper | certified |
+| --- | ---: | ---: | --- |
+| ditch | 40 to 60 | 268 to 359 | 2 of 3 |
+| rubble | – | – | 0 of 2 |
+"""
+    )
+
+
 HOUSE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
 
 
