@@ -97,9 +97,9 @@ def tests_of(world: World, options: dict | None, flaky: bool, seed: int) -> tupl
     if options is None:
         return _picire(world, test, RERUNS if flaky else 0)
     iterations = RERUNS if flaky else 0
-    rule = {"iterations": iterations, "accept_rate": "first", "check": False}
+    rule = {"iterations": iterations, "accept_rate": "first", "check": flaky}
     found = ddenv.reduce(world.elements, test, seed=seed, **rule, **world.evidence, **options)
-    return found.tests, set(found.kept) == world.needed
+    return found.search_tests, set(found.kept) == world.needed
 
 
 def _picire(world: World, test: Callable[[frozenset[str]], bool], iterations: int) -> tuple[int, bool]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -40,6 +40,10 @@ class Acceptance:
         if not self.rate:
             return "similar" if shown else ""
         return _by_bayes(self.rate, self.keep_rate, self.steps_back, shown, missed)
+
+    def within(self, runs: int | None) -> Acceptance:
+        """The same rule, by which `runs` runs without f and none with it are enough; None leaves it as it is."""
+        return self if runs is None else replace(self, most_misses=min(runs, self.most_misses))
 
     @property
     def misses(self) -> int:

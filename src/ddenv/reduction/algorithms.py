@@ -11,9 +11,14 @@ from itertools import takewhile
 
 import numpy as np
 
+from ddenv.arrays import Floats
+from ddenv.reduction.chance import LEAST
 from ddenv.reduction.evidence import Partition
 from ddenv.reduction.guide import Guide, Search
 from ddenv.reduction.round import Candidate, Round, left_out, make_round, one_model_partitions, round_of
+
+# A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
+DOUBT = 0.25
 
 
 def ddenv(elements: Partition, guide: Guide) -> Search:
@@ -186,66 +191,86 @@ def _raise_chances(group: Partition, chance: dict[str, float]) -> None:
 
 def splitting(elements: Partition, guide: Guide) -> Search:
     """Binary splitting. It sorts the models by the prioritization, far to near. Each test leaves out a group from the far end, of
-    the size at which the failure shows with even odds. If it does not show, one of the group is needed, and halves of the group
-    are left out until that model is found. At the end each remaining model is left out once more. For failures that show whenever
-    all needed models are there, it takes close to the minimum number of tests.
+    the size that tells most: the failure shows about as often as not. If it does not show, smaller groups are left out, until the
+    farthest needed model is found. Where the failure does not show in every run, one run is made without a group, and a miss only
+    makes it likelier that the group is needed. At the end each remaining model is left out once more, in as many runs as any
+    candidate has. It takes close to the minimum number of tests.
+
+    Noisy binary search (Burnashev and Zigangirov, 1974) for the farthest needed model, with the guide's probabilities as prior.
     """
     line = _far_to_near(elements, guide)
     weight = dict(zip(line, -np.log1p(-guide.chances(line)), strict=True))
     environment = line
-    suspects: Partition = ()
     passed = found = 0.0
+    # How many runs without the first 1, 2, ... models of the line missed f.
+    misses: dict[int, int] = {}
     while line:
         # The ratio of needed models found so far to those expected by now.
         likelier = (1.0 + found) / (1.0 + passed)
-        group = _half(suspects, weight, likelier) if suspects else _head(line, weight, likelier)
+        spared = _spared(np.array([weight[name] for name in line]) * likelier, misses, guide)
+        if spared[0] < DOUBT:
+            passed, found = passed + weight[line[0]], found + 1
+            line, misses = line[1:], {}
+            continue
+        # Rather too few than too many: the near models are the likeliest to be needed.
+        size = max(1, int((spared >= _most_telling(guide.rate())).sum()))
+        group, runs = line[:size], misses.get(size, 0) + 1
         round = left_out(group, environment)
         # f needs something, we assume: leaving out everything is not worth a test.
-        winner = (yield round) if round.candidates else None
-        if winner is not None:
-            environment = tuple(name for name in environment if name not in set(group))
-            line, suspects = line[len(group) :], suspects[len(group) :]
-            passed += sum(weight[name] for name in group)
-        else:
-            suspects = group
-        if len(suspects) == 1:
-            # All other suspects are gone.
-            passed, found = passed + weight[suspects[0]], found + 1
-            line, suspects = line[1:], ()
-    return (yield from sweep(environment))
+        winner = (yield replace(round, runs=runs)) if round.candidates else None
+        if winner is None:
+            misses[size] = runs if round.candidates else guide.runs()
+            continue
+        environment = tuple(name for name in environment if name not in set(group))
+        passed += sum(weight[name] for name in group)
+        line, misses = line[size:], {more - size: count for more, count in misses.items() if more > size}
+    return (yield from sweep(environment, guide.runs()))
 
 
-def sweep(environment: Partition) -> Search:
+def _spared(weights: Floats, misses: dict[int, int], guide: Guide) -> Floats:
+    """The probability that none of the first 1, 2, ... models of the line is needed, shape (len(weights),)."""
+    none = np.exp(-np.cumsum(np.append(0.0, weights)))
+    # That the first needed model is number 0, 1, ... of the line, and that none is needed.
+    first = np.append(-np.diff(none), none[-1])
+    for size, count in misses.items():
+        first[size:] *= LEAST if count >= guide.runs() else (1.0 - guide.rate()) ** count
+    return np.asarray(1.0 - np.cumsum(first[:-1]) / first.sum())
+
+
+def _most_telling(rate: float) -> float:
+    """The probability of being spared with which a group tells most in one run: the optimum of a Z-channel.
+
+    f shows at `rate` (above 0) without a group that is spared, never without another one.
+    """
+    if rate >= 1.0:
+        return 0.5
+    entropy = -(rate * math.log2(rate) + (1.0 - rate) * math.log2(1.0 - rate))
+    return 1.0 / (rate * (1.0 + math.exp2(entropy / rate)))
+
+
+def sweep(environment: Partition, runs: int | None = None) -> Search:
     """Leaves out each model in turn, in the environment's order, until none can be left out; returns what remains.
 
     After a success it goes on with the next model: those before were just found to be needed. They are tried again at the end.
+    With `runs`, all models have one run before any has a second one, up to `runs`: a model that is not needed is found before the
+    others have had theirs.
     """
+    looks = None if runs is None else 1
     while environment:
         ranked = [(part, float(place)) for place, part in enumerate(one_model_partitions(environment))]
         round = round_of(len(environment), environment, ranked, [("complement", place) for place in range(len(ranked))])
-        winner = yield round
-        if winner is None:
+        winner = yield replace(round, runs=looks)
+        if winner is not None:
+            place = winner.partition
+            environment = environment[place + 1 :] + environment[:place]
+            looks = looks and 1
+        elif looks is None or looks >= (runs or 1):
             break
-        place = winner.partition
-        environment = environment[place + 1 :] + environment[:place]
+        else:
+            looks += 1
     return frozenset(environment)
 
 
 def _far_to_near(elements: Partition, guide: Guide) -> Partition:
     scores = guide.rank(one_model_partitions(elements)) if elements else []
     return tuple(name for name, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))
-
-
-def _head(line: Partition, weight: dict[str, float], likelier: float) -> Partition:
-    """The models at the head of the line of which none is needed with even odds; at least one model."""
-    reach = np.cumsum([weight[name] for name in line]) * likelier
-    return line[: max(1, int(np.searchsorted(reach, math.log(2.0))))]
-
-
-def _half(suspects: Partition, weight: dict[str, float], likelier: float) -> Partition:
-    """The suspects, of which one is needed, that include it with even odds; never all of them."""
-    reach = np.cumsum([weight[name] for name in suspects]) * likelier
-    # Solves (e^-x - e^-all) / (1 - e^-all) = 1/2: none in the first part, but some in all.
-    even = -math.log((1.0 + math.exp(-reach[-1])) / 2.0)
-    nearest = int(np.argmin(np.abs(reach[:-1] - even)))
-    return suspects[: nearest + 1]

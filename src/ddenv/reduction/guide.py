@@ -37,7 +37,8 @@ class Guide:
     `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, of which the lowest is tried first.
     `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test. `n_partitions`
     is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`, `growth` ("paper" or
-    "steady") and `skip` ("known" or "implied") those of ddenv.
+    "steady") and `skip` ("known" or "implied") those of ddenv. `rate()` is the rate at which f shows in a single run where all that
+    it needs is there, `runs()` how many runs a candidate has if none shows f.
     """
 
     split: Split
@@ -48,6 +49,8 @@ class Guide:
     complement_order: str = "paper"
     growth: str = "paper"
     skip: str = "known"
+    rate: Callable[[], float] = lambda: 1.0
+    runs: Callable[[], int] = lambda: 1
 
 
 def make_guide(
@@ -61,6 +64,8 @@ def make_guide(
     complement_order: str = "paper",
     growth: str = "paper",
     skip: str = "known",
+    rate: Callable[[], float] = lambda: 1.0,
+    runs: Callable[[], int] = lambda: 1,
 ) -> Guide:
     """A guide for the schemas of these names, which look at what `evidence()` returns at that moment.
 
@@ -97,7 +102,7 @@ def make_guide(
             return uniform_prior(environment)
         return spatial_prior(environment, known)
 
-    return Guide(split_now, rank_now, chances_now, n_partitions, candidates, complement_order, growth, skip)
+    return Guide(split_now, rank_now, chances_now, n_partitions, candidates, complement_order, growth, skip, rate, runs)
 
 
 def search(algorithm: str, elements: Iterable[str], guide: Guide) -> Search:

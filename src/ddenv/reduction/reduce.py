@@ -140,31 +140,26 @@ def reduce(
         complement_order=complement_order,
         growth=growth,
         skip=skip,
+        rate=lambda: keeping.rate if iterations else 1.0,
+        runs=lambda: keeping.rule().misses if accept_rate == "kept" else 1 + iterations,
     )
     walk, searching = Walk(names, calls, on_round or (lambda _: None)), search(algorithm, names, guide)
     # Planned before the first test, so that a missing argument is reported at once.
     planned = next_round(searching, None)
     claims: tuple[RateClaim, ...] = ()
-    if accept_rate == "kept":
+    if accept_rate == "kept" or (check and iterations):
         keeping.baseline()
-        before = calls.others
+    elif check and not calls.once(everything):
+        raise UserError(NOTHING_TO_REDUCE)
+    before = calls.others
+    if accept_rate == "kept":
         walk.search(searching, keeping.rule(), planned)
         claims = keeping.carry_on(walk)
         minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
     else:
-        if check:
-            _check(calls, everything, 1 + iterations)
-        before, rule = calls.others, Acceptance(1 + iterations)
+        rule = Acceptance(1 + iterations)
         walk.search(searching, rule, planned)
         rests = [walk.chain[-1] - {name} for name in walk.left]
         minimal = all(standing([rest], calls.known, rule).verdicts[0] == "dissimilar" for rest in rests)
     tests = before, len(calls.trials), calls.others - before
     return Reduction(walk.left, walk.rounds, tuple(walk.history), minimal, *tests, claims)
-
-
-def _check(calls: Calls, everything: frozenset[str], runs: int) -> None:
-    # Not any(): a generator would turn a StopIteration of the test into another exception.
-    for _ in range(runs):
-        if calls.once(everything):
-            return
-    raise UserError(NOTHING_TO_REDUCE)

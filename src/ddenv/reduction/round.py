@@ -43,13 +43,17 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Round:
-    """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins."""
+    """`partitions` in the order in which they are tried, with the `scores` that rank them. The first similar candidate wins.
+
+    `runs` is how many runs a candidate has if none shows f, where the algorithm wants no more for now; None is as many as usual.
+    """
 
     n_partitions: int
     environment: Partition
     partitions: tuple[Partition, ...]
     scores: tuple[float, ...]
     candidates: tuple[Candidate, ...]
+    runs: int | None = None
 
     @property
     def exhaustive(self) -> bool:

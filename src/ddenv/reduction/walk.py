@@ -62,7 +62,7 @@ class Walk:
             self.rounds += 1
             self._on_round(round)
             models = (one.models for one in round.candidates)
-            place = standing(models, self._calls.shown, rule, self.refused).winner
+            place = standing(models, self._calls.shown, rule.within(round.runs), self.refused).winner
             winner = None if place is None else round.candidates[place]
             if winner is not None:
                 self.take(winner.models)
