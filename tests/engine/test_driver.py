@@ -88,6 +88,19 @@ def test_workers_never_change_the_result(tmp_path, method):
         assert all(each == stories[0] for each in stories)
 
 
+def test_where_f_is_flaky_splitting_looks_once_and_a_miss_shows_nothing_yet(tmp_path):
+    path = new_run(tmp_path, algorithm="splitting", iterations=3)
+    state = drive(path, FakePool(flaky(5, "wall", "ball"), 2))
+    assert set(state.environment) == {"wall", "ball"}
+    with RunFile(path) as file:
+        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+    looked = [data for data in judged if data["verdict"] == "missed"]
+    assert looked
+    assert judged[0]["verdict"] in ("similar", "missed")
+    # At the end each model has had all its runs.
+    assert [data["verdict"] for data in judged[-2:]] == ["dissimilar", "dissimilar"]
+
+
 def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
     path = new_run(tmp_path, pair="model2model/timestep")
     state = drive(path, FakePool(needs("wall", "beam"), 1))

@@ -1,11 +1,13 @@
 """What every algorithm promises, for any world and any oracle."""
 
+from contextlib import suppress
 from zlib import crc32
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.reduction.algorithms import sweep
 from tests.reduction.worlds import ALGORITHMS, PAIRS, evidence, run, worlds
 from tests.tiers import examples
 
@@ -107,3 +109,17 @@ def test_what_is_implied_is_tried_only_to_prove_the_end_minimal(world):
                 break
             assert len(round.environment) - one.size == 1 or not any(one.models <= models for models in failed)
             failed.append(one.models)
+
+
+def test_in_a_sweep_all_models_have_one_run_before_any_has_a_second_one():
+    looks = [(round.runs, len(round.candidates)) for round in _rounds(sweep(("a", "b", "c"), 3))]
+    assert looks == [(1, 3), (2, 3), (3, 3)]
+
+
+def _rounds(searching):
+    """The rounds of a search to which nothing is similar."""
+    with suppress(StopIteration):
+        round = next(searching)
+        while True:
+            yield round
+            round = searching.send(None)

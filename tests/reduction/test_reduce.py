@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tomllib
+from math import comb
 
 import numpy as np
 import pytest
@@ -120,6 +121,31 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
         shown = [result for kept, result in fresh if kept == frozenset(found.kept) - {claim.without}][-claim.runs :]
         assert (claim.shown, claim.runs) == (sum(shown), len(shown))
         assert claim.low <= claim.shown / claim.runs <= claim.high
+
+
+def line_of(count):
+    """A world of so many models on a line at whose end the robot fails."""
+    path = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [10.0, count, 0.0, 0.0, 0.0]])
+    return {"positions": {f"m{index}": (float(index), 0.0, 0.0) for index in range(count)}, "trajectory": path}
+
+
+def test_splitting_looks_once_where_the_failure_is_flaky_and_confirms_the_end():
+    """Within 1.6 times the bits that name the needed models, at what a run tells of them (0.618 bits at a rate of 0.8)."""
+    needed, tests = {"m30", "m33", "m35"}, []
+    for salt in range(30):
+        rng, made = np.random.default_rng(salt), []
+
+        def flaky(kept, rng=rng, made=made):
+            made.append(kept)
+            return kept >= needed and rng.random() < 0.8
+
+        options = {"algorithm": "splitting", "iterations": 3, "accept_rate": "first"}
+        found = ddenv.reduce([f"m{index}" for index in range(36)], flaky, **options, **line_of(36))
+        assert set(found.kept) == needed
+        assert found.minimal
+        assert all(made.count(frozenset(needed - {name})) == 4 for name in needed)
+        tests.append(found.search_tests)
+    assert np.mean(tests) <= 1.6 * np.log2(comb(36, 3)) / 0.618
 
 
 def test_the_papers_rule_is_content_with_a_rarer_failure_and_claims_nothing():

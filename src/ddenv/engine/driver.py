@@ -19,6 +19,7 @@ from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
+from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import Search, make_guide, search
@@ -130,6 +131,8 @@ class Driver:
             complement_order=asked.complement_order,
             growth=asked.growth,
             skip=asked.skip,
+            rate=self._rate,
+            runs=lambda: self._journal.rule.misses,
         )
         guide = self._memory.of(self._guide)
         if not again:
@@ -141,6 +144,13 @@ class Driver:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
         assert self._evidence is not None
         return replace(self._evidence, trials=self._trials)
+
+    def _rate(self) -> float:
+        """The rate of f in the whole world, as it was known when this search began."""
+        return self._journal.rule.rate or known_failure(self._journal.state).rate
+
+    def _rule(self, round: Round) -> Acceptance:
+        return self._journal.rule.within(round.runs)
 
     def _keep(self, candidate: Candidate) -> Keep:
         """All models that are in the world when a candidate is tested."""
@@ -291,7 +301,7 @@ class Driver:
     def _standing(self, round: Round) -> Standing:
         """Tests of the candidates that have no verdict yet."""
         open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
-        shown, rule, refused = self._journal.shown, self._journal.rule, self._journal.refused
+        shown, rule, refused = self._journal.shown, self._rule(round), self._journal.refused
         return standing(open_ones, shown, rule, refused, first=self._judged, enough=self._enough)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
@@ -303,7 +313,12 @@ class Driver:
             if self._journal.refused.get(models) is None:
                 # What has lost the rate is not tested.
                 lost = models in self._journal.refused
-                tests = [] if lost else self._journal.tests_of(models, self._journal.rule)
+                tests = [] if lost else self._journal.tests_of(models, self._rule(round))
+                if (
+                    verdict == "dissimilar"
+                    and not standing([models], self._journal.shown, self._journal.rule).verdicts[0]
+                ):
+                    verdict = "missed"
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
                 self._journal.record_once(
                     "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
@@ -324,7 +339,7 @@ class Driver:
             lost = journal.refused.has_lost(self._keep(candidate))
             if rejected or lost or not journal.has("candidate_judged", number, index):
                 continue
-            for test in journal.tests_of(self._keep(candidate), journal.rule):
+            for test in journal.tests_of(self._keep(candidate), self._rule(round)):
                 if test not in self._learnt and journal.state.tests[test - 1].outcome not in BROKEN:
                     self._learnt.add(test)
                     self._trials.append(self._learnt_from(test))
@@ -350,7 +365,7 @@ class Driver:
     def _take(self, number: int, round: Round, winner: int) -> None:
         """The winner becomes the environment; the next rounds use its similar run."""
         models = self._keep(round.candidates[winner])
-        test = self._journal.evidence_of(self._journal.tests_of(models, self._journal.rule))
+        test = self._journal.evidence_of(self._journal.tests_of(models, self._rule(round)))
         environment = self._numbers(models)
         self._journal.record_once("reduced", number, winner, environment=environment, evidence_test=test)
         self._look_at(test)

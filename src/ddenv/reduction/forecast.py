@@ -12,7 +12,7 @@ from random import Random
 import numpy as np
 
 from ddenv import schemas
-from ddenv.reduction.acceptance import Acceptance
+from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.guide import Guide, Search, search
@@ -87,14 +87,15 @@ def plays(moment: Moment) -> Iterator[float]:
     """How many tests are left in each of up to `PLAYS` plays. The same moment gives the same plays."""
     random = Random(f"{moment.evidence.seed} {len(moment.environment)} {len(moment.evidence.trials)}")
     codes = {name: random.getrandbits(62) for name in moment.elements}
-    guide, verdicts, line = _quick_guide(moment), _verdicts(moment, codes), _near_to_far(moment)
+    guide, line = _quick_guide(moment), _near_to_far(moment)
+    verdicts, missed = _known(moment, codes)
     groups = _groups(moment, line)
     looked_at = 0
     for number in range(PLAYS):
         if number >= FEWEST_PLAYS and looked_at > CANDIDATES:
             return
         needed = _needed(random, len(moment.elements), len(line), groups)
-        play = _Play(moment, random, frozenset(line[place] for place in needed), codes, dict(verdicts))
+        play = _Play(moment, random, frozenset(line[place] for place in needed), codes, dict(verdicts), dict(missed))
         try:
             play.run(search(moment.algorithm, moment.elements, guide))
         except Exception:
@@ -113,14 +114,21 @@ def interval(tests: Sequence[float]) -> tuple[int, int, int]:
 
 
 class _Play:
-    """A search where f needs the models `needed`, and no other. What has one of `verdicts` is not tested again.
+    """A search where f needs the models `needed`, and no other. What has one of `verdicts` is not tested again; other candidates
+    go on after the runs that `missed` f.
 
     Verdicts are found by the exclusive or of the `codes` of all models that are there: of thousands of complements, sets of names
     would take too long.
     """
 
     def __init__(
-        self, moment: Moment, random: Random, needed: frozenset[str], codes: dict[str, int], verdicts: dict[int, bool]
+        self,
+        moment: Moment,
+        random: Random,
+        needed: frozenset[str],
+        codes: dict[str, int],
+        verdicts: dict[int, bool],
+        missed: dict[int, int],
     ) -> None:
         self.tests = 0.0
         self.looked_at = 0
@@ -131,6 +139,7 @@ class _Play:
         self._needed = needed
         self._codes = codes
         self._verdicts = verdicts
+        self._missed = missed
 
     def run(self, searching: Search) -> None:
         """To the end of the search."""
@@ -141,27 +150,33 @@ class _Play:
             except StopIteration:
                 return
             whole = _code(self._codes, round.environment)
-            winner = next((one for one in round.candidates if self._is_similar(one, whole)), None)
+            rule = self._rule.within(round.runs)
+            winner = next((one for one in round.candidates if self._is_similar(one, whole, rule)), None)
 
-    def _is_similar(self, candidate: Candidate, whole: int) -> bool:
-        """Its verdict; `whole` is the code of the round's environment."""
+    def _is_similar(self, candidate: Candidate, whole: int, rule: Acceptance) -> bool:
+        """Its verdict by `rule`; `whole` is the code of the round's environment."""
         self.looked_at += 1
         part = _code(self._codes, candidate.part)
         code = part if candidate.kind == "partition" else part ^ whole
-        if code not in self._verdicts:
-            self._verdicts[code] = self._shows(candidate)
-        return self._verdicts[code]
+        if code in self._verdicts:
+            return self._verdicts[code]
+        similar = self._shows(candidate, code, rule)
+        if similar or self._rule.verdict(0, self._missed.get(code, 0)):
+            self._verdicts[code] = similar
+        return similar
 
-    def _shows(self, candidate: Candidate) -> bool:
+    def _shows(self, candidate: Candidate, code: int, rule: Acceptance) -> bool:
         part = candidate.part
         all_there = self._needed.issubset(part) if candidate.kind == "partition" else self._needed.isdisjoint(part)
-        shown = missed = 0
-        while not (verdict := self._rule.verdict(shown, missed)):
+        shown, missed = 0, self._missed.get(code, 0)
+        while not (verdict := rule.verdict(shown, missed)):
             self.tests += 1
             if all_there and self._random.random() < self._rate:
                 shown += 1
             else:
                 missed += 1
+        # Where some runs showed f, it is judged for good.
+        self._missed[code] = missed if not shown else MOST_RUNS
         if verdict == "similar":
             self.tests += self._wasted
         return verdict == "similar"
@@ -171,13 +186,17 @@ def _code(codes: dict[str, int], models: Iterable[str]) -> int:
     return reduce(xor, map(codes.__getitem__, models), 0)
 
 
-def _verdicts(moment: Moment, codes: dict[str, int]) -> dict[int, bool]:
-    """The verdicts so far."""
-    known: dict[int, bool] = {}
+def _known(moment: Moment, codes: dict[str, int]) -> tuple[dict[int, bool], dict[int, int]]:
+    """The verdicts so far, and how often candidates without a verdict missed f."""
+    shown, missed = set[int](), dict[int, int]()
     for trial in moment.evidence.trials:
         code = _code(codes, trial.models.intersection(codes))
-        known[code] = known.get(code, False) or trial.similar
-    return known
+        if trial.similar:
+            shown.add(code)
+        else:
+            missed[code] = missed.get(code, 0) + 1
+    verdicts = {code: False for code, count in missed.items() if moment.rule.verdict(0, count)}
+    return verdicts | dict.fromkeys(shown, True), missed
 
 
 def _quick_guide(moment: Moment) -> Guide:

@@ -28,7 +28,9 @@ class _Row:
     @property
     def tried(self) -> int:
         """The number of its candidates that were judged or have tests."""
-        return sum(one.verdict in ("similar", "dissimilar") or bool(one.tests) for one in self.round.candidates)
+        return sum(
+            one.verdict in ("similar", "missed", "dissimilar") or bool(one.tests) for one in self.round.candidates
+        )
 
     @property
     def won(self) -> Candidate | None:

@@ -20,7 +20,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
                          pinned? [..]
     forecast             round, tests [low, likely, high]: how many were left when tests_done of them were finished
-    candidate_judged     candidate, verdict (similar, dissimilar or unknown), tests [ids], known
+    candidate_judged     candidate, verdict (similar, missed, dissimilar or unknown), tests [ids], known
     waiting              candidate
     decided              candidate, decision: accept or reject
     reduced              candidate, environment [..], evidence_test

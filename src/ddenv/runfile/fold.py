@@ -150,7 +150,7 @@ def _forecast(_: RunState, data: Data, __: float) -> Changes:
 def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
     candidate = replace(
         _tried(state, data["candidate"]),
-        verdict=one_of(data["verdict"], "similar", "dissimilar", "unknown"),
+        verdict=one_of(data["verdict"], "similar", "missed", "dissimilar", "unknown"),
         tests=tuple(map(int, data["tests"])),
         known=int(data["known"]),
     )

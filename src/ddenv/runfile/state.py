@@ -250,9 +250,10 @@ class Split:
 class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
-    `verdict` is "" while open, then "similar", "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but
-    the user rejected it). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None.
-    `tests` are the ids of its tests so far, including re-runs and `known` tests of earlier rounds.
+    `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm may come back to it),
+    "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but the user rejected it). `distance` is what the
+    prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the ids of its tests so far, including
+    re-runs and `known` tests of earlier rounds.
     """
 
     index: int

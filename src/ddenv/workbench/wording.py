@@ -42,6 +42,7 @@ OUTCOME = {
 }
 VERDICT = {
     "similar": "● similar",
+    "missed": "○ missed",
     "dissimilar": "○ dissimilar",
     "vetoed": "⊘ vetoed",
     "rejected": "✗ rejected",
