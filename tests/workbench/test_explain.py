@@ -30,6 +30,13 @@ def test_a_starting_engine_is_not_called_dead(run):
     assert "starts" in told(run.created(), "starting")[1]
 
 
+def test_it_is_said_that_the_piles_settle(run):
+    run.created().write("supports_started")
+    assert told(run)[1].startswith("Finding what rests on what")
+    run.supports()
+    assert "rests on" not in told(run)[1]
+
+
 def test_the_baseline_counts_its_runs(run):
     run.created()
     run.test(None, "failed")

@@ -33,6 +33,11 @@ def test_everything_is_said_where_there_is_room(run):
     assert " (" in told["left"]
 
 
+def test_it_is_said_that_the_piles_settle(run):
+    run.created().write("supports_started")
+    assert said(snapshot(run))["state"] == "▶ finding what rests on what"
+
+
 @pytest.mark.parametrize("width", [120, 100, 80, 64, 40])
 def test_the_least_important_goes_first(run, width):
     shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
