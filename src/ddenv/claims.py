@@ -15,8 +15,11 @@ def is_minimal(certificate: Certificate) -> bool:
     return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
 
 
-def verdict_on(certificate: Certificate, pinned: int = 0) -> str:
-    """What a finished certificate shows, in one sentence without a full stop; `pinned` models could not be left out."""
+def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
+    """What a finished certificate shows, in one sentence without a full stop.
+
+    `pinned` models could not be left out; `each` is what was left out at a time.
+    """
     left, *removals = certificate.claims
     share = percent(certificate.keep_rate)
     if left.verdict == "lost":
@@ -35,7 +38,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0) -> str:
     if not removals:
         return f"nothing is left that can be removed{but}: {rate(left)}"
     most = max(removals, key=lambda claim: claim.high)
-    return f"no single model can be removed{but}: {rate(left)}; without any one of them at most {rate(most)}"
+    return f"no {each} can be removed{but}: {rate(left)}; without any one of them at most {rate(most)}"
 
 
 def rate(claim: Claim) -> str:

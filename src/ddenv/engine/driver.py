@@ -172,11 +172,12 @@ class Driver:
             self._bench.tick()
         certificate = current(journal.state)
         assert certificate is not None
-        reason = verdict_on(certificate, len(self._pinned))
+        together = self._reduction.keep_supports
+        reason = verdict_on(certificate, len(self._pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
         if any(journal.refused.get(journal.without(name)) for name in spare if name is not None):
             reason += "; to leave it out was vetoed or rejected"
-        if self._reduction.keep_supports:
+        if together:
             stacks = stacks_of(journal.state, journal.state.environment)
             reason += f"; stacks were kept together ({count(len(stacks), 'stack')})"
         self._end(is_minimal(certificate), reason)
