@@ -86,7 +86,7 @@ def _seen(base: Baseline) -> list[Block]:
         return []
     rows = tuple((str(number), one.name, str(one.runs)) for number, one in enumerate(base.seen, 1))
     f = frozenset(row for row, one in enumerate(base.seen) if one.test == base.failure_test)
-    words = "The whole world shows several failures. The one in bold is f; --failure NUMBER reduces another one."
+    words = "The whole world shows several failures. The run began with the one in bold as f; --failure NUMBER reduces another one."
     return [say(words), Table(("number", "failure", "runs"), rows, frozenset({0, 2}), f)]
 
 
