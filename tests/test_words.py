@@ -1,6 +1,6 @@
 """The lines that are printed while a run is followed."""
 
-from ddenv.cli.follow import broken
+from ddenv.cli.summary import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Event
@@ -72,10 +72,37 @@ def base(test: int) -> tuple[str, dict]:
     return "test_started", {"test": test, "phase": "baseline", "round": None, "candidate": None, "run": 0, "seed": 0}
 
 
-def test_full_runs_of_what_is_left_are_told():
-    _, before, after = states(started(1), ("confirm_started", {"round": None}))
-    assert news("confirm_started", before, after) == "confirming what is left with full runs"
-    assert "confirming what is left with full runs · 4 of 4 models" in headline(after)
+STARTED = {"certificate": 1, "run": 10_000, "rate": 0.9, "keep_rate": 0.8, "error": 0.03, "at_least": 3}
+
+
+def claim(without: int | None, verdict: str, shown: int, runs: int) -> dict:
+    ends = {"similar": shown, "pass": runs - shown}
+    return {
+        "without": without,
+        "verdict": verdict,
+        "shown": shown,
+        "runs": runs,
+        "low": 0.1,
+        "high": 0.9,
+        "outcomes": ends,
+    }
+
+
+def test_a_certificate_is_told_with_what_follows_from_it():
+    lost = {"claims": [claim(None, "lost", 3, 9)]}
+    _, before, after = states(started(1), ("certificate_started", STARTED))
+    assert news("certificate_started", before, after).startswith("certificate 1: fresh runs of what is left (4 models)")
+    assert "certifying what is left with fresh runs · 4 of 4 models" in headline(after)
+    both = (("certificate_started", STARTED), ("certificate_finished", lost))
+    _, before, after = states(*both)
+    assert news("certificate_finished", before, after) == (
+        "  certificate 1: f is too rare in what is left: f in 3 of 9 fresh runs (10 % to 90 %); "
+        "it has to keep 80 % of the whole world's rate"
+    )
+    _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": []}))
+    assert news("rate_lost", before, after) == "  back to 4 models, the last environment that keeps the rate"
+    _, _, before, after = states(*both, ("left_out", {"without": 1, "environment": [0, 2, 3], "evidence_test": 1}))
+    assert news("left_out", before, after) == "  reduced to 3 models after 0 tests: without b f shows as often"
 
 
 def test_the_headline_counts_tests_that_ended_and_that_run():

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
+from ddenv.amounts import count, first_of, percent
+from ddenv.rates import wilson_interval
+from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.progress import Certificate, Claim
-from ddenv.runfile.state import RunState
-from ddenv.words import count, first_of, percent
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import Node, RunState
 
 MOST_NAMES = 3
+NO_FRESH_RUNS = "no fresh runs were made"
 
 
 def is_minimal(certificate: Certificate) -> bool:
@@ -41,10 +47,23 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     return f"no {each} can be removed{but}: {rate(left)}; without any one of them at most {rate(most)}"
 
 
-def rate(claim: Claim) -> str:
-    """How often a claim's runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"."""
-    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
-    return f"f in {claim.shown} of {count(claim.runs, 'fresh run')}{interval}"
+class Counted(Protocol):
+    """Runs with their rate of f, as in a claim."""
+
+    @property
+    def shown(self) -> int: ...
+    @property
+    def runs(self) -> int: ...
+    @property
+    def low(self) -> float: ...
+    @property
+    def high(self) -> float: ...
+
+
+def rate(fresh: Counted) -> str:
+    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"."""
+    interval = f" ({percent(fresh.low)} to {percent(fresh.high)})" if fresh.runs else ""
+    return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
 
 
 def meaning(claim: Claim, certificate: Certificate) -> str:
@@ -70,3 +89,76 @@ def current(state: RunState) -> Certificate | None:
     """The finished certificate of the current environment, if there is one."""
     last = state.certificate
     return last if last is not None and last.claims else None
+
+
+def short(claim: Claim) -> str:
+    """The verdict of a claim in a word or two."""
+    return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
+
+
+def terms(certificate: Certificate) -> str:
+    """What a certificate asks for, in one sentence without a full stop."""
+    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+    return f"what is left has to keep {rate}, and to fall below that without any one model"
+
+
+def promise(certificate: Certificate) -> str:
+    """What "minimal" means by a certificate, in one sentence without a full stop."""
+    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+    return (
+        f"minimal means: what is left keeps {rate}, and falls below that without any one model; "
+        f"the chance that this is wrong is at most {percent(certificate.error)}"
+    )
+
+
+def ended(state: RunState) -> str:
+    """Why a finished run ended, without a full stop; it says so where no fresh runs show what the result is worth."""
+    if state.baseline is None or current(state) is not None:
+        return state.reason
+    return f"{state.reason}; {missing(state)}" if state.reason else missing(state)
+
+
+def missing(state: RunState) -> str:
+    """Why the current environment has no finished certificate; "" if it has one."""
+    if current(state) is not None:
+        return ""
+    return NO_FRESH_RUNS if state.certificate is None else "its certificate is not finished"
+
+
+def has_dropped(state: RunState) -> bool:
+    """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
+    here = state.here
+    whole = None if here is None else origin(state, here.number)
+    if here is None or whole is None or here is whole or not here.runs or not whole.runs:
+        return False
+    least = settings(state).keep_rate * whole.shown / len(whole.runs)
+    return wilson_interval(here.shown, len(here.runs))[1] < least
+
+
+def drift(state: RunState) -> tuple[str, ...]:
+    """How often f showed in the current environment and where it was seen first, from all runs; shorter and shorter forms.
+
+    Empty in the whole world, and where a certificate says more.
+    """
+    here = state.here
+    if here is None or not here.runs or current(state) is not None:
+        return ()
+    whole = origin(state, here.number)
+    if whole is here:
+        return ()
+    long, brief = ("in the whole world", "whole world") if whole.parent is None else ("where the branch began", "first")
+    return (
+        f"f in {seen(here)} here, {seen(whole)} {long}",
+        f"f {here.shown}/{len(here.runs)} here, {whole.shown}/{len(whole.runs)} {brief}",
+        f"f {here.shown}/{len(here.runs)} here",
+    )
+
+
+def seen(node: Node) -> str:
+    """How often f showed in an environment, from all runs so far; "" without runs."""
+    return f"{node.shown} of {len(node.runs)}" if node.runs else ""
+
+
+def of_runs(shown: int, runs: int) -> str:
+    """3 of 5 runs."""
+    return f"{shown} of {count(runs, 'run')}"

@@ -1,18 +1,21 @@
-"""One line of text for each event of a run, and the format of numbers in all views."""
+"""One line of text for each event of a run, and what else is said of it without a screen."""
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections import Counter
-from collections.abc import Sequence
 
+from ddenv.amounts import count as count
+from ddenv.amounts import duration as duration
+from ddenv.amounts import first_of as first_of
+from ddenv.amounts import percent as percent
+from ddenv.claims import verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
 
 SETTLING = "finding what rests on what"
-CONFIRMING = "confirming what is left with full runs"
+CONFIRMING = "certifying what is left with fresh runs"
 # A line names so many failures of the baseline.
 MOST_FAILURES = 3
 # Events whose text is always the same.
@@ -53,17 +56,6 @@ def news(kind: str, before: RunState, after: RunState, attached: bool = False) -
 
 def _news(kind: str, before: RunState, after: RunState) -> str:
     match kind:
-        case "engine_started":
-            resumed = " again" if before.tests else ""
-            workers, models = count(after.jobs, "worker"), count(len(after.elements), "model")
-            return f"engine started{resumed} with {workers}; {models} can be removed"
-        case "comparing":
-            return (
-                f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
-            )
-        case "compared":
-            same = after.physics.mixed == before.physics.mixed
-            return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
         case "baseline_finished":
             return baseline(after)
         case "round_started" if (round := after.round) is not None:
@@ -79,9 +71,43 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
             return f"  {waiting.label} shows f and waits for accept or reject"
         case "reduced":
             return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
+        case "certificate_started" | "certificate_finished" | "rate_lost" | "left_out":
+            return _certificate(kind, after)
+        case "engine_started" | "comparing" | "compared":
+            return _engine(kind, before, after)
         case "finished" | "engine_stopped" | "engine_failed":
             return f"{after.status}: {after.reason}"
     return _news_by_hand(kind, before, after)
+
+
+def _engine(kind: str, before: RunState, after: RunState) -> str:
+    """What an engine does before it goes on."""
+    match kind:
+        case "engine_started":
+            resumed = " again" if before.tests else ""
+            workers, models = count(after.jobs, "worker"), count(len(after.elements), "model")
+            return f"engine started{resumed} with {workers}; {models} can be removed"
+        case "comparing":
+            return (
+                f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
+            )
+        case "compared":
+            same = after.physics.mixed == before.physics.mixed
+            return f"  {'the same bits' if same else 'other bits: from here on the tests are mixed'}"
+    return ""
+
+
+def _certificate(kind: str, after: RunState) -> str:
+    """What a certificate does, and what follows from it."""
+    last, models = after.certificates[-1], count(len(after.environment), "model")
+    match kind:
+        case "certificate_started":
+            return f"certificate {last.number}: fresh runs of what is left ({models}), without each model, and of the whole world"
+        case "certificate_finished":
+            return f"  certificate {last.number}: {verdict_on(last, len(after.pinned))}"
+        case "rate_lost":
+            return f"  back to {models}, the last environment that keeps the rate"
+    return f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows as often"
 
 
 def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
@@ -153,34 +179,3 @@ def iterations(state: RunState) -> str:
     if found.iterations_95 > given:
         line += f"; a 95 % chance to see f needs --iterations {found.iterations_95}"
     return line
-
-
-def count(number: int, word: str) -> str:
-    """1 model, 2 models."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
-
-
-def first_of(names: Sequence[str], most: int) -> str:
-    """a, b and 3 more: at most `most` of them by name."""
-    left = len(names) - most
-    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
-
-
-def duration(seconds: float) -> str:
-    """`seconds` as 7 s, 1 min 40 s or 2 h 05 min."""
-    whole = max(0, round(seconds)) if math.isfinite(seconds) else 0
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02} min"
-
-
-def percent(part: float) -> str:
-    """A fraction as a whole percentage that is never rounded to certainty."""
-    value = round(100 * part)
-    if value == 0 and part > 0:
-        return "<1 %"
-    if value == 100 and part < 1:
-        return ">99 %"
-    return f"{value} %"

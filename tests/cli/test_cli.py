@@ -43,7 +43,8 @@ def test_a_reduction_finds_the_two_that_matter(reduced):
     assert summary["minimal"] is True
     assert (summary["models_before"], summary["models_after"]) == (6, 2)
     assert sum(summary["outcomes"].values()) == summary["tests"]
-    assert summary["failure_rate"] == 1.0
+    assert summary["rate_left"]["rate"] == summary["rate_whole_world"]["rate"] == 1.0
+    assert [claim["verdict"] for claim in summary["certificate"]["claims"]] == ["kept", "needed", "needed"]
     assert summary["outcomes"]["pass"] > 0
     assert set(summary) >= {"deflake_runs", "rounds", "wall_seconds", "run_file"}
 
@@ -87,7 +88,7 @@ def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     summary = json.loads(done.stdout)
     assert (summary["kept"], summary["minimal"], summary["failure"]) == (reduced[1]["kept"], True, "stuck")
     assert summary["ended_early"] > 0
-    assert "confirming what is left with full runs" in done.stderr
+    assert "certificate 1: fresh runs of what is left (2 models)" in done.stderr
 
 
 def test_runs_are_listed_and_a_damaged_one_does_not_hide_the_others(reduced):
@@ -226,6 +227,8 @@ MISTAKES = {
     "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
     "name": (["run", WALL, "--name", "../x"], "is not a valid file name"),
     "no run": (["open", "nothing"], "no such run file"),
+    "no run to certify": (["certify", "nothing"], "no such run file"),
+    "no runs": (["certify", "nothing", "--runs", "0"], "0 is not in the range"),
     "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),

@@ -9,7 +9,11 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
+from ddenv.claims import is_minimal, verdict_on
+from ddenv.rates import wilson_interval
+from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
@@ -80,6 +84,8 @@ class FakeRun:
         self.tests = 0
         self.round = 0
         self.trials = 0
+        self.certificates = 0
+        self.fresh = self.first_fresh = FIRST_FRESH_RUN
         self._stack = ExitStack()
 
     def engine(self):
@@ -142,13 +148,48 @@ class FakeRun:
         self.finish(number, outcome, distance, failure=failure)
         return number
 
-    def confirm(self, without: str | None = None, run: int = 0) -> int:
-        """A full run of what is left starts."""
+    def start_certificate(self) -> None:
+        self.certificates += 1
+        self.first_fresh = self.fresh
+        terms = {"rate": 0.7, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
+        self.write("certificate_started", certificate=self.certificates, run=self.fresh, **terms)
+
+    def certify(self, node: int, without: str | None = None, run: int = 0) -> int:
+        """A run with a fresh seed starts, of the environment of `node`."""
         self.tests += 1
-        left_out = None if without is None else self.elements.index(without)
-        place = {"phase": "confirm", "round": None, "candidate": None, "without": left_out}
-        self.write("test_started", test=self.tests, **place, run=run, seed=run)
+        place = {"phase": "certify", "round": None, "candidate": None, "node": node}
+        if without is not None:
+            place["without"] = self.elements.index(without)
+        number = self.first_fresh + run
+        self.write("test_started", test=self.tests, **place, run=number, seed=number)
+        self.fresh = max(self.fresh, number + 1)
         return self.tests
+
+    def certify_all(self, node: int, without: str | None, outcomes: str) -> None:
+        """A run for each letter: s similar, p pass, o another failure, e broken."""
+        words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "o": ("other", 2.3, "tipped over")}
+        for run, letter in enumerate(outcomes):
+            outcome, distance, failure = words.get(letter, ("error", None, "the simulation broke"))
+            self.finish(self.certify(node, without, run), outcome, distance, failure=failure)
+
+    def finish_certificate(self, *claims: tuple[str | None, str, str]) -> None:
+        """Each claim as (without, verdict, outcomes as in `certify_all`)."""
+        tests = [test.id for test in fold(self.file.events()).confirm_tests]
+        self.write("certificate_finished", claims=[self._claim(*each) for each in claims], tests=tests)
+
+    def _claim(self, without: str | None, verdict: str, outcomes: str) -> dict:
+        shown, runs = outcomes.count("s"), len(outcomes.replace("e", ""))
+        low, high = wilson_interval(shown, runs) if runs else (0.0, 1.0)
+        names = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
+        return {
+            "without": None if without is None else self.elements.index(without),
+            "verdict": verdict,
+            "shown": shown,
+            "runs": runs,
+            "low": low,
+            "high": high,
+            "outcomes": {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes},
+        }
 
     def live(self, *tests: tuple[int, float]) -> None:
         """Tests run now: each (test, part of the way from 0 to 1)."""
@@ -352,16 +393,57 @@ def guided(run: FakeRun) -> FakeRun:
     return run
 
 
-def confirming(run: FakeRun) -> FakeRun:
-    """The rounds left two models, and two full runs are made of what is left."""
-    _rounds(run).write("confirm_started", round=None)
-    run.finish(run.confirm(), "similar", 0.12, failure="stuck")
-    run.finish(run.confirm("crate_00"), "other", 2.3, failure="tipped over")
-    run.live((run.confirm("crate_00", 1), 0.6), (run.confirm("crate_01"), 0.25))
+def certifying(run: FakeRun) -> FakeRun:
+    """The rounds left two models, and fresh runs show what they are worth."""
+    _rounds(run).start_certificate()
+    run.certify_all(2, None, "ssssss")
+    run.certify_all(0, None, "ssspss")
+    run.certify_all(2, "crate_00", "oppe")
+    run.live((run.certify(2, "crate_00", 4), 0.6), (run.certify(2, "crate_01"), 0.25))
     return run
 
 
 def finished(run: FakeRun) -> FakeRun:
-    """A run that ended with two models."""
-    _rounds(run).write("finished", minimal=True, reason="no candidate showed f")
+    """A run that ended with two models, each shown to be needed."""
+    _rounds(run).start_certificate()
+    claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
+    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
+    return _claimed(run, claims)
+
+
+def uncertified(run: FakeRun) -> FakeRun:
+    """A run of a file of format 4, which ended with two models and without a certificate."""
+    _rounds(run).write("finished", minimal=True, reason="no single model can be removed")
+    return run
+
+
+def not_shown(run: FakeRun) -> FakeRun:
+    """A run that ended with two models, one of which may not be needed."""
+    _rounds(run).start_certificate()
+    claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
+    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
+    return _claimed(run, claims)
+
+
+def rarer(run: FakeRun) -> FakeRun:
+    """Round 2 in an environment that showed f in one of six runs."""
+    run.created().baseline()
+    run.start_round(2)
+    left, endings = run.elements[:6], ("pass", "similar", "pass", "other", "pass", "pass")
+    tests = [run.test(0, outcome, 0.12, number) for number, outcome in enumerate(endings)]
+    run.judge(0, "similar", tests)
+    run.reduce(0, left, tests[1])
+    run.start_round(3, left)
+    run.dissimilar(0)
+    run.live((run.start(1), 0.6))
+    return run
+
+
+def _claimed(run: FakeRun, claims: tuple) -> FakeRun:
+    """The runs of the current environment that each claim rests on, and the end."""
+    for without, _, outcomes in claims:
+        run.certify_all(2, without, outcomes)
+    run.finish_certificate(*claims)
+    certificate = fold(run.file.events()).certificates[-1]
+    run.write("finished", minimal=is_minimal(certificate), reason=verdict_on(certificate))
     return run

@@ -99,22 +99,51 @@ def test_what_waits_says_which_keys_decide(run):
     assert rows_of(snapshot(fake_run.waiting(run)))[0]["verdict"] == "? a or x"
 
 
-def test_full_runs_of_what_is_left_have_rows(run):
-    rows = rows_of(snapshot(fake_run.confirming(run)))
-    told = [(row["#"], row["candidate"], row["models"], row["tests"], row["verdict"]) for row in rows]
-    assert told == [
-        ("1", "all left", "2", "run 1", "● stuck"),
-        ("2", "- crate_00", "1", "run 1", "◇ tipped over"),
-        ("3", "- crate_00", "1", "run 2", "▶ 26.8 s"),
-        ("4", "- crate_01", "1", "run 1", "▶ 10.8 s"),
+FRESH = ("environment", "runs", "ended", "f", "95 %", "verdict")
+
+
+def told_of(run, engine="alive") -> list[tuple[str, ...]]:
+    return [tuple(row[name] for name in FRESH) for row in rows_of(snapshot(run, engine))]
+
+
+def test_a_certificate_in_the_making_counts_runs_without_broken_ones(run):
+    assert told_of(fake_run.certifying(run)) == [
+        ("what is left", "6", "6●", "100 %", "61 to 100", ""),
+        ("- crate_00", "3", "1◇ 2○ 1✗", "0 %", "0 to 56", "▶ 26.8 s"),
+        ("- crate_01", "", "", "", "", "▶ 10.8 s"),
+        ("whole world", "6", "5● 1○", "83 %", "44 to 97", ""),
+    ]
+    assert [row[-1] for row in told_of(run, "absent")] == ["", "", "", ""]
+
+
+def test_a_finished_certificate_has_its_verdicts_in_words(run):
+    assert told_of(fake_run.finished(run), "absent") == [
+        ("what is left", "23", "23●", "100 %", "86 to 100", "● kept"),
+        ("- crate_00", "11", "2◇ 9○", "0 %", "0 to 26", "● needed"),
+        ("- crate_01", "12", "1● 11○", "8 %", "1 to 35", "● needed"),
+        ("whole world", "23", "22● 1○", "96 %", "79 to 99", ""),
     ]
 
 
-def test_models_left_out_are_told_apart_by_the_ends_of_their_names(run):
-    state = snapshot(fake_run.confirming(run)).state
-    tests = [replace(test, without=f"construction_barrel_{test.id:02}") for test in state.confirm_tests]
-    rows = rows_of(Snapshot(state.changed(tests=PersistentTuple.of(tests))))
-    assert [row["candidate"] for row in rows] == [f"- cons…_{test.id:02}" for test in tests]
+def test_what_is_not_shown_says_so(run):
+    verdicts = [row[-1] for row in told_of(fake_run.not_shown(run), "absent")]
+    assert verdicts == ["● kept", "? not shown", "✗ tests broke", ""]
+
+
+def test_a_second_certificate_counts_its_own_runs(run):
+    fake_run.finished(run).start_certificate()
+    run.certify_all(2, None, "sps")
+    assert [row[:2] for row in told_of(run)] == [
+        ("what is left", "3"),
+        ("- crate_00", ""),
+        ("- crate_01", ""),
+        ("whole world", ""),
+    ]
+
+
+def test_a_search_that_goes_on_has_its_candidates_again(run):
+    fake_run.certifying(run).write("rate_lost", node=1, lost=2, again=[])
+    assert listed(snapshot(run)).of[0] == "round"
 
 
 def test_tests_of_a_dead_engine_do_not_run(run):

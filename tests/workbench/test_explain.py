@@ -141,13 +141,50 @@ def test_a_minimal_end_names_what_is_kept(run):
     assert "95 % interval 30 % to 95 %" in words
 
 
-def test_full_runs_of_what_is_left_come_before_the_end(run):
-    line, words = told(fake_run.confirming(run))
+def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run):
+    run.created().baseline()
+    run.start_round(2)
+    run.test(0, "similar", 0.1, failure="stuck")
+    run.test(0, "pass", run=1)
+    assert (
+        "Next is one more run of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in told(run)[1]
+    )
+    run.live((run.start(0, 2), 0.4))
+    words = told(run)[1]
+    assert "Run 3 of part A (6 models), candidate 1 of 2: f showed in 1 of 2 runs so far." in words
+    assert "It is taken once its runs show that it keeps the rate of f" in words
+
+
+def test_a_certificate_comes_before_the_end(run):
+    line, words = told(fake_run.certifying(run))
     assert line == 21
-    assert "Confirming what is left with full runs" in words
-    assert "run 2 of all that is left except crate_00" in words
-    run.write("finished", minimal=True, reason="no candidate showed f")
-    assert "f no longer shows; full runs confirm it." in told(run, "absent")[1]
+    assert "what is left has to keep 80 % of the whole world's rate" in words
+    assert "So far f shows in 6 of 6 runs of what is left, and in 5 of 6 runs of the whole world." in words
+    assert "Now run 5 of all that is left except crate_00." in words
+
+
+def test_minimal_is_said_with_what_it_means(run):
+    words = told(fake_run.finished(run), "absent")[1]
+    assert "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (86 % to 100 %)" in words
+    assert "Minimal means: what is left keeps 80 % of the whole world's rate" in words
+
+
+def test_without_fresh_runs_nothing_is_called_minimal(run):
+    words = told(fake_run.uncertified(run), "absent")[1]
+    assert "No single model can be removed; no fresh runs were made." in words
+    assert "Minimal" not in words
+
+
+def test_what_is_not_shown_is_said_in_so_many_words(run):
+    words = told(fake_run.not_shown(run), "absent")[1]
+    assert "Not shown that each model is needed: tests broke without crate_01" in words
+    assert "Minimal" not in words
+
+
+def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
+    words = told(fake_run.rarer(run))[1]
+    assert "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 models." in words
+    assert "rarer" not in told(fake_run.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]
 
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
@@ -241,7 +278,9 @@ def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run
     run.adopt(4, run.elements[:3], run.tests)
     words = told(run)[1]
     assert words.startswith("You adopted try 4: 6 → 3 models. Round 4")
-    run.write("accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={}, distances={})
+    run.write(
+        "accepted_other", test=8, what="try 2", trial=2, environment=[0, 1], outcomes={"8": "similar"}, distances={}
+    )
     assert told(run)[1].startswith("You accepted the other failure of try 2 as f: 3 → 2 models.")
     run.start_round(2, run.elements[:2])
     run.dissimilar(0)
@@ -260,13 +299,11 @@ def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):
 
 def test_what_was_pinned_is_not_called_needed(run):
     fake_run.finished(run)
-    for name, words in (
-        ("crate_00", "the other one f no longer shows; 1 model that you pinned"),
-        ("crate_01", "All of them are pinned: fewer models were not tried."),
-    ):
-        run.pin(name)
-        run.write("finished", minimal=True, reason="")
-        assert words in told(run, "absent")[1]
+    run.pin("crate_00")
+    run.start_certificate()
+    run.finish_certificate((None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"))
+    run.write("finished", minimal=True, reason="no single model can be removed except pinned ones (1)")
+    assert "1 model that you pinned always stayed; p unpins." in told(run, "absent")[1]
 
 
 def test_a_file_that_is_gone_and_another_engine_are_named(run):

@@ -403,7 +403,7 @@ def test_before_f_is_known_nothing_is_tried_or_undone(run):
 
 
 def test_a_round_that_is_over_cannot_be_vetoed(run):
-    state = state_of(fake_run.confirming(run))
+    state = state_of(fake_run.certifying(run))
     assert why_not("veto", state) == "the rounds are over"
     run.write("finished", minimal=True, reason="no candidate showed f")
     state = state_of(run)

@@ -68,7 +68,7 @@ NONSENSE = [
     {},
     {"a": 1},
 ]
-SCENES = (fake_run.mid_round, fake_run.waiting, fake_run.guided, fake_run.confirming, fake_run.finished)
+SCENES = (fake_run.mid_round, fake_run.waiting, fake_run.guided, fake_run.certifying, fake_run.finished)
 
 
 def steering(app):

@@ -63,7 +63,15 @@ def baseline(run):
     return run
 
 
-MOMENTS = [baseline, fake_run.mid_round, fake_run.waiting, fake_run.confirming, fake_run.finished]
+MOMENTS = [
+    baseline,
+    fake_run.mid_round,
+    fake_run.waiting,
+    fake_run.rarer,
+    fake_run.certifying,
+    fake_run.finished,
+    fake_run.not_shown,
+]
 by_name = lambda value: value.__name__ if callable(value) else str(value)  # noqa: E731
 
 
@@ -78,7 +86,7 @@ def test_run_screen(snap_compare, run, theme, size):
 @pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_run.waiting]), ids=by_name)
 def test_moments_of_a_run(snap_compare, run, moment, size):
     moment(run)
-    if moment is not fake_run.finished:
+    if moment not in (fake_run.finished, fake_run.not_shown):
         run.hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown())
 

@@ -24,8 +24,9 @@ def said(shown, width=200, **more):
 
 def test_everything_is_said_where_there_is_room(run):
     shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
-    told = said(shown, scene="http://127.0.0.1:7000/static/", asked="pause", cut=3)
-    assert list(told) == ["state", "asked", "tests", "cut", "time", "left", "mode", "engine", "scene"]
+    told = said(shown, 260, scene="http://127.0.0.1:7000/static/", asked="pause", cut=3)
+    assert list(told) == ["state", "asked", "tests", "drift", "cut", "time", "left", "mode", "engine", "scene"]
+    assert told["drift"] == "f in 1 of 1 here, 3 of 4 in the whole world"
     assert told["state"] == "▶ running"
     assert told["tests"] == "10 tests: 4 similar 4 pass 2 other"
     assert (told["cut"], told["time"], told["engine"]) == ("3 ended early", "1 min 23 s", "engine ●")
@@ -36,6 +37,21 @@ def test_everything_is_said_where_there_is_room(run):
 def test_it_is_said_that_the_piles_settle(run):
     run.created().write("supports_started")
     assert said(snapshot(run))["state"] == "▶ finding what rests on what"
+
+
+@pytest.mark.parametrize("width", [200, 120, 100, 80])
+def test_where_f_is_clearly_rarer_the_mark_and_the_key_stay(run, width):
+    told = said(snapshot(fake_run.rarer(run)), width)
+    assert told["drift"].startswith("▼ f ") and told["drift"].endswith(": u goes back")
+
+
+def test_broken_tests_do_not_count_in_the_drift(run):
+    fake_run.certifying(run)
+    before = said(snapshot(run))["drift"]
+    run.certify_all(2, None, "eee")
+    assert said(snapshot(run))["drift"] == before
+    run.certify_all(2, None, "s")
+    assert said(snapshot(run))["drift"] != before
 
 
 @pytest.mark.parametrize("width", [120, 100, 80, 64, 40])

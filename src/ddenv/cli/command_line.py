@@ -1,6 +1,6 @@
 """The command line: all commands, and their exit codes.
 
-Exit codes: 0 done (for a reduction: minimal), 1 stopped before that, 2 wrong input, 130 interrupted.
+Exit codes: 0 done (for a reduction: shown to be minimal), 1 stopped before that, 2 wrong input, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from ddenv.cli.certify_command import certify_command
 from ddenv.cli.config_command import config_command
 from ddenv.cli.export_command import export_command
 from ddenv.cli.open_command import open_command
@@ -66,6 +67,7 @@ def _cannot_print(error: OSError) -> int:
 for command in (
     run_command,
     resume_command,
+    certify_command,
     open_command,
     runs_command,
     test_command,

@@ -1,4 +1,4 @@
-"""Follows a run without a screen: plain lines, or on a terminal one line that is updated; and a summary at the end."""
+"""Follows a run without a screen: plain lines, or on a terminal one line that is updated."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
+from ddenv.cli.summary import summary, summary_lines
 from ddenv.errors import UserError, printable
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines
-from ddenv.words import count, headline, news
+from ddenv.words import headline, news
 
 POLL = 0.2
-# The maximum number of names in a line.
-MOST_NAMES = 12
 
 
 class Interrupted(Exception):
@@ -35,10 +34,10 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
     """Prints what happens and the result, as one JSON object if asked; returns the exit code and the last state."""
     try:
         state = follow(path, engine, sys.stderr if as_json else sys.stdout)
-        code = 0 if state.minimal else 1
+        code = 0 if state.certified else 1
     except Interrupted as interrupted:
         # It may have ended just then.
-        state, code = interrupted.state, 0 if interrupted.state.minimal else 130
+        state, code = interrupted.state, 0 if interrupted.state.certified else 130
     print(json.dumps(summary(state, path)) if as_json else "\n".join(summary_lines(state, path)), flush=True)
     if code == 130:
         print(f"interrupted; continue with: ddenv resume {path}", file=sys.stderr)
@@ -117,55 +116,3 @@ class _Line(_Plain):
 
     def close(self) -> None:
         print("\r\x1b[K", end="", file=self._out, flush=True)
-
-
-def summary(state: RunState, path: Path) -> dict[str, Any]:
-    """The object that `--json` prints. Durations are in s."""
-    return {
-        "models_before": len(state.elements),
-        "models_after": len(state.environment),
-        "kept": list(state.environment),
-        "tests": state.tests_done,
-        "outcomes": state.outcomes(),
-        "deflake_runs": state.deflake_runs,
-        "ended_early": state.cut_tests,
-        "rounds": state.rounds_done,
-        "minimal": state.minimal,
-        "failure": state.failure or None,
-        "failure_rate": None if state.baseline is None else state.baseline.rate,
-        "wall_seconds": round(state.working_seconds, 3),
-        "status": state.status,
-        "reason": state.reason,
-        "run_file": str(path),
-    }
-
-
-def summary_lines(state: RunState, path: Path) -> list[str]:
-    """The same for people."""
-    before, after = len(state.elements), len(state.environment)
-    if state.baseline is None:
-        return [f"run file: {path}"]
-    what = "minimal environment" if state.minimal else "environment so far"
-    tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
-    early = f"; {state.cut_tests} ended early" if state.cut_tests else ""
-    said = [
-        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {_names(state)}",
-        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{early}) in {count(state.rounds_done, 'round')}, "
-        f"{state.working_seconds:.0f} s",
-        *broken(state),
-        f"run file: {path}",
-    ]
-    return [printable(line) for line in said]
-
-
-def broken(state: RunState) -> list[str]:
-    """Why the last broken test broke, if any did: broken tests count as tests without the failure."""
-    tests = [test for test in state.tests if test.outcome in ("error", "timeout")]
-    return [f"{count(len(tests), 'test')} broke, the last one: {tests[-1].failure}"] if tests else []
-
-
-def _names(state: RunState) -> str:
-    """The models that are left, the first ones if there are many."""
-    kept = state.environment
-    more = f" and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
-    return ", ".join(kept[:MOST_NAMES]) + more

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ddenv.claims import seen
 from ddenv.page.blocks import Block, Cell, Section, Table, moment, plain, say
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import Node, RunState, Trial
@@ -19,6 +20,7 @@ HOW = {
     "adopted": "adopted by hand",
     "accepted": "another failure, accepted by hand",
     "instead": "a branch to its failure",
+    "certified": "by a certificate",
 }
 
 
@@ -63,17 +65,17 @@ def _tree(state: RunState) -> list[Block]:
     if len(nodes) < 2:
         return []
     straight = all(node.parent == node.number - 1 and node.how == "reduced" for node in nodes[1:])
-    if straight and state.node == len(nodes) - 1 and not any(node.rejected for node in nodes):
+    if straight and state.node == len(nodes) - 1 and not any(node.rejected or node.lost_rate for node in nodes):
         return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
     order = list(_drawn(state))
     rows = [_node(state, nodes[number], indent) for number, indent in order]
     here = frozenset(index for index, (number, _) in enumerate(order) if number == state.node)
-    head = ("environment", "models", "came by", "round", "tests", "")
+    head = ("environment", "models", "came by", "round", "tests", "f shown", "")
     if len(rows) > MOST:
         here = frozenset()
     return [
         say("The tree of reductions, each environment below the one it came from:"),
-        Table(head, _cut(rows, 2), frozenset({1, 3, 4}), here),
+        Table(head, _cut(rows, 2), frozenset({1, 3, 4, 5}), here),
     ]
 
 
@@ -114,12 +116,21 @@ def _path(state: RunState) -> frozenset[int]:
 
 def _node(state: RunState, node: Node, indent: str) -> tuple[Cell, ...]:
     marks = ["taken back"] if node.rejected else []
+    marks += ["f too rare"] if node.lost_rate else []
     marks += ["minimal"] if node.minimal else []
     marks += ["here"] if node.number == state.node else []
     how = HOW.get(node.how, "")
     came = f"{plain(node.what)}, {how}" if how else plain(node.what)
     round = "" if node.round is None else str(node.round)
-    return f"{indent}{node.number}", str(len(node.environment)), came, round, str(node.tests), ", ".join(marks)
+    return (
+        f"{indent}{node.number}",
+        str(len(node.environment)),
+        came,
+        round,
+        str(node.tests),
+        seen(node),
+        ", ".join(marks),
+    )
 
 
 def _cut(rows: Sequence[tuple[Cell, ...]], words: int) -> tuple[tuple[Cell, ...], ...]:

@@ -42,7 +42,13 @@ MEANING = {
     "timeout": "the test took too long on the clock",
     "failed": "failed, before f was fixed",
 }
-PHASES = (("baseline", "whole world"), ("round", "in rounds"), ("hand", "by hand"), ("confirm", "full runs at the end"))
+PHASES = (
+    ("baseline", "whole world"),
+    ("round", "in rounds"),
+    ("hand", "by hand"),
+    ("certify", "fresh runs"),
+    ("confirm", "full runs at the end"),
+)
 
 
 def sureness(record: Record) -> Section | None:
@@ -50,7 +56,7 @@ def sureness(record: Record) -> Section | None:
     state = record.state
     if not state.tests_done:
         return None
-    return Section("How sure it is", (*_baseline(state), *_tests(state), *_confirmed(state), *_mixed(state)))
+    return Section("How sure it is", (*_baseline(state), *_tests(state), *_mixed(state)))
 
 
 def _mixed(state: RunState) -> list[Block]:
@@ -136,19 +142,3 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
     return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
-
-
-def _confirmed(state: RunState) -> list[Block]:
-    tests = [test for test in state.confirm_tests if test.is_finished]
-    if not tests:
-        return []
-    whole = [test for test in tests if test.without is None]
-    shown = sum(test.outcome == "similar" for test in whole)
-    without = [test for test in tests if test.without is not None]
-    missed = sum(test.outcome != "similar" for test in without)
-    return [
-        say(
-            f"Full runs of what was left at the end: f showed in {shown} of {len(whole)}; "
-            f"with one more model left out it did not show in {missed} of {len(without)}."
-        )
-    ]

@@ -73,10 +73,12 @@ def repeat(record: Record) -> Section:
     state, run = record.state, shlex.quote(plain(record.path))
     blocks: list[Block] = []
     if state.baseline is not None:
-        kept = "minimal world" if state.minimal else "world that is left"
+        kept = "minimal world" if state.certified else "world that is left"
         blocks += [
             say(f"See the failure in the {kept}, and that it needs each of its models:"),
             Code((f"ddenv test {run} --minimal --leave-each-out",)),
+            say("Run it more often with fresh seeds, for a narrower interval:"),
+            Code((f"ddenv certify {run} --runs 100",)),
             say(f"Take the {kept} elsewhere, with a scenario that runs the robot in it:"),
             Code((f"ddenv export {run} --sdf minimal.sdf --scenario minimal.yaml",)),
         ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from ddenv.claims import ended
 from ddenv.errors import UserError
 from ddenv.page.blocks import (
     Paragraph,
@@ -28,6 +29,7 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
+from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
 from ddenv.runfile.state import RunState
@@ -39,7 +41,7 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    about = (what_is_left, way, guiding, sureness, others_met, settings, repeat)
+    about = (what_is_left, worth, way, guiding, sureness, others_met, settings, repeat)
     sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
@@ -55,13 +57,13 @@ def _verdict(state: RunState) -> str:
     left, all_of_them = len(state.environment), len(state.elements)
     if state.baseline is None:
         return "No failure is known yet"
-    if state.minimal and not left:
+    if state.certified and not left:
         return f"None of the {count(all_of_them, 'model')} is needed to make the robot fail"
     enough = "is" if left == 1 else "are"
     if left == all_of_them:
         return f"The robot fails among all {count(left, 'model')}; none is removed yet"
     words = f"{left} of {all_of_them} models {enough} enough to make the robot fail"
-    return words if state.minimal else f"{words} so far"
+    return words if state.certified else f"{words} so far"
 
 
 def _damage(record: Record) -> list[Paragraph]:
@@ -74,10 +76,11 @@ def _standing(record: Record) -> list[Paragraph]:
     """Whether it is over, and why it ended."""
     state = record.state
     why = plain(state.reason).rstrip(".")
-    if state.status == "finished" and state.minimal:
+    if state.status == "finished" and state.certified:
         return [_minimal(state)]
     if state.status == "finished":
-        return [say(Strong("Not minimal."), f" The run ended before that: {why or 'no reason is known'}.", notice=True)]
+        why = plain(ended(state)).rstrip(".") or "no reason is known"
+        return [say(Strong("Not shown to be minimal:"), f" {why}.", notice=True)]
     if state.status == "stopped":
         return [
             say(Strong("Stopped"), f"{f': {why}' if why else ''}. This report shows what was known then.", notice=True)
@@ -94,11 +97,9 @@ def _standing(record: Record) -> list[Paragraph]:
 
 
 def _minimal(state: RunState) -> Paragraph:
-    sure = " Full runs confirm it." if state.confirming else ""
     if not state.environment:
-        return say(Strong("Minimal."), f" Look at the robot, its goal, and the models that always stay.{sure}")
-    them = "it" if len(state.environment) == 1 else "any one of them"
-    return say(Strong("Minimal:"), f" without {them} the failure was not seen again.{sure}")
+        return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
+    return say(Strong("Minimal:"), f" {plain(state.reason).rstrip('.')}.")
 
 
 def _failure(state: RunState) -> list[Paragraph]:
@@ -139,6 +140,8 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
     figures = [(f"{before} → {after}" if after != before else str(before), "models")]
     if after < before:
         figures.append((percent(1 - after / before), "smaller"))
+    if state.baseline is not None and (shown := rate_of_left(state))[0]:
+        figures.append(shown)
     spent, rounds = state.working_seconds, len(record.rounds)
     if state.started_at is not None:
         spent += max(0.0, state.updated_at - state.started_at)

@@ -23,7 +23,7 @@ MOST_MODELS, MOST_NAMES, MOST_DROPPED = 200, 12, 3
 def what_is_left(record: Record) -> Section:
     """The section on what is left."""
     state = record.state
-    title = "The minimal environment" if state.minimal else "What is left so far"
+    title = "The minimal environment" if state.certified else "What is left so far"
     if state.baseline is None:
         title = "The world"
     if record.world is None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, supports
+from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, supports
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
@@ -59,7 +59,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "reason": "",
         "paused": False,
         "waiting_candidate": None,
-        "confirming": False,
+        "confirming": state.certificate is not None and not state.certificate.claims,
         "settling": False,
         "jobs": int(data["jobs"]),
         "engine_version": str(data["version"]),
@@ -117,7 +117,8 @@ def _test_finished(state: RunState, data: Data, _: float) -> Changes:
     if values["outcome"] not in ("similar", "other"):
         # Few tests fail: the rounds of all others need not be kept.
         values["tried"] = None
-    return with_test(state, int(data["test"]), values)
+    changes = with_test(state, int(data["test"]), values)
+    return changes | fold_rates.noted(state, changes["tests"][int(data["test"]) - 1])
 
 
 def _test_lost(state: RunState, data: Data, _: float) -> Changes:
@@ -187,7 +188,7 @@ def _reduced(state: RunState, data: Data, at: float) -> Changes:
     # One part alone shows f although several seemed to be needed: the lower bound was wrong.
     if winner.kind == "partition" and _current(state).missed > 1:
         state = state.changed(lower_bound=0)
-    changes = arrived(state, data, at, "reduced", winner.label)
+    changes = arrived(state, data, at, "reduced", winner.label, winner.tests)
     return changes | {"round": replace(_current(state), winner=winner.index)}
 
 

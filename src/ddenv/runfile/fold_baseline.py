@@ -7,6 +7,7 @@ from dataclasses import replace
 from ddenv.runfile.events import Changes, Data, chance, vector
 from ddenv.runfile.failures import Baseline, SeenFailure
 from ddenv.runfile.fold_decisions import with_outcomes
+from ddenv.runfile.fold_rates import seen
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import RunState
 
@@ -28,14 +29,16 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
     )
     compared = with_outcomes(state, data)
     point = Point(compared.tests_done, len(state.environment))
-    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=baseline.failure_test),)
+    runs, shown = seen(compared.tests, (test.id for test in compared.tests if test.phase == "baseline"))
+    first = baseline.failure_test
+    root = () if not state.nodes else (replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown),)
     return {
         "tests": compared.tests,
         "tally": compared.tally,
         "deflake_runs": compared.deflake_runs,
         "baseline": baseline,
-        "evidence_test": baseline.failure_test,
-        "failures": (baseline.failure_test,),
+        "evidence_test": first,
+        "failures": (first,),
         "nodes": (*root, *state.nodes[1:]),
         "history": (*state.history, point),
         "status": state.status if state.paused else "running",

@@ -76,4 +76,5 @@ def rate_lost(state: RunState, data: Data, _: float) -> Changes:
 
 def left_out(state: RunState, data: Data, at: float) -> Changes:
     without = names(state.elements, [data["without"]])[0]
-    return arrived(state, data, at, "certified", f"without {listed([without])}")
+    runs = [test.id for test in state.confirm_tests if (test.node, test.without) == (state.node, without)]
+    return arrived(state, data, at, "certified", f"without {listed([without])}", runs)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes, Data, names, number, one_of
+from ddenv.runfile.fold_rates import counted_again, same_runs, seen
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import Decision, Node, RunState, Test, Trial, many
 
@@ -47,7 +48,7 @@ def adopted(state: RunState, data: Data, at: float) -> Changes:
     words = f"adopted {trial.label}: {many(trial.size)}"
     return {
         **_with_trial(state, trial),
-        **arrived(state, data, at, "adopted", trial.label),
+        **arrived(state, data, at, "adopted", trial.label, trial.tests),
         **decision(state, at, "adopt", words),
     }
 
@@ -59,6 +60,7 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
     trial = None if data.get("trial") is None else tried(state, data["trial"])
     what = trial.label if trial else str(data["what"])
     judged = with_outcomes(state, data)
+    judged = judged.changed(nodes=counted_again(judged.nodes, judged.tests))
     if data.get("instead"):
         return _branched(judged, test, data, at, what)
     changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
@@ -67,14 +69,16 @@ def accepted_other(state: RunState, data: Data, at: float) -> Changes:
         "tally": judged.tally,
         "failures": (*state.failures, test.id),
         **changes,
-        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what),
+        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what, same_runs(judged, test)),
         **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
     }
 
 
 def _branched(state: RunState, test: Test, data: Data, at: float, what: str) -> Changes:
     """Another failure is f from now on, in place of what was f, in the environment that showed it."""
-    arrival = arrived(state, {**data, "evidence_test": test.id}, at, "instead", what, below=test.node)
+    arrival = arrived(
+        state, {**data, "evidence_test": test.id}, at, "instead", what, same_runs(state, test), below=test.node
+    )
     gone = state.pinned.difference(arrival["environment"])
     words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
     return {
@@ -106,7 +110,10 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
-    judged = with_outcomes(state, data) if "outcomes" in data else state
+    judged = state
+    if "outcomes" in data:
+        judged = with_outcomes(state, data)
+        nodes = list(counted_again(nodes, judged.tests))
     return {
         **left_round(state),
         "tests": judged.tests,
@@ -146,10 +153,13 @@ def command_refused(state: RunState, data: Data, _: float) -> Changes:
     return {"refusal": (int(data["command"]), str(data["why"]))}
 
 
-def arrived(state: RunState, data: Data, at: float, how: str, what: str, below: int | None = None) -> Changes:
-    """The run moves to another environment, a new node below the current one, or below node number `below`."""
+def arrived(
+    state: RunState, data: Data, at: float, how: str, what: str, tests: Iterable[int], below: int | None = None
+) -> Changes:
+    """The run moves to another environment, a new node below the current one, or below node number `below`; `tests` ran it."""
     environment = names(state.elements, data["environment"])
     reduction = state.scenario.get("reduction", {})
+    runs, shown = seen(state.tests, tests)
     node = Node(
         number=len(state.nodes),
         parent=state.node if below is None else below,
@@ -161,6 +171,8 @@ def arrived(state: RunState, data: Data, at: float, how: str, what: str, below: 
         time=at,
         evidence_test=int(data["evidence_test"]),
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
+        runs=runs,
+        shown=shown,
     )
     inside = set(environment) <= set(state.environment)
     # Nothing is known yet about what another failure needs.

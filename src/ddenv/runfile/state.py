@@ -160,6 +160,11 @@ class RunState:
         return last if last is not None and last.node == self.node and not last.past else None
 
     @property
+    def certified(self) -> bool:
+        """Whether the run ended as minimal, and fresh runs show it; files of format 4 have no certificate."""
+        return self.minimal and self.certificate is not None
+
+    @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
         # Tries of the user may run between them.
@@ -192,7 +197,7 @@ class Node:
     names the candidate, trial or test. `tests` is the number of tests finished by then, `time` is Unix time, s, `round` the round
     that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known. `method` is the
     algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs showed that f
-    is too rare in it.
+    is too rare in it. `runs` are the tests of its environment that ended and did not break; `shown` of them showed f.
     """
 
     number: int
@@ -208,6 +213,8 @@ class Node:
     minimal: bool = False
     rejected: bool = False
     lost_rate: bool = False
+    runs: tuple[int, ...] = ()
+    shown: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ STATUS = {
     "settling": ("▶", SETTLING),
     "baseline": ("▶", "baseline"),
     "running": ("▶", "running"),
-    "confirming": ("▶", "confirming"),
+    "certifying": ("▶", "certificate"),
     "paused": ("‖", "paused"),
     "waiting": ("?", "waiting"),
     "finished": ("■", "finished"),
@@ -44,9 +44,22 @@ VERDICT = {
     "similar": "● similar",
     "missed": "○ missed",
     "dissimilar": "○ dissimilar",
+    "unknown": "✗ unknown",
     "vetoed": "⊘ vetoed",
     "rejected": "✗ rejected",
 }
+
+
+# The signs of the verdicts of a certificate.
+CLAIM = {"kept": "●", "lost": "✗", "needed": "●", "not needed": "○", "not shown": "?", "unknown": "✗"}
+_SIGNED = ("similar", "other", "pass", "error", "timeout", "failed")
+
+
+def signs(counts: Mapping[str, int]) -> str:
+    """How tests ended, in signs with their counts, from the number of each outcome."""
+    said = [f"{counts[name]}{OUTCOME[name][0]}" for name in _SIGNED if counts.get(name)]
+    spaced = " ".join(said)
+    return spaced if len(spaced) < 9 else "".join(said)
 
 
 def outcome(test: Test) -> str:

@@ -61,7 +61,8 @@ async def test_the_history_follows_the_run_and_compares(run):
         history = session.app.screen
         assert isinstance(history, History)
         assert [row[0] for row in cells(session)] == ["○ 11 models", "○ 6 models", "├─✗ 4 models", "● 5 models"]
-        assert [row[4] for row in cells(session)] == ["", "", "taken back", "here"]
+        assert [row[4] for row in cells(session)] == ["3 of 4", "1 of 1", "1 of 1", "1 of 1"]
+        assert [row[5] for row in cells(session)] == ["", "", "taken back", "here"]
         assert history.under_cursor.number == 3
         decided = " ".join(line.plain[10:] for line in history.query_one(Lines).items)
         assert decided.startswith("took back without A: 6 models again pinned crate_00")

@@ -82,7 +82,7 @@ async def test_every_run_says_how_it_stands(several):
         states = {name: row[1:4] for name, row in listed.rows().items()}
         assert states == {
             "crates-1": ["▶ running", "6 of 11", "10"],
-            "done": ["■ minimal", "2 of 11", "14"],
+            "done": ["■ minimal", "2 of 11", "83"],
             "gone [b]x": ["✗ engine is gone", "6 of 11", "10"],
             "new": ["○ not started", "11 of 11", "0"],
             "broken": ["✗ cannot be read", "", ""],

@@ -53,10 +53,10 @@ def path(nodes: Sequence[Node], number: int) -> list[int]:
 
 
 def sign(node: Node, here: int) -> str:
-    """The sign of a node: current, taken back, minimal or none of these."""
+    """The sign of a node: current, taken back (or too rare in f), minimal or none of these."""
     if node.number == here:
         return HERE
-    if node.rejected:
+    if node.rejected or node.lost_rate:
         return REJECTED
     return MINIMAL if node.minimal else OTHER
 
@@ -68,6 +68,8 @@ def words(node: Node, here: int) -> str:
         found.append("minimal")
     if node.rejected:
         found.append("taken back")
+    if node.lost_rate:
+        found.append("f too rare")
     return ", ".join(found)
 
 

@@ -14,6 +14,7 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
+from ddenv.claims import of_runs, seen
 from ddenv.guiding.commands import refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
@@ -31,7 +32,7 @@ from ddenv.workbench.wording import count, plain, shorten
 # Time between two looks at the run, s.
 PERIOD = 0.5
 # Name and width of the columns after the tree; the last is for wide terminals.
-COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("", 22), ("method", 36))
+COLUMNS = (("#", 3), ("made by", 15), ("tests", 5), ("f shown", 10), ("", 14), ("method", 36))
 ROOM = 90
 # The width of the tree in columns, without the lines of its branches.
 TREE = 15
@@ -137,12 +138,12 @@ class History(Screen[int | None]):
     def _cells(self, row: branches.Row) -> tuple[Text, ...]:
         node = row.node
         here = node.number == self._here
-        style = "bold" if here else "dim" if node.rejected else ""
+        style = "bold" if here else "dim" if node.rejected or node.lost_rate else ""
         sign = branches.sign(node, self._here)
         size = len(node.environment)
         marked = MARK if node.number == self._marked else ""
         words = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
-        texts = (str(node.number), plain(node.what), str(node.tests), words, plain(node.method))
+        texts = (str(node.number), plain(node.what), str(node.tests), seen(node), words, plain(node.method))
         cells = (
             Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
         )
@@ -178,6 +179,7 @@ class History(Screen[int | None]):
         names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
         text = Text(f"{place(node)}: {how}", "bold", no_wrap=True)
+        text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
         text.append(f"\n{names or 'no models'}", "not bold dim")
         self.query_one("#about", Static).update(text)
@@ -238,7 +240,7 @@ def _as_it_is(line: Text, width: int) -> Text:
 
 
 def _side(name: str) -> Literal["left", "right"]:
-    return "right" if name in ("#", "tests") else "left"
+    return "right" if name in ("#", "tests", "f shown") else "left"
 
 
 HOW = {
@@ -247,4 +249,5 @@ HOW = {
     "adopted": "a try by hand that showed f",
     "accepted": "another failure, accepted as f, too",
     "instead": "a branch: the failure of this test is f here",
+    "certified": "reduced by a certificate: fresh runs show f as often",
 }

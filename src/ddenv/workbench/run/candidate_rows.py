@@ -1,26 +1,29 @@
-"""The rows of the table beside the map, in words: tries and candidates, or the baseline's runs, or the full runs at the end."""
+"""The rows of the table beside the map, in words: tries and candidates, or the baseline's runs, or those of a certificate."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from ddenv.map.names import shortened
+from rich.cells import cell_len
+
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
+from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.workbench.run import certificate_rows
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import DROPS, OUTCOME, VERDICT, brief, dropping, metres, outcome, plain
+from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs
 
-# Maximum width of a model's name, after a sign and a space, in cells.
+# Maximum width of a model's name, in cells.
 NAME = 8
 # The latest judged tries that stay in the table.
 TRIALS = 3
-SIGNS = ("similar", "other", "pass", "error", "timeout", "failed")
 
-Item = Trial | Candidate | Test
-Words = dict[str, str]
+Item = Trial | Candidate | Test | FreshRuns
+Words = Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +48,13 @@ COLUMNS = (
     Column("time", 8, right=True, spare=2),
     Column("verdict", 14),
 )
+FRESH_COLUMNS = (
+    Column("runs", 5, right=True),
+    Column("ended", 10, right=True, spare=1),
+    Column("f", 7, right=True),
+    Column("95 %", 11, right=True),
+    Column("verdict", 14),
+)
 # Columns that only candidates fill.
 OF_CANDIDATES = ("distance", "evidence")
 
@@ -55,7 +65,7 @@ class Listed:
 
     of: tuple[object, ...] = ()
     trials: Sequence[Trial] = ()
-    rest: Sequence[Candidate | Test] = ()
+    rest: Sequence[Candidate | Test | FreshRuns] = ()
 
     def __len__(self) -> int:
         return len(self.trials) + len(self.rest)
@@ -69,18 +79,18 @@ class Listed:
     def row(self, item: Trial | Candidate) -> int | None:
         """The row of a trial or of a candidate of the round."""
         if isinstance(item, Candidate):
-            return len(self.trials) + item.index
+            return len(self.trials) + item.index if self.of[:1] == ("round",) else None
         return next((row for row, each in enumerate(self.trials) if each.number == item.number), None)
 
 
 def listed(snapshot: Snapshot) -> Listed:
     """What the table lists now."""
     state = snapshot.state
-    if state.confirming and not state.ended:
-        return Listed(("confirm",), (), state.confirm_tests)
     here = [trial for trial in state.trials if trial.node == state.node]
     judged = {trial.number for trial in [trial for trial in here if trial.verdict][-TRIALS:]}
     trials = tuple(trial for trial in here if not trial.verdict or trial.number in judged)
+    if state.certificate is not None:
+        return Listed(("certificate", state.certificate.number), trials, fresh_runs(state))
     if state.round is not None:
         return Listed(("round", state.node, state.round.number), trials, state.round.candidates)
     runs = tuple(takewhile(lambda test: test.phase == "baseline", state.tests))
@@ -89,8 +99,8 @@ def listed(snapshot: Snapshot) -> Listed:
 
 def round_title(state: RunState) -> tuple[str, str]:
     """The table's title, and how much of it is done."""
-    if state.confirming and not state.ended:
-        return "Full runs of what is left", f"{sum(test.is_finished for test in state.confirm_tests)} made"
+    if state.certificate is not None:
+        return certificate_rows.certificate_title(state)
     if state.round is None:
         return "Baseline: the whole world", ""
     candidates = state.round.candidates
@@ -106,18 +116,27 @@ def round_title(state: RunState) -> tuple[str, str]:
 def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, ...]:
     """The columns that fit into `width` cells, each with its width; `narrow` leaves out all that can be spared."""
     first = listing.rest[0] if listing.rest else None
+    if isinstance(first, FreshRuns):
+        names = (certificate_rows.name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
+        longest = Column("environment", max(13, *(cell_len(name) + 1 for name in names)))
+        return _fitted((longest, *FRESH_COLUMNS), width, narrow)
     unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:
         unused = ("distance",)
-    columns = [each for each in COLUMNS if each.name not in unused and not (narrow and each.spare)]
     number = Column("#", max(2, len(str(len(listing.rest)))))
-    while (over := number.width - 2 + sum(each.width for each in columns) - width) > 0:
+    return _fitted((number, *(each for each in COLUMNS[1:] if each.name not in unused)), width, narrow)
+
+
+def _fitted(wanted: Sequence[Column], width: int, narrow: bool) -> tuple[Column, ...]:
+    """Those of the columns that fit; the last one gets the rest of the width."""
+    columns = [each for each in wanted if not (narrow and each.spare)]
+    while (over := sum(each.width for each in columns) - width) > 0:
         most = max(columns, key=lambda each: each.spare)
         if not most.spare:
             break
         columns.remove(most)
-    rest = max(0, -over)
-    return (number, *columns[1:-1], Column("verdict", columns[-1].width + rest))
+    *others, last = columns
+    return (*others, Column(last.name, last.width + max(0, -over)))
 
 
 def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
@@ -127,6 +146,8 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         return {}
     if isinstance(item, Test):
         return _run(snapshot, item, row + 1 - len(listing.trials))
+    if isinstance(item, FreshRuns):
+        return certificate_rows.words(snapshot, item)
     tests = [snapshot.state.tests[id - 1] for id in item.tests if 0 < id <= len(snapshot.state.tests)]
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
@@ -134,25 +155,24 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     seconds = sum(test.wall_seconds for test in done)
     candidate = item if isinstance(item, Candidate) else None
     fallen = drops(snapshot.state, item)
+    ended = signs(Counter(test.outcome for test in done))
+    # More runs are made of what shows f until it is clear that it keeps the rate.
+    options = settings(snapshot.state)
+    most = f"/{1 + options.iterations}" if options.accept_rate == "first" else ""
     return {
+        "environment": item.label,
+        "runs": str(len(done)) if done else "",
+        "ended": ended,
         "#": str(candidate.index + 1) if candidate else "",
         "candidate": f"{item.label}{DROPS}" if fallen else item.label,
         "models": str(item.size),
         "distance": metres(candidate.distance) if candidate else "",
-        "tests": f"{len(done)}/{1 + settings(snapshot.state).iterations}" if done or running else "",
-        "evidence": _evidence(done),
+        "tests": f"{len(done)}{most}" if done or running else "",
+        "evidence": ended,
         "to f": metres(min(distances)) if distances else "",
         "time": brief(seconds) if done else "",
         "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
     }
-
-
-def _evidence(tests: Sequence[Test]) -> str:
-    """How tests ended, in signs with their counts."""
-    outcomes = [test.outcome for test in tests]
-    counts = [f"{outcomes.count(name)}{OUTCOME[name][0]}" for name in SIGNS if name in outcomes]
-    spaced = " ".join(counts)
-    return spaced if len(spaced) < 9 else "".join(counts)
 
 
 def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test]) -> str:
@@ -179,17 +199,13 @@ def _seconds(snapshot: Snapshot, test: Test) -> str:
 
 
 def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
-    """One run of the whole world, or of what is left, or of that without one model."""
+    """One run of the whole world."""
     running = test.outcome == "running" and snapshot.engine == "alive"
-    left, name = len(snapshot.state.environment), f"run {test.run + 1}"
-    run = ""
-    if test.phase == "confirm":
-        run, name = name, "all left" if test.without is None else f"- {shortened(test.without, NAME)}"
     return {
         "#": str(number),
-        "candidate": name,
-        "models": str(left - (test.without is not None)),
-        "tests": run,
+        "candidate": f"run {test.run + 1}",
+        "models": str(len(snapshot.state.environment)),
+        "tests": "",
         "to f": metres(test.distance),
         "time": brief(test.wall_seconds) if test.is_finished else "",
         "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),

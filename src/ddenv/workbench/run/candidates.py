@@ -1,4 +1,4 @@
-"""The table of this round's candidates, of the baseline's runs before the first round, or of the full runs after the last."""
+"""The table of this round's candidates, of the baseline's runs before the first round, or of the certificate after the last."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 from ddenv.runfile.state import Candidate, Test, Trial
+from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.workbench.run.candidate_rows import Column, Listed, Words, fitting, listed, words
 from ddenv.workbench.run.poll import Snapshot
 
@@ -82,7 +83,7 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     @property
     def under_cursor(self) -> Candidate | Trial | None:
         item = self._listed.item(self.cursor_row)
-        return None if isinstance(item, Test) else item
+        return None if isinstance(item, Test | FreshRuns) else item
 
     @property
     def chosen(self) -> Candidate | Trial | None:
@@ -233,7 +234,7 @@ def _aligned(column: Column, text: str) -> str:
     """As wide as its column, with a space before it except in the first."""
     if column.right:
         return " " * (column.width - cell_len(text)) + text
-    before = "" if column.name in ("#", "verdict") else " "
+    before = "" if column.name in ("#", "environment", "verdict") else " "
     room = column.width - len(before)
     return before + (set_cell_size(text, room) if cell_len(text) <= room else f"{set_cell_size(text, room - 1)}…")
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ddenv.claims import current, ended, of_runs, promise
 from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.fold_rates import seen
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.words import failed_in, other_failures
+from ddenv.workbench.run.explain_certificate import certifying
 from ddenv.workbench.run.explain_decisions import (
     arrival,
     by_hand,
     last_reduction,
     older_engine,
     out_of_budget,
+    rarer,
     to_adopt,
 )
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
@@ -47,7 +51,7 @@ def explain(snapshot: Snapshot) -> Explanation:
     shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
     if not snapshot.error:
-        sentences = (*older_engine(snapshot), *to_adopt(state), *sentences, *by_hand(state))
+        sentences = (*older_engine(snapshot), *rarer(state), *to_adopt(state), *sentences, *by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
 
@@ -71,7 +75,7 @@ def _happening(snapshot: Snapshot) -> Happening:
     if state.baseline is None:
         return _with_pause(state, ("baseline", _baseline_so_far(state, options)))
     if state.confirming:
-        return _with_pause(state, ("returned", _confirming(snapshot)))
+        return _with_pause(state, ("returned", certifying(snapshot)))
     if state.round is None or state.round.done:
         return _with_pause(state, ("split", _between(snapshot, options)))
     if state.waiting_candidate is not None:
@@ -207,6 +211,8 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
 
 
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
+    if shown := _shown_of(state, candidate):
+        return f"Next is one more run of {place}: {shown}."
     if not 0 < len(candidate.tests) <= options.iterations:
         return f"Next is {place}."
     again = _why_again(_last(state, candidate))
@@ -231,11 +237,27 @@ def _first_run(place: str, options: Settings) -> tuple[str, ...]:
 
 
 def _rerun(state: RunState, candidate: Candidate, test: Test, place: str, options: Settings) -> tuple[str, ...]:
+    if shown := _shown_of(state, candidate):
+        return (
+            f"Run {test.run + 1} of {place}: {shown}.",
+            "It is taken once its runs show that it keeps the rate of f, and given up once that is unlikely.",
+        )
     before = _last(state, candidate)
     return (
         f"Re-run {test.run} of {options.iterations} of {place}: {_why_again(before)}",
-        f"A failure can be flaky: a candidate is dissimilar only after {count(1 + options.iterations, 'test')} without f.",
+        f"A failure can be flaky: a candidate is dissimilar {_enough(options)} {count(1 + options.iterations, 'test')} without f.",
     )
+
+
+def _enough(options: Settings) -> str:
+    return "only after" if options.accept_rate == "first" else "after at most"
+
+
+def _shown_of(state: RunState, candidate: Candidate) -> str:
+    """How often f showed in a candidate that has no verdict yet although f showed in it; "" if it did not."""
+    _, shown = seen(state.tests, candidate.tests)
+    done = sum(state.tests[id - 1].is_finished for id in candidate.tests if 0 < id <= len(state.tests))
+    return f"f showed in {of_runs(shown, done)} so far" if shown else ""
 
 
 def _why_again(before: Test | None) -> str:
@@ -257,16 +279,6 @@ def _otherwise(test: Test) -> str:
     return f"the robot {deed(test.failure)}{'' if test.failure in DEEDS else ' elsewhere,'} {away} from f's end."
 
 
-def _confirming(snapshot: Snapshot) -> tuple[str, ...]:
-    """The rounds are over; full runs confirm their result."""
-    first = "Confirming what is left with full runs: earlier tests ended as soon as the robot was stuck for good."
-    running = [test for test in snapshot.running if test.phase == "confirm"]
-    if not running:
-        return (first,)
-    what = f"all that is left except {plain(running[0].without)}" if running[0].without else "all that is left"
-    return (first, f"Now run {running[0].run + 1} of {what}.")
-
-
 def _reduced(state: RunState, candidate: Candidate, options: Settings) -> Happening:
     before, after = len(candidate.split.environment), candidate.size
     gone = "the others take no part in f" if before - after > 1 else "the other one takes no part in f"
@@ -285,39 +297,26 @@ def _finished(state: RunState) -> Happening:
     options, kept = settings(state), count(len(state.environment), "model")
     if state.baseline is None:
         return None, (_reason(state, "The run ended in the baseline."),)
-    if not state.minimal:
-        return "returned", (
-            _reason(state, "The run ended early."),
-            *out_of_budget(state),
-            f"{kept} left: {_names(state)}.",
-        )
+    base = baseline_sentence(state, options.iterations)
+    if not state.certified:
+        left = f"{kept} left: {_names(state)}."
+        return "returned", (_reason(state, "The run ended early."), *out_of_budget(state), left)
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
-        return "returned", ("Minimal: no model left.", none, baseline_sentence(state, options.iterations))
-    single = len(state.environment) == 1
+        return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
     pinned = state.pinned.intersection(state.environment)
-    if pinned:
-        return "returned", (f"Ended: {kept} left. {_proof_with_pins(state, len(pinned))}", f"Kept: {_names(state)}.")
-    proof = f"without {'it' if single else 'any one of them'} f no longer shows"
-    sure = "; full runs confirm it" if state.confirming else ""
-    return "returned", (
-        f"Minimal: {kept} left, and {proof}{sure}.",
-        f"Kept: {_names(state)}.",
-        baseline_sentence(state, options.iterations),
-    )
-
-
-def _proof_with_pins(state: RunState, pinned: int) -> str:
-    if pinned == len(state.environment):
-        what = "it is" if pinned == 1 else "all of them are"
-        return f"{what[:1].upper()}{what[1:]} pinned: fewer models were not tried. p unpins."
-    others = "the other one" if len(state.environment) - pinned == 1 else "any one of the others"
-    return f"Without {others} f no longer shows; {count(pinned, 'model')} that you pinned always stayed."
+    stays = (f"{count(len(pinned), 'model')} that you pinned always stayed; p unpins.",) if pinned else ()
+    certificate = current(state)
+    means = () if certificate is None else (_sentence(promise(certificate)),)
+    return "returned", (f"Minimal: {kept} left. {_reason(state, '')}", f"Kept: {_names(state)}.", *stays, *means, base)
 
 
 def _reason(state: RunState, otherwise: str) -> str:
-    text = plain(state.reason) or otherwise
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    return _sentence(plain(ended(state)) or otherwise)
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:] + ("" if words.endswith(".") else ".")
 
 
 def _names(state: RunState) -> str:

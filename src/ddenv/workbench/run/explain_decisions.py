@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ddenv.claims import drift, has_dropped
 from ddenv.guiding.situation import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
@@ -53,6 +54,15 @@ def _under_way(state: RunState, trial: Trial) -> str:
         return f"{what} is the next test, before the round goes on."
     again = f"re-run {running.run} of {most - 1}" if running.run else "first run"
     return f"{what} is being tested: {again}."
+
+
+def rarer(state: RunState) -> tuple[str, ...]:
+    """A warning where f shows clearly less often than in the whole world."""
+    here = state.here
+    if not (has_dropped(state) and drift(state)) or here is None or here.parent is None:
+        return ()
+    before = count(len(state.nodes[here.parent].environment), "model")
+    return (f"f is rarer than it was: {drift(state)[0]}. u goes back to {before}.",)
 
 
 def arrival(state: RunState) -> str:

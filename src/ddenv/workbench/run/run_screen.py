@@ -178,6 +178,8 @@ class RunScreen(Screen[None]):
         self.query_one(Header).show(snapshot)
         self._show_map()
         self._show_models()
+        # Its rows are wider than those of candidates.
+        self.set_class(snapshot.state.certificate is not None, "-certificate")
         title = round_title(snapshot.state)
         # Even the same words would have the panel drawn again, with all that is in it.
         if title != self._title:

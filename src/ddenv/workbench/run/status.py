@@ -9,6 +9,7 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.claims import drift, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
@@ -22,7 +23,10 @@ from ddenv.workbench.wording import STATUS, about, count, duration, plain, short
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
-SHRINK = ("cut", "time", "engine", "left", "scene", "tests", "left", "mode", "tests", "asked", "engine", "tests")
+SHRINK = (
+    *("cut", "time", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
+    *("asked", "engine", "tests", "drift"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +109,8 @@ class Status(Widget):
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
             return Style(link=self._besides[0], underline=True)
+        if name == "drift" and self._snapshot is not None and has_dropped(self._snapshot.state):
+            return ink(self.app.theme_variables, "text-warning", bold=True)
         return Style(dim=name in ("time", "left", "mode", "cut"))
 
 
@@ -147,7 +153,7 @@ def facts(
 ) -> tuple[Fact, ...]:
     """What the status line says, in its order."""
     state = snapshot.state
-    status = "confirming" if snapshot.status == "running" and state.confirming else snapshot.status
+    status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
     status = "settling" if status == "baseline" and state.settling else status
     sign, word = STATUS.get(status, ("·", status))
     if snapshot.gone:
@@ -159,6 +165,7 @@ def facts(
         Fact("state", (f"{sign} {word}",)),
         Fact("asked", (f"… {asked}" if asked else "", "…" if asked else "")),
         Fact("tests", tests_said(state)),
+        Fact("drift", drift_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
         Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
@@ -196,6 +203,16 @@ def tests_said(state: RunState) -> tuple[str, ...]:
     said = count(total, "test") if state.budget is None else f"{total} of {count(state.budget, 'test')}"
     parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
     return (f"{said}: {parts}" if parts else said, f"{said}: {counts['similar']} similar", said, "")
+
+
+def drift_said(state: RunState) -> tuple[str, ...]:
+    """How often f shows here, beside the whole world; marked where it has dropped, with the key that goes back."""
+    forms = drift(state)
+    if not forms:
+        return ("",)
+    if not has_dropped(state):
+        return (*forms, "")
+    return tuple(f"▼ {form}: u goes back" for form in forms)
 
 
 def left_said(left: Remaining | None) -> tuple[str, ...]:

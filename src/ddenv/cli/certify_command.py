@@ -1,0 +1,39 @@
+"""`ddenv certify`: more evidence for the result of a run."""
+
+from __future__ import annotations
+
+import click
+
+from ddenv.cli.options import jobs_option, json_option
+from ddenv.errors import UserError
+
+
+@click.command("certify")
+@click.argument("run")
+@click.option(
+    "--runs",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Run what is left at least so often; as often as the baseline's whole world if not given.",
+)
+@jobs_option()
+@json_option
+def certify_command(run: str, runs: int | None, jobs: int, as_json: bool) -> int:
+    """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
+    from ddenv.cli.follow import follow_to_summary
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.lock import engine_lock
+    from ddenv.runfile.run_settings import settings
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.programs import start_engine
+
+    path = find_run(run)
+    with RunFile(path) as file, engine_lock(path):
+        state = fold(file.events())
+    if state.baseline is None:
+        raise UserError(
+            f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
+        )
+    at_least = runs or settings(state).baseline_runs
+    return follow_to_summary(path, start_engine(path, jobs, certify=at_least), as_json)[0]

@@ -1,0 +1,132 @@
+"""The result of a run: an object for programs, and lines for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ddenv.amounts import count, first_of
+from ddenv.claims import current, drift, is_minimal, meaning, missing, promise, rate, seen, short
+from ddenv.errors import printable
+from ddenv.rates import wilson_interval
+from ddenv.runfile.progress import Claim
+from ddenv.runfile.state import Node, RunState
+from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+
+# The maximum number of names in a line, and of models with a line each.
+MOST_NAMES = 12
+
+
+def summary(state: RunState, path: Path) -> dict[str, Any]:
+    """The object that `--json` prints. Durations are in s."""
+    return {
+        "models_before": len(state.elements),
+        "models_after": len(state.environment),
+        "kept": list(state.environment),
+        "tests": state.tests_done,
+        "outcomes": state.outcomes(),
+        "deflake_runs": state.deflake_runs,
+        "ended_early": state.cut_tests,
+        "rounds": state.rounds_done,
+        "minimal": state.certified,
+        "failure": state.failure or None,
+        "rate_left": _rate(state.here),
+        "rate_whole_world": _rate(state.nodes[0] if state.nodes else None),
+        "certificate": certificate(state),
+        "wall_seconds": round(state.working_seconds, 3),
+        "status": state.status,
+        "reason": state.reason,
+        "run_file": str(path),
+    }
+
+
+def _rate(node: Node | None) -> dict[str, Any] | None:
+    """How often f showed in an environment, from all runs of it that did not break."""
+    return None if node is None or not node.runs else _share(node.shown, len(node.runs))
+
+
+def _share(shown: int, runs: int) -> dict[str, Any]:
+    low, high = wilson_interval(shown, runs)
+    return {"shown": shown, "runs": runs, "rate": shown / runs, "low": low, "high": high}
+
+
+def certificate(state: RunState) -> dict[str, Any] | None:
+    """What fresh runs show of what is left; None where none were made."""
+    found = current(state)
+    if found is None:
+        return None
+    whole = _whole_world(state)
+    claims = [
+        {
+            "without": claim.without,
+            "verdict": claim.verdict,
+            "means": meaning(claim, found),
+            "shown": claim.shown,
+            "runs": claim.runs,
+            "rate": claim.shown / claim.runs if claim.runs else None,
+            "low": claim.low,
+            "high": claim.high,
+            "outcomes": dict(claim.outcomes),
+        }
+        for claim in found.claims
+    ]
+    return {
+        "number": found.number,
+        "keep_rate": found.keep_rate,
+        "error": found.error,
+        "minimal": is_minimal(found),
+        "claims": claims,
+        "whole_world": None if whole is None else _share(whole.shown, whole.runs) | {"outcomes": dict(whole.outcomes)},
+    }
+
+
+def _whole_world(state: RunState) -> FreshRuns | None:
+    """The certificate's runs of the whole world, if it made any beside those of what is left."""
+    return next((each for each in fresh_runs(state) if each.node == 0 and not each.is_left and each.runs), None)
+
+
+def summary_lines(state: RunState, path: Path) -> list[str]:
+    """The same for people."""
+    before, after = len(state.elements), len(state.environment)
+    if state.baseline is None:
+        return [f"run file: {path}"]
+    what = "minimal environment" if state.certified else "environment so far"
+    if state.status == "finished" and not state.certified:
+        what = "environment, not shown to be minimal"
+    tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
+    early = f"; {state.cut_tests} ended early" if state.cut_tests else ""
+    names = first_of(state.environment, MOST_NAMES)
+    said = [
+        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names}",
+        *_certificate_lines(state),
+        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{early}) in {count(state.rounds_done, 'round')}, "
+        f"{state.working_seconds:.0f} s",
+        *broken(state),
+        f"run file: {path}",
+    ]
+    return [printable(line) for line in said]
+
+
+def _certificate_lines(state: RunState) -> list[str]:
+    found = current(state)
+    if found is None:
+        so_far = drift(state) or (f"f in {seen(state.nodes[0])} in the whole world",)
+        return [f"{so_far[0]}; {missing(state)}"]
+    left, *removals = found.claims
+    lines = [f"  what is left: {rate(left)}: {meaning(left, found)}"]
+    lines += [_removal(claim) for claim in removals[:MOST_NAMES]]
+    if more := len(removals) - MOST_NAMES:
+        lines += [f"  and {count(more, 'more model')}"] if more > 0 else []
+    if (whole := _whole_world(state)) is not None:
+        lines.append(f"  the whole world: {rate(whole)}")
+    return [*lines, promise(found)] if state.certified else lines
+
+
+def _removal(claim: Claim) -> str:
+    return f"  without {claim.without}: {rate(claim)}: {short(claim)}"
+
+
+def broken(state: RunState) -> list[str]:
+    """Why the last broken test broke, if any did: broken tests say nothing about the failure."""
+    tests = [test for test in state.tests if test.outcome in ("error", "timeout")]
+    return [f"{count(len(tests), 'test')} broke, the last one: {tests[-1].failure}"] if tests else []

@@ -1,0 +1,73 @@
+"""The runs of a certificate by the models that they ran: of what is left, of that without each model, and of the whole world."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import takewhile
+
+from ddenv.rates import wilson_interval
+from ddenv.runfile.fold_decisions import origin
+from ddenv.runfile.fold_rates import BROKEN
+from ddenv.runfile.progress import Certificate, Claim
+from ddenv.runfile.state import FRESH, OUTCOMES, RunState, Test
+
+
+@dataclass(frozen=True, slots=True)
+class FreshRuns:
+    """Runs with fresh seeds of the environment of `node`, or of that without the model `without`.
+
+    `shown` of the `runs` that ended and did not break showed f; `outcomes` has the number of each outcome, with broken runs.
+    `low`..`high` is Wilson's 95 % interval of the rate, 0..1 without runs. `running` are the tests that run now. `is_left`: all
+    that is left ran. `claim` is what the certificate says of them, once it is finished; it makes none of the whole world, nor of
+    earlier environments.
+    """
+
+    node: int
+    without: str | None
+    shown: int
+    runs: int
+    low: float
+    high: float
+    outcomes: tuple[tuple[str, int], ...]
+    running: tuple[Test, ...] = ()
+    claim: Claim | None = None
+    is_left: bool = False
+
+
+def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
+    """The runs of the current environment's certificate: what is left comes first, the world that f was seen in last."""
+    certificate = state.certificate
+    if certificate is None:
+        return ()
+    tests: dict[tuple[int, str | None], list[Test]] = {}
+    for test in _tests(state, certificate):
+        tests.setdefault((test.node, test.without), []).append(test)
+    claims = {claim.without: claim for claim in certificate.claims}
+    # Those that are known to be needed are not claimed again where the rate is lost.
+    removals = [name for name in state.environment if name not in state.pinned and (not claims or name in claims)]
+    keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
+    first = origin(state, certificate.node).number
+    earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
+    keys += [*earlier, *([(first, None)] if certificate.node != first else [])]
+    found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
+    return (replace(found[0], is_left=True), *found[1:])
+
+
+def _tests(state: RunState, certificate: Certificate) -> Iterable[Test]:
+    """In the order they were started."""
+    # Tries of the user may run between them.
+    last = takewhile(lambda test: test.phase in (*FRESH, "hand"), reversed(state.tests))
+    return reversed([test for test in last if test.phase in FRESH and test.run >= certificate.first_run])
+
+
+def _of(key: tuple[int, str | None], tests: list[Test], claim: Claim | None) -> FreshRuns:
+    running = tuple(test for test in tests if test.outcome == "running")
+    if claim is not None:
+        return FreshRuns(*key, claim.shown, claim.runs, claim.low, claim.high, claim.outcomes, running, claim)
+    counts = Counter(test.outcome for test in tests if test.is_finished)
+    outcomes = tuple((outcome, counts[outcome]) for outcome in OUTCOMES if counts[outcome])
+    runs, shown = counts.total() - sum(counts[outcome] for outcome in BROKEN), counts["similar"]
+    low, high = wilson_interval(shown, runs) if runs else (0.0, 1.0)
+    return FreshRuns(*key, shown, runs, low, high, outcomes, running)

@@ -1,0 +1,65 @@
+"""What is happening while a certificate is made, in sentences."""
+
+from __future__ import annotations
+
+from ddenv.claims import of_runs, terms
+from ddenv.runfile.progress import Certificate
+from ddenv.runfile.state import RunState, Test
+from ddenv.runs.fresh_runs import fresh_runs
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import plain
+
+
+def certifying(snapshot: Snapshot) -> tuple[str, ...]:
+    """Fresh runs show what the result of the rounds is worth."""
+    state = snapshot.state
+    certificate = state.certificate
+    if certificate is None:
+        return ("The rounds are over.",)
+    if certificate.claims:
+        return (_after(certificate), *_now(snapshot, certificate))
+    return (
+        f"Full runs with fresh seeds check the result: {terms(certificate)}.",
+        *_so_far(state),
+        *_now(snapshot, certificate),
+    )
+
+
+def _so_far(state: RunState) -> tuple[str, ...]:
+    """How often f showed in what is left and in the whole world."""
+    rows = fresh_runs(state)
+    if not rows or not rows[0].runs:
+        return ()
+    left, whole = rows[0], rows[-1]
+    beside = (
+        f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
+        if whole.without is None and whole.runs and len(rows) > 1
+        else ""
+    )
+    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
+
+
+def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
+    running = [test for test in snapshot.running if test.phase == "certify"]
+    if not running:
+        return ()
+    return (f"Now run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)
+
+
+def _what(test: Test, certificate: Certificate) -> str:
+    if test.without is not None:
+        return f"all that is left except {plain(test.without)}"
+    if test.node == certificate.node:
+        return "all that is left"
+    return named(test.node)
+
+
+def _after(certificate: Certificate) -> str:
+    if certificate.claims[0].verdict == "lost":
+        return "f is too rare in what is left. Earlier environments run, to find the last one that keeps the rate."
+    return "The certificate is finished."
+
+
+def named(node: int) -> str:
+    """An environment by its number in the history."""
+    return "the whole world" if node == 0 else f"the environment of step {node}"

@@ -1,0 +1,73 @@
+"""`ddenv certify`, and the result of a run as lines and as JSON."""
+
+import pytest
+
+from ddenv.cli.summary import summary, summary_lines
+from ddenv.runfile.fold import fold
+from tests.command import in_process
+from tests.workbench import fake_run
+
+
+@pytest.fixture
+def run(tmp_path):
+    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
+    yield made
+    made.close()
+
+
+def told(run) -> tuple[dict, str]:
+    state = fold(run.file.events())
+    return summary(state, run.path), "\n".join(summary_lines(state, run.path))
+
+
+def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
+    found, lines = told(fake_run.finished(run))
+    assert (found["minimal"], found["kept"]) == (True, ["crate_00", "crate_01"])
+    assert (found["rate_left"]["shown"], found["rate_left"]["runs"]) == (24, 24)
+    assert (found["rate_whole_world"]["shown"], found["rate_whole_world"]["runs"]) == (25, 27)
+    left, first, second = found["certificate"]["claims"]
+    assert (left["without"], left["verdict"], left["outcomes"]) == (None, "kept", {"similar": 23})
+    assert left["means"] == "keeps 80 % of the whole world's rate"
+    assert (first["without"], first["rate"], second["shown"], second["runs"]) == ("crate_00", 0.0, 1, 12)
+    assert found["certificate"]["whole_world"]["outcomes"] == {"similar": 22, "pass": 1}
+    assert "minimal environment: 2 of 11 models" in lines
+    assert "what is left: f in 23 of 23 fresh runs (86 % to 100 %): keeps 80 % of the whole world's rate" in lines
+    assert "without crate_01: f in 1 of 12 fresh runs (1 % to 35 %): needed" in lines
+
+
+def test_what_is_not_shown_is_not_called_minimal(run):
+    found, lines = told(fake_run.not_shown(run))
+    assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)
+    assert "environment, not shown to be minimal: 2 of 11 models" in lines
+    assert "without crate_01: f in 1 of 2 fresh runs (9 % to 91 %): tests broke" in lines
+
+
+def test_files_without_a_certificate_claim_nothing(run):
+    found, lines = told(fake_run.uncertified(run))
+    assert (found["minimal"], found["certificate"]) == (False, None)
+    assert "f in 1 of 1 here, 3 of 4 in the whole world; no fresh runs were made" in lines
+
+
+def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: started.append((*words, more)))
+    monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, None))
+    fake_run.finished(run)
+    in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
+    in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
+    # As often as the baseline, if not said otherwise.
+    assert started == [(run.path, 1, {"certify": 40}), (run.path, 1, {"certify": 4})]
+
+
+def test_what_cannot_be_certified_is_refused_in_one_line(run, monkeypatch, capsys):
+    run.created()
+    assert refused(monkeypatch, capsys, run).startswith(f"ddenv: {run.path}: f is not known yet")
+    fake_run.FakeRun.baseline(run)
+    with run.engine():
+        assert "another engine is working on this run" in refused(monkeypatch, capsys, run)
+
+
+def refused(monkeypatch, capsys, run) -> str:
+    done = in_process(monkeypatch, capsys, "certify", run.path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    return done.stderr
