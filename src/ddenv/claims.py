@@ -107,7 +107,7 @@ def promise(certificate: Certificate) -> str:
     rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
     return (
         f"minimal means: what is left keeps {rate}, and falls below that without any one model; "
-        f"the chance that this is wrong is at most {percent(certificate.error)}"
+        f"the chance that this is wrong is at most {100 * certificate.error:.1g} %"
     )
 
 

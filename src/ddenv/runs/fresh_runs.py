@@ -12,6 +12,7 @@ from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.fold_rates import BROKEN
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.state import FRESH, OUTCOMES, RunState, Test
+from ddenv.runfile.supports import stacks_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +46,9 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     for test in _tests(state, certificate):
         tests.setdefault((test.node, test.without), []).append(test)
     claims = {claim.without: claim for claim in certificate.claims}
-    # Those that are known to be needed are not claimed again where the rate is lost.
-    removals = [name for name in state.environment if name not in state.pinned and (not claims or name in claims)]
+    # Stacks that are kept together are named by their first models. Where the rate is lost, nothing is claimed of removals.
+    free = (stack[0] for stack in stacks_of(state, state.environment) if state.pinned.isdisjoint(stack))
+    removals = [name for name in free if not claims or name in claims]
     keys = [(certificate.node, None), *((certificate.node, name) for name in removals)]
     first = origin(state, certificate.node).number
     earlier = sorted((key for key in tests if key not in keys and key != (first, None)), key=lambda key: -key[0])
