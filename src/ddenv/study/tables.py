@@ -41,15 +41,19 @@ def section(folder: Path, group: Group) -> Section:
 
 
 def numbers(group: Group) -> Table:
-    """Tests, reduction and minutes, beside the paper's if it has them, and whether the result is certified."""
+    """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
     beside = _has_theirs(group)
-    search, certificate = ("search tests", "certificate tests"), ("search minutes", "certificate minutes")
-    head: tuple[str, ...] = ("partitioning, prioritization", *search, "% reduction", *certificate, "certified")
+    head: tuple[str, ...] = (
+        "search tests",
+        "certificate tests",
+        "% reduction",
+        "search minutes",
+        "certificate minutes",
+    )
     if beside:
-        ours = (search[0], "paper", search[1], "% reduction", "paper", certificate[0], "paper", certificate[1])
-        head = (head[0], *ours, head[-1])
-    rows = tuple(_numbers(row, beside) for row in group.rows)
-    return Table(head, rows, frozenset(range(1, len(head) - 1)))
+        head = (head[0], "paper", *head[1:3], "paper", head[3], "paper", head[4])
+    head = ("partitioning, prioritization", "certified", *head)
+    return Table(head, tuple(_numbers(row, beside) for row in group.rows), frozenset(range(2, len(head))))
 
 
 def _numbers(row: Row, beside: bool) -> tuple[Cell, ...]:
@@ -59,13 +63,14 @@ def _numbers(row: Row, beside: bool) -> tuple[Cell, ...]:
     smaller = spread([each.smaller for each in over], percent)
     minutes = spread([each.seconds / 60 for each in over], _minutes)
     more = spread([each.certificate_seconds / 60 for each in over], _minutes)
+    name = row.method.label, _certified(row)
     if not beside:
-        return row.method.label, tests, fresh, smaller, minutes, more, _certified(row)
+        return *name, tests, fresh, smaller, minutes, more
     paper = theirs(row.found[0].cell)
     one, two, three = (
         ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
     )
-    return row.method.label, tests, one, fresh, smaller, two, minutes, three, more, _certified(row)
+    return *name, tests, one, fresh, smaller, two, minutes, three, more
 
 
 def _certified(row: Row) -> str:

@@ -40,9 +40,9 @@ def test_tests_and_time_are_told():
     known = Past(1, 3.0)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
-    assert "with 2 jobs; 4 of them the baseline, about 124 the certificate; 3.0 s a test in earlier runs" in words
+    assert "with 2 jobs; baseline 4, certificate 124; 3.0 s a test in earlier runs" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown.endswith("of them about 124 the certificate; the time is known after the baseline of 4 tests")
+    assert unknown.endswith("baseline 4, certificate 124; the time is known after the baseline")
     assert whole_cost(scenario(budget=9), 43, 1, known).startswith("9 tests at most, 27 s with 1 job")
 
 

@@ -77,13 +77,12 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     budget = getattr(reduction, "budget", None)
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
-    words, parts = f"about {count(middle, 'test')} ({low} to {high})", f"about {rough.certificate[1]} the certificate"
+    words = f"about {count(middle, 'test')} ({low} to {high})"
+    parts = f"baseline {reduction.baseline_runs}, certificate {rough.certificate[1]}"
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
-        words, parts = f"{count(budget, 'test')} at most", ""
+        words, parts = f"{count(budget, 'test')} at most", f"baseline {reduction.baseline_runs}"
     if past.seconds is None:
-        of_them = f", of them {parts}" if parts else ""
-        return f"{words}{of_them}; {UNKNOWN_TIME} of {count(reduction.baseline_runs, 'test')}"
+        return f"{words}; {parts}; {UNKNOWN_TIME}"
     spent = duration(middle * past.seconds / jobs)
-    parts = ", ".join(filter(None, (f"{reduction.baseline_runs} of them the baseline", parts)))
     return f"{words}, {spent} with {count(jobs, 'job')}; {parts}; {past.seconds:.1f} s a test in earlier runs"
