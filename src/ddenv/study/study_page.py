@@ -51,8 +51,9 @@ def _lead(found: Sequence[Found], minimal: Sequence[Found]) -> list[Paragraph]:
         say(
             "A robot fails in a world of many models. Each cell of this study reduces such a world, by one method, to the few "
             "models that make the robot fail: it runs smaller and smaller parts, keeps those that show the same failure f, "
-            "and stops when no single model can be left out. Runs with fresh seeds then certify what is left: it keeps at least "
-            f"{_shares(found)} of the whole world's failure rate, and less without any one of its models."
+            "and stops when no single model can be left out. Runs with fresh seeds then show what that is worth: it is "
+            f"certified if it keeps at least {_shares(found)} of the whole world's failure rate, and less without any one of its "
+            "models."
         )
     ]
     pairs = [(each, theirs(each.cell)) for each in minimal]
