@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
 from ddenv.claims import is_minimal, verdict_on
-from ddenv.rates import wilson_interval
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.study.plan import Cell, Plan, make_plan
 from ddenv.study.results import Found, read_cell
 from ddenv.study.study_folder import run_path
@@ -63,8 +60,7 @@ def begun(folder: Path, cell: Cell, world: bytes | None = None) -> fake_run.Fake
     return fake_run.FakeRun(run_path(folder, cell), data, world or cell.scenario.world.read_bytes())
 
 
-# Outcomes of fresh runs by letters, and the claims of a certificate that holds: of what is left, and without each model.
-OUTCOMES = {"s": "similar", "p": "pass", "o": "other", "e": "error"}
+# The claims of a certificate: of what is left, and without each model, with its verdict and its runs in letters.
 Claims = dict[str | None, tuple[str, str]]
 
 
@@ -72,35 +68,16 @@ def holds(left: Sequence[str]) -> Claims:
     return {None: ("kept", "sssss"), **dict.fromkeys(left, ("needed", "pppp"))}
 
 
-def certified(run: fake_run.FakeRun, claims: Claims, number: int = 1) -> None:
-    """A certificate, with a verdict and the outcomes of the runs for each claim; two runs of the whole world show f as well."""
-    state = fold(run.file.events())
-    first = FIRST_FRESH_RUN * number
-    terms = {"rate": 0.7, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
-    run.write("certificate_started", certificate=number, run=first, **terms)
-    made = [_fresh(run, 0, None, first + place, "s") for place in range(2)]
-    named = []
-    for without, (verdict, letters) in claims.items():
-        made += [_fresh(run, state.node, without, first + place, letter) for place, letter in enumerate(letters)]
-        shown, runs = letters.count("s"), len(letters.replace("e", ""))
-        low, high = wilson_interval(shown, runs)
-        outcomes = Counter(OUTCOMES[letter] for letter in letters)
-        left_out = None if without is None else run.elements.index(without)
-        claim = {"without": left_out, "verdict": verdict, "shown": shown, "runs": runs, "low": low, "high": high}
-        named.append(claim | {"outcomes": outcomes})
+def certified(run: fake_run.FakeRun, claims: Claims) -> None:
+    """A certificate with these claims; two runs of the whole world show f as well."""
+    node = fold(run.file.events()).node
+    run.start_certificate()
+    run.certify_all(0, None, "ss")
+    for without, (_, letters) in claims.items():
+        run.certify_all(node, without, letters)
+    run.finish_certificate(*((without, *rest) for without, rest in claims.items()))
     # One ran ahead of time, and nothing rests on it.
-    _fresh(run, state.node, None, first + 900, "p")
-    run.write("certificate_finished", claims=named, tests=made)
-
-
-def _fresh(run: fake_run.FakeRun, node: int, without: str | None, number: int, letter: str) -> int:
-    run.tests += 1
-    place = {"phase": "certify", "round": None, "candidate": None, "node": node}
-    if without is not None:
-        place["without"] = run.elements.index(without)
-    run.write("test_started", test=run.tests, **place, run=number, seed=number)
-    run.finish(run.tests, OUTCOMES[letter])
-    return run.tests
+    run.finish(run.certify(node, None, 900), "pass")
 
 
 def ended(run: fake_run.FakeRun) -> None:

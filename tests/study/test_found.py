@@ -89,7 +89,7 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
     earlier = run.tests
     run.write("rate_lost", node=1, lost=2, again=[], tests=[earlier - 1, earlier])
     run.write("leg_started", round=3, n_partitions=2)
-    certified(run, holds(LEFT), number=2)
+    certified(run, holds(LEFT))
     assert read_cell(tmp_path, cell).problem == "has not ended"
     ended(run)
     found = read_cell(tmp_path, cell)
