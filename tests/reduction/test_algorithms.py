@@ -1,6 +1,7 @@
 """What every algorithm promises, for any world and any oracle."""
 
 from contextlib import suppress
+from dataclasses import replace
 from zlib import crc32
 
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.reduction.algorithms import sweep
+from ddenv.reduction.guide import make_guide, search
 from tests.reduction.worlds import ALGORITHMS, PAIRS, evidence, run, worlds
 from tests.tiers import examples
 
@@ -109,6 +111,17 @@ def test_what_is_implied_is_tried_only_to_prove_the_end_minimal(world):
                 break
             assert len(round.environment) - one.size == 1 or not any(one.models <= models for models in failed)
             failed.append(one.models)
+
+
+def test_nothing_is_implied_by_tests_that_broke():
+    known = evidence(8, 1)
+
+    def second_round(broke):
+        guide = make_guide("model2model", "failure-proximal", lambda: known, skip="implied", growth="steady")
+        searching = search("ddenv", known.elements, replace(guide, broke=lambda candidate: broke))
+        return [one.models for one in list(_rounds(searching))[1].candidates]
+
+    assert set(second_round(broke=False)) < set(second_round(broke=True))
 
 
 def test_in_a_sweep_all_models_have_one_run_before_any_has_a_second_one():

@@ -8,14 +8,40 @@ from typing import Any
 
 import numpy as np
 
-from ddenv.engine.judging import end_of
+from ddenv.engine.bench import Bench, Wanted
+from ddenv.engine.journal import Journal
+from ddenv.engine.judging import end_of, rows_of
 from ddenv.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
 from ddenv.runfile.failures import SeenFailure, grouped
 from ddenv.runfile.state import Test
 from ddenv.words import count
-from ddenv.world.scenario import FailureSpec
+from ddenv.world.scenario import FailureSpec, Reduction
+
+
+def run_baseline(journal: Journal, bench: Bench, asked: Reduction, spec: FailureSpec) -> dict[str, Any] | str:
+    """Runs the whole world; returns what `fix_failure` finds. Raises as `Bench.work`.
+
+    Where the rate is kept and f is rare, it goes on, one run at a time, so that the number of workers changes nothing.
+    """
+    everything = frozenset(journal.state.elements)
+
+    def found_in(runs: int) -> dict[str, Any] | str:
+        def wanted() -> Wanted:
+            return [(everything, run, None) for run in range(runs) if (everything, run, False) not in journal.ledger]
+
+        bench.work("baseline", None, wanted)
+        tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in range(runs)]
+        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
+        return fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
+
+    runs = asked.baseline_runs
+    found = found_in(runs)
+    while asked.accept_rate == "kept" and not isinstance(found, str) and goes_on(found, runs):
+        runs += 1
+        found = found_in(runs)
+    return found
 
 
 def fix_failure(

@@ -10,7 +10,7 @@ from itertools import islice
 from typing import Any
 
 from ddenv.claims import current, is_minimal, verdict_on
-from ddenv.engine.baseline import fix_failure, goes_on
+from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import Certifier
 from ddenv.engine.control import Control, Steered
@@ -19,7 +19,7 @@ from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
 from ddenv.errors import UserError
-from ddenv.reduction.acceptance import Acceptance
+from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, plays
 from ddenv.reduction.guide import Search, make_guide, search
@@ -134,7 +134,7 @@ class Driver:
             rate=self._rate,
             runs=lambda: self._journal.rule.misses,
         )
-        guide = self._memory.of(self._guide)
+        guide = self._memory.of(replace(self._guide, broke=self._broke))
         if not again:
             return self._stacks.expand(search(asked.algorithm, elements, guide))
         searched = partial(search, asked.algorithm, guide=guide)
@@ -148,6 +148,14 @@ class Driver:
     def _rate(self) -> float:
         """The rate of f in the whole world, as it was known when this search began."""
         return self._journal.rule.rate or known_failure(self._journal.state).rate
+
+    def _broke(self, candidate: Candidate) -> bool:
+        """Whether a test of a candidate of the algorithm, which knows one model of each stack, broke for good."""
+        tally = self._journal.state.tally
+        if not any(tally[outcome] for outcome in BROKEN):
+            return False
+        keep = self._pinned.union(self._stacks.expanded(candidate.models))
+        return any(self._journal.shown(keep, run) == "broken" for run in range(MOST_RUNS))
 
     def _rule(self, round: Round) -> Acceptance:
         return self._journal.rule.within(round.runs)
@@ -192,30 +200,12 @@ class Driver:
         """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""
         if self._journal.state.baseline is not None:
             return ""
-        keeps_rate, runs = self._reduction.accept_rate == "kept", self._reduction.baseline_runs
-        found = self._found_in(runs)
-        # One run at a time, so that the number of workers changes nothing.
-        while keeps_rate and not isinstance(found, str) and goes_on(found, runs):
-            runs += 1
-            found = self._found_in(runs)
+        found = run_baseline(self._journal, self._bench, self._reduction, self._failure_spec)
         if isinstance(found, str):
             return found
         self._journal.record("baseline_finished", **found)
         self._control.round_finished()
         return ""
-
-    def _found_in(self, runs: int) -> dict[str, Any] | str:
-        """What the first `runs` of the whole world show, as `fix_failure` returns it; makes those that are missing."""
-        journal, everything = self._journal, frozenset(self._journal.state.elements)
-
-        def wanted() -> Wanted:
-            return [(everything, run, None) for run in range(runs) if (everything, run, False) not in journal.ledger]
-
-        self._bench.work("baseline", None, wanted)
-        tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in range(runs)]
-        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-        asked = self._reduction
-        return fix_failure(tests, trajectories, self._failure_spec, asked.iterations, asked.failure)
 
     def _round(self, number: int, round: Round) -> Candidate | None:
         """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""

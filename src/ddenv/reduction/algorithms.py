@@ -6,6 +6,7 @@ An algorithm yields a `Round` and is sent the first similar candidate, or None. 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import takewhile
 
@@ -42,7 +43,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
             round = _without_implied(round, missed)
         # All candidates may be implied.
         winner = (yield round) if round.candidates else None
-        missed = _missed(round, winner, missed)
+        missed = _missed(round, winner, missed, guide.broke)
         if winner is not None:
             kept = winner.models
             environment = tuple(name for name in environment if name in kept)
@@ -78,14 +79,19 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
     return parts
 
 
-def _missed(round: Round, winner: Candidate | None, missed: list[frozenset[str]]) -> list[frozenset[str]]:
+def _missed(
+    round: Round,
+    winner: Candidate | None,
+    missed: list[frozenset[str]],
+    broke: Callable[[Candidate], bool],
+) -> list[frozenset[str]]:
     """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
 
     A candidate without f leaves out such a group, as far as its models are still in the environment. A group that is gone
     altogether was not needed after all: f showed by chance, or does not show in every such environment.
     """
     failed = takewhile(lambda one: one is not winner, round.candidates)
-    found = [*missed, *(one.lacks for one in failed)]
+    found = [*missed, *(one.lacks for one in failed if not broke(one))]
     if winner is not None:
         left = winner.models
         found = [group & left for group in found]

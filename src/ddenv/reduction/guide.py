@@ -35,10 +35,11 @@ class Guide:
     """What an algorithm asks while it searches.
 
     `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, of which the lowest is tried first.
-    `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test. `n_partitions`
-    is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`, `growth` ("paper" or
-    "steady") and `skip` ("known" or "implied") those of ddenv. `rate()` is the rate at which f shows in a single run where all that
-    it needs is there, `runs()` how many runs a candidate has if none shows f.
+    `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test.
+    `n_partitions` is the granularity at the start of ddenv; `candidates` and `complement_order` are those of `make_round`,
+    `growth` ("paper" or "steady") and `skip` ("known" or "implied") those of ddenv. `rate()` is the rate at which f shows in a
+    single run where all that it needs is there, `runs()` how many runs a candidate has if none shows f, `broke(candidate)`
+    whether its tests say nothing about f.
     """
 
     split: Split
@@ -51,6 +52,7 @@ class Guide:
     skip: str = "known"
     rate: Callable[[], float] = lambda: 1.0
     runs: Callable[[], int] = lambda: 1
+    broke: Callable[[Candidate], bool] = lambda candidate: False
 
 
 def make_guide(
