@@ -19,7 +19,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import read_parts
-from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
 from tests.engine.test_driver import Killed, _kill, needs, story
 from tests.tiers import examples
 
@@ -48,7 +48,7 @@ def wrong(salt, often):
 
 
 def kept(folder, **more):
-    return new_run(Path(folder), accept_rate="kept", **more)
+    return new_run(Path(folder), **{"accept_rate": "kept", "keep_rate": 0.8} | more)
 
 
 def claims(state):
@@ -75,9 +75,9 @@ def test_a_certificate_has_fresh_runs_of_what_is_left_and_without_each_model(tmp
 @every_method
 def test_an_end_where_f_is_rare_is_left_again(tmp_path, method):
     """One board shows f in a quarter of the runs, both in all: a quarter is not what the user saw."""
-    for salt in range(6):
+    for salt in range(4):
         oracle = at_rates(salt, ({"wall", "beam"}, 1.0), ({"wall"}, 0.25))
-        state = drive(kept(tmp_path, **method), FakePool(oracle, 2))
+        state = drive(kept(tmp_path, **CHEAP, **method), FakePool(oracle, 2))
         assert {"wall", "beam"} <= set(state.environment)
         assert state.status == "finished"
 
@@ -115,7 +115,7 @@ def test_whatever_cut_runs_show_the_end_is_what_full_runs_show(method, salt, oft
 def test_a_lost_rate_is_found_by_bisection_and_the_search_goes_on_from_there(tmp_path):
     oracle = at_rates(3, ({"wall", "beam"}, 1.0), ({"wall"}, 0.25))
     for seed in range(0, 200_000, 20_000):
-        state = drive(kept(tmp_path, seed=seed), FakePool(oracle, 1))
+        state = drive(kept(tmp_path, seed=seed, **CHEAP), FakePool(oracle, 1))
         lost = [node for node in state.nodes if node.lost_rate]
         if lost:
             break
@@ -238,8 +238,8 @@ DRIFTING = [({"wall", "beam", "ball"}, 1.0), ({"wall", "beam"}, 0.9), ({"wall"},
 def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs, breaks):
     oracle = at_rates(salt, *DRIFTING)
     with tempfile.TemporaryDirectory() as folder:
-        undisturbed = drive(kept(folder), FakePool(oracle, 1))
-        path = kept(folder)
+        undisturbed = drive(kept(folder, **CHEAP), FakePool(oracle, 1))
+        path = kept(folder, **CHEAP)
         _killed(path, FakePool(oracle, jobs, salt), moments)
         state = _resumed(path, FakePool(oracle, jobs, salt))
     assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
@@ -248,9 +248,9 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs, br
 @pytest.mark.programs
 def test_killed_after_any_event_it_goes_on_and_makes_no_test_twice(tmp_path):
     oracle = at_rates(3, *DRIFTING)
-    undisturbed = drive(kept(tmp_path), FakePool(oracle, 1))
+    undisturbed = drive(kept(tmp_path, **CHEAP), FakePool(oracle, 1))
     for moment in range(1, undisturbed.revision, 7):
-        path = kept(tmp_path)
+        path = kept(tmp_path, **CHEAP)
         _killed(path, FakePool(oracle, 2), [moment])
         state = _resumed(path, FakePool(oracle, 2))
         assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
