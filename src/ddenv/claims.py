@@ -29,7 +29,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     left, *removals = certificate.claims
     share = percent(certificate.keep_rate)
     if left.verdict == "lost":
-        return f"f is too rare in what is left: {rate(left)}; it has to keep {share} of {_whole_rate(certificate)}"
+        return f"f is rarer in what is left, not shown to keep {share} of {_whole_rate(certificate)}: {rate(left)}"
     if left.verdict != "kept":
         return f"not shown that what is left keeps {share} of {_whole_rate(certificate)}: {rate(left)}"
     for word, start in (
@@ -72,9 +72,9 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
     share = rate.removesuffix(" rate")
     return {
         "kept": f"keeps {rate}",
-        "lost": f"has lost the rate: below {share}",
+        "lost": f"f is rarer: not shown to keep {share}",
         "needed": f"needed: without it the rate falls below {share}",
-        "not needed": f"not needed: without it the rate keeps {share}",
+        "not needed": "not needed: f shows about as often without it",
         "not shown": "not shown: the runs do not decide",
         "unknown": "unknown: too many runs broke",
     }.get(claim.verdict, "")

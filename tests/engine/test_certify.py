@@ -90,7 +90,7 @@ def test_as_printed_the_certificate_says_that_the_rate_is_lost_and_changes_nothi
             break
     assert state.environment == ("wall",)
     assert not state.minimal
-    assert state.reason.startswith("f is too rare in what is left")
+    assert state.reason.startswith("f is rarer in what is left, not shown to keep")
     assert len(state.certificates) == 1
 
 
@@ -195,24 +195,73 @@ def test_the_next_engine_makes_broken_tests_again(tmp_path):
     assert state.minimal
 
 
-def test_a_certificate_can_be_made_again_with_more_runs(tmp_path):
-    path = kept(tmp_path)
-    before = drive(path, FakePool(needs("wall"), 2))
+def certified_again(path, oracle, at_least):
+    """The state after one more certificate."""
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)
         file.own()
         journal = Journal(file)
         _begin(journal, 2, None)
         control = Control(journal, threading.Event(), time.time())
-        pool = FakePool(at_rates(1, (set(ELEMENTS), 1.0), ({"wall"}, 0.5)), 2)
-        Driver(scenario, world, journal, Bench(journal, pool, control), control).certify(40)
-        state = journal.state
+        pool = FakePool(oracle, 2)
+        Driver(scenario, world, journal, Bench(journal, pool, control), control).certify(at_least)
+        return journal.state
+
+
+def test_a_certificate_can_be_made_again_with_more_runs(tmp_path):
+    path = kept(tmp_path)
+    before = drive(path, FakePool(needs("wall"), 2))
+    state = certified_again(path, at_rates(1, (set(ELEMENTS), 1.0), ({"wall"}, 0.5)), 40)
     assert before.minimal
     assert len(state.certificates) == 2
     assert state.certificates[1].first_run > max(test.run for test in before.tests)
     assert claims(state)[None].verdict == "lost"
     assert state.environment == before.environment
     assert not state.minimal
+
+
+def test_a_certificate_is_made_again_where_tests_broke_for_good(tmp_path):
+    path = kept(tmp_path)
+    drive(path, FakePool(breaks_without("wall"), 2))
+    state = certified_again(path, needs("wall"), 10)
+    assert (state.status, state.minimal, len(state.certificates)) == ("finished", True, 2)
+
+
+def test_a_few_broken_fresh_runs_leave_a_finished_run_as_it_is(tmp_path):
+    def oracle(keep, seed):
+        return "error" if seed == FIRST_FRESH_RUN + 3 else needs("wall")(keep, seed)
+
+    path = kept(tmp_path)
+    assert drive(path, FakePool(oracle, 2)).minimal
+    with RunFile(path) as file:
+        assert not Journal(file).has_broken
+
+
+def test_a_failure_that_no_fresh_run_shows_needs_nothing_and_proves_nothing(tmp_path):
+    def oracle(keep, seed):
+        return "similar" if seed in (0, 1, 2) and "wall" in keep else "pass"
+
+    state = drive(kept(tmp_path, baseline_runs=10), FakePool(oracle, 2))
+    assert state.status == "finished"
+    assert not state.minimal
+    assert not any(claim.verdict in ("kept", "needed", "not needed") for claim in state.certificates[-1].claims)
+
+
+def test_fresh_runs_of_an_earlier_environment_are_read_back_as_such(tmp_path):
+    """The user adopts a try that is no part of the environment before it; its rate is too low, and earlier ones run again."""
+    oracle = at_rates(3, ({"wall", "beam"}, 1.0), ({"wall", "ball"}, 0.3))
+    path = kept(tmp_path)
+    drive(path, FakePool(oracle, 1))
+    with RunFile(path) as file:
+        file.send("try", models=["wall", "ball"])
+        state = drive(path, FakePool(oracle, 1))
+        for trial in (one for one in state.trials if one.verdict == "similar"):
+            file.send("adopt", trial=trial.number)
+            state = drive(path, FakePool(oracle, 1))
+        journal = Journal(file)
+    for test in state.tests:
+        if test.phase == "certify" and test.is_finished:
+            assert (oracle(journal.keep_of_test(test.id), test.seed) == "similar") == (test.outcome == "similar")
 
 
 def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):
@@ -232,10 +281,9 @@ DRIFTING = [({"wall", "beam", "ball"}, 1.0), ({"wall", "beam"}, 0.9), ({"wall"},
     salt=st.integers(0, 30),
     moments=st.lists(st.integers(1, 250), min_size=1, max_size=4),
     jobs=st.integers(1, 3),
-    breaks=st.booleans(),
 )
 @examples(0.2)
-def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs, breaks):
+def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs):
     oracle = at_rates(salt, *DRIFTING)
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(kept(folder, **CHEAP), FakePool(oracle, 1))
@@ -243,6 +291,8 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(salt, moments, jobs, br
         _killed(path, FakePool(oracle, jobs, salt), moments)
         state = _resumed(path, FakePool(oracle, jobs, salt))
     assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
+    # Neither workers nor kills change which seeds a certificate has, and what it rests on.
+    assert state.certificates == undisturbed.certificates
 
 
 @pytest.mark.programs

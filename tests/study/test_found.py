@@ -102,7 +102,7 @@ def test_steps_back_are_counted_with_all_their_tests(tmp_path, cell, run):
 @pytest.mark.parametrize(
     ("claims", "problem"),
     [
-        ({None: ("lost", "ssppppppppppp")}, "f is too rare in what is left: f in 2 of 13 fresh runs (4 % to 42 %);"),
+        ({None: ("lost", "ssppppppppppp")}, "whole world's rate: f in 2 of 13 fresh runs (4 % to 42 %)"),
         (
             {None: ("not shown", "sssp")},
             "not shown that what is left keeps 80 % of the whole world's rate: f in 3 of 4",

@@ -35,5 +35,7 @@ def certify_command(run: str, runs: int | None, jobs: int, as_json: bool) -> int
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"
         )
+    if state.status != "finished" and not (state.confirming and state.ended):
+        raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
     at_least = runs or settings(state).baseline_runs
     return follow_to_summary(path, start_engine(path, jobs, certify=at_least), as_json)[0]

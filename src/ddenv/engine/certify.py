@@ -8,15 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.engine.bench import Bench, Wanted
+from ddenv.engine.control import Stopped
 from ddenv.engine.journal import BROKEN, Journal, Keep
-from ddenv.errors import UserError
 from ddenv.rates import wilson_interval
 from ddenv.reduction.certificate import Claim, Procedure, Terms, error_of, falls, good_enough, keeps, settle
 from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.runfile.progress import Certificate
+from ddenv.runfile.state import FRESH_RUNS
 
 # After this many steps back what is left stays as it is, and is not called minimal.
 MOST_STEPS_BACK = 14
+CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Certifier:
     def _certificate(self) -> Certificate:
         found = self.journal.state.certificate
         if found is None:
-            raise UserError("damaged run file: there is no certificate")
+            raise Stopped(CHANGED)
         return found
 
     @property
@@ -167,7 +169,7 @@ class Certifier:
     def _leave_out(self, name: str) -> None:
         journal = self.journal
         state, keep, first = journal.state, journal.without(name), self._certificate.first_run
-        runs = range(first, journal.fresh_run)
+        runs = range(first, first + FRESH_RUNS)
         tests = [test for run in runs if (test := journal.ledger.get((keep, run, True))) is not None]
         journal.record(
             "left_out",

@@ -12,8 +12,8 @@ from typing import Any
 from ddenv.claims import current, is_minimal, verdict_on
 from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
-from ddenv.engine.certify import Certifier
-from ddenv.engine.control import Control, Steered
+from ddenv.engine.certify import CHANGED, Certifier
+from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import BROKEN, Journal, Keep, other_way
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
@@ -82,6 +82,8 @@ class Driver:
 
     def certify(self, at_least: int) -> None:
         """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
+        # A search that is due would begin at the end.
+        self._journal.begin_leg()
         state = self._journal.state
         self._stack(state.environment, state.pinned)
         self._certify(list(self._stacks.representatives), at_least, moves=False, anew=True)
@@ -176,10 +178,11 @@ class Driver:
         """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
         journal = self._journal
         Certifier(journal, self._bench, free, max(1, journal.state.jobs), moves).certify(at_least, anew)
-        while journal.steered:
+        while journal.steered and not anew:
             self._bench.tick()
         certificate = current(journal.state)
-        assert certificate is not None
+        if certificate is None or journal.steered:
+            raise Stopped(CHANGED)
         together = self._reduction.keep_supports
         reason = verdict_on(certificate, len(self._pinned), "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]

@@ -12,9 +12,9 @@ from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, Round, RunState, Test
+from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, FRESH_RUNS, Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
-from ddenv.runfile.supports import stack_with, stacks_of
+from ddenv.runfile.supports import stack_with
 
 Keep = frozenset[str]
 # After these events the search starts again from what the user left.
@@ -77,7 +77,7 @@ class Journal:
         self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         self._broke: dict[tuple[Keep, int, bool], int] = {}
-        self._fresh_run = FIRST_FRESH_RUN
+        self._rested_on: set[int] = set()
         self._steps_back = 0
         self._again: tuple[tuple[str, ...], ...] = ()
         for event in file.events():
@@ -130,7 +130,9 @@ class Journal:
 
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
-        tests = [test for test in self.state.tests if self.keep_of_test(test.id) == self.whole]
+        # Fresh runs that only ran ahead of time would make it depend on the number of workers.
+        named = (test for test in self.state.tests if test.phase not in FRESH or test.id in self._rested_on)
+        tests = [test for test in named if self.keep_of_test(test.id) == self.whole]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
 
@@ -142,13 +144,24 @@ class Journal:
     @property
     def has_broken(self) -> bool:
         """Whether tests broke twice, so that a verdict or a claim is unknown."""
-        tests = (self.state.tests[test - 1] for test in self.ledger.values())
-        return any(test.outcome in BROKEN and test.phase != "baseline" for test in tests)
+        return any(self._leaves_unknown(self.state.tests[test - 1]) for test in self.ledger.values())
+
+    def _leaves_unknown(self, test: Test) -> bool:
+        """A baseline that is done, and a certificate, may do without a few runs that broke."""
+        if test.outcome not in BROKEN:
+            return False
+        if test.phase == "baseline":
+            return self.state.baseline is None
+        last = self.state.certificates[-1:]
+        return test.phase not in FRESH or any(claim.verdict == "unknown" for one in last for claim in one.claims)
 
     @property
     def fresh_run(self) -> int:
-        """The number of the first run whose seed chose nothing so far."""
-        return self._fresh_run
+        """The number of the first run of the next certificate, whose seed chose nothing so far."""
+        if not self.state.certificates:
+            return FIRST_FRESH_RUN
+        last = self.state.certificates[-1]
+        return last.first_run + max(FRESH_RUNS, 2 * last.at_least)
 
     @property
     def steps_back(self) -> int:
@@ -218,11 +231,11 @@ class Journal:
     def _subject(self, keep: Keep) -> dict[str, int]:
         """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
         state = self.state
-        gone = tuple(name for name in state.environment if name not in keep)
-        if gone and gone in stacks_of(state, state.environment):
-            return {"node": state.node, "without": state.elements.index(gone[0])}
         path = [node.number for node in state.path if frozenset(node.environment) == keep]
-        return {"node": path[-1]}
+        if path:
+            return {"node": path[-1]}
+        gone = next(name for name in state.environment if name not in keep)
+        return {"node": state.node, "without": state.elements.index(gone)}
 
     def without(self, name: str) -> Keep:
         """The environment without a model, or without all of its stack."""
@@ -272,25 +285,25 @@ class Journal:
     def _engine_started(self, _: dict[str, Any]) -> None:
         """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
         tests = self.state.tests
-        again = [key for key, test in self.ledger.items() if tests[test - 1].outcome in BROKEN]
-        if self.state.baseline is not None:
-            again = [key for key in again if tests[self.ledger[key] - 1].phase != "baseline"]
+        again = [key for key, test in self.ledger.items() if self._leaves_unknown(tests[test - 1])]
         for key in again:
             del self.ledger[key]
         self._broke.clear()
         if again and self.state.baseline is not None:
             self.steered = True
 
+    def _certificate_finished(self, data: dict[str, Any]) -> None:
+        self._rested_on.update(data.get("tests", ()))
+
     def _rate_lost(self, data: dict[str, Any]) -> None:
         """What has lost the rate, and all parts of it, are not taken again."""
+        self._rested_on.update(data.get("tests", ()))
         elements = self.state.elements
         self._steps_back += 1
         self._again = tuple(tuple(elements[model] for model in group) for group in data["again"])
         self.refused.lose(frozenset(self.state.nodes[data["lost"]].environment))
 
     def _test_started(self, data: dict[str, Any]) -> None:
-        if data["phase"] == "certify":
-            self._fresh_run = max(self._fresh_run, data["run"] + 1)
         self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
 
     def _test_finished(self, data: dict[str, Any]) -> None:
@@ -330,7 +343,7 @@ class Journal:
         """An undone reduction is not accepted again; an environment that the user goes to is wanted."""
         nodes = self.state.nodes
         wanted = frozenset(nodes[data["node"]].environment)
-        self.refused.pop(wanted, None)
+        self.refused.allow(wanted)
         self._refused_in.pop(wanted, None)
         if data.get("rejected") is not None:
             self._refuse(frozenset(nodes[data["rejected"]].environment), "rejected")
@@ -365,6 +378,7 @@ class Journal:
 
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "engine_started": Journal._engine_started,
+    "certificate_finished": Journal._certificate_finished,
     "rate_lost": Journal._rate_lost,
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,

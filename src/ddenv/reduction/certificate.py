@@ -33,8 +33,9 @@ REFUTED = 20.0
 PATIENCE, MOST_PAIRS, MOST_REMOVAL_PAIRS = 5.0, 600, 240
 # After this number of pairs a claim is given up if both bets grow so slowly that this many times their growth would not be enough.
 FEWEST_PAIRS, HOPE = 100, 4.0
-# After all pairs, a rate of at least this share of the whole world's is likely to be kept.
-LIKELY_KEPT = 0.9
+# Well above what must be kept: a rate that falls below this share of the whole world's is given up, since to show that it is kept
+# would take too many runs. After all pairs, the lower one counts.
+WELL_ABOVE, SOMEWHAT_ABOVE, HIGHEST_SHARE, HIGH_SHARE = 0.15, 0.1, 0.95, 0.9
 # More broken runs of one claim than this, and than a tenth, leave it unknown.
 MOST_BROKEN = 5
 # An earlier environment is judged by a sequential test of this log-likelihood ratio, and at most so many runs.
@@ -99,9 +100,13 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
 
 
 def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
-    """Whether `left` shows f at `keep_rate` of the rate of `whole` or more: "kept", "lost" or "not shown"."""
+    """Whether `left` shows f at `keep_rate` of the rate of `whole` or more: "kept", "lost" or "not shown".
+
+    "kept" is wrong with a probability of at most the terms' error. "lost" is no such claim: f is seen to be rarer than in
+    `whole`, and the runs do not show that enough is kept.
+    """
     if left == whole:
-        return (yield from _at_least(max(1, terms.at_least), (left,), "kept"))
+        return (yield from _of_whole(left, max(1, terms.at_least)))
     need, rate, alone, runs, hits, share = 1.0 / terms.error, terms.rate, 0.0, 0, 0, 0.0
     if rate >= SURE and terms.keep_rate < EXPECTED[0]:
         share, bet = SHARE_ALONE, [1.0 / len(EXPECTED)] * len(EXPECTED)
@@ -118,21 +123,39 @@ def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
     stake, growth = _best_stake(round(rate, 2), terms.keep_rate)
     highest = 0.995 / terms.keep_rate
     bet_for = _Bet.of(0.5 * stake, stake, min(1.5 * stake, highest))
-    against = _Bet.of(0.2, 0.5, 0.9)
+    against, share_well = _Bet.of(0.2, 0.5, 0.9), max(terms.keep_rate, min(HIGHEST_SHARE, terms.keep_rate + WELL_ABOVE))
     shown_left = shown_whole = 0
     for pair in range(min(MOST_PAIRS, int(PATIENCE * math.log(3.0 / terms.error) / growth))):
         mine, theirs = yield left, whole
         shown_left, shown_whole = shown_left + mine, shown_whole + theirs
-        bet_for, against = bet_for.after(mine - terms.keep_rate * theirs), against.after(0.95 * theirs - mine)
+        bet_for, against = bet_for.after(mine - terms.keep_rate * theirs), against.after(share_well * theirs - mine)
         if alone + (1.0 - share) * bet_for.wealth >= need:
             return (yield from _at_least(terms.at_least - runs - pair - 1, (left, whole), "kept"))
         if against.wealth >= REFUTED:
             return "lost"
-    return "not shown" if shown_left >= LIKELY_KEPT * shown_whole else "lost"
+    return "not shown" if shown_left >= _likely_kept(terms) * shown_whole else "lost"
+
+
+def _of_whole(whole: Subject, runs: int) -> Procedure:
+    """The whole world keeps its own rate, if f shows in it at all."""
+    shown = 0
+    for _ in range(runs):
+        (mine,) = yield (whole,)
+        shown += mine
+    return "kept" if shown else "not shown"
+
+
+def _likely_kept(terms: Terms) -> float:
+    """The share of the whole world's rate from which on it is likely that enough is kept."""
+    return max(terms.keep_rate, min(HIGH_SHARE, terms.keep_rate + SOMEWHAT_ABOVE))
 
 
 def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
-    """Whether `without` shows f at less than `keep_rate` of the rate of `whole`: "needed", "not needed" or "not shown"."""
+    """Whether `without` shows f at less than `keep_rate` of the rate of `whole`: "needed", "not needed" or "not shown".
+
+    "needed" is wrong with a probability of at most the terms' error. "not needed" says that f shows about as often; the next
+    certificate has to show it.
+    """
     bet_for = _Bet.of(0.5, 0.75, 0.95, 0.95)
     against = _Bet.of(0.2, 0.5, 0.9)
     shown_without = shown_whole = 0
@@ -148,13 +171,13 @@ def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
         more = pair + 1, MOST_REMOVAL_PAIRS
         if not bet_for.may_reach(1.0 / terms.error, *more) and not against.may_reach(REFUTED, *more):
             break
-    return "not needed" if shown_without >= LIKELY_KEPT * shown_whole else "not shown"
+    return "not needed" if shown_without and shown_without >= _likely_kept(terms) * shown_whole else "not shown"
 
 
 def good_enough(earlier: Subject, rate: float, keep_rate: float, lost_rate: float) -> Procedure:
     """Whether an earlier environment still shows f at `rate`, and not nearer to `lost_rate`: "kept" or "lost"."""
     good = min(rate, HIGHEST_RATE)
-    bad = max(0.02, min(keep_rate * good, (good + lost_rate) / 2.0))
+    bad = min(max(0.02, min(keep_rate * good, (good + lost_rate) / 2.0)), keep_rate * good)
     ratio = 0.0
     for _ in range(MOST_EARLIER):
         (shown,) = yield (earlier,)

@@ -26,6 +26,11 @@ class Refused(dict[frozenset[str], str]):
         """Neither `models` nor a part of them is taken any more."""
         self._lost.append(models)
 
+    def allow(self, models: frozenset[str]) -> None:
+        """`models` may be taken again, and parts of them."""
+        self.pop(models, None)
+        self._lost[:] = [lost for lost in self._lost if not models <= lost]
+
     def has_lost(self, models: frozenset[str]) -> bool:
         """Whether `models` are part of what lost the rate."""
         return any(models <= lost for lost in self._lost)

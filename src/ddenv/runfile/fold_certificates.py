@@ -21,7 +21,7 @@ def certificate_started(state: RunState, data: Data, _: float) -> Changes:
         at_least=int(data["at_least"]),
         branch=origin(state, state.node).parent is not None,
     )
-    if one.number != len(state.certificates) + 1:
+    if one.number != len(state.certificates) + 1 or not one.error or one.first_run < 0 or one.at_least < 0:
         raise ValueError(one.number)
     return {"confirming": True, "certificates": (*state.certificates, one)}
 
@@ -35,7 +35,7 @@ def certificate_finished(state: RunState, data: Data, _: float) -> Changes:
 
 def _claim(state: RunState, data: Data) -> Claim:
     without, shown, runs = data["without"], int(data["shown"]), int(data["runs"])
-    if not 0 <= shown <= runs:
+    if not 0 <= shown <= runs or (data["verdict"] == "lost" and not runs):
         raise ValueError(shown)
     return Claim(
         without=None if without is None else names(state.elements, [without])[0],

@@ -18,8 +18,8 @@ UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 # The phases of full runs of what is left. Files of format 4 have "confirm", with the seeds that the search had used.
 FRESH = ("certify", "confirm")
-# The first run with a fresh seed; the search never comes so far.
-FIRST_FRESH_RUN = 10_000
+# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
+FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class RunState:
     @property
     def certified(self) -> bool:
         """Whether the run ended as minimal, and fresh runs show it; files of format 4 have no certificate."""
-        return self.minimal and self.certificate is not None
+        return self.minimal and self.certificate is not None and bool(self.certificate.claims)
 
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
