@@ -37,7 +37,7 @@ def needed_of(known, count):
 def searched(known, needed, algorithm="ddenv", pair=NEAR, iterations=3, **options):
     """Plays a search and forecasts each round: (the forecast's low, likely, high; the tests that were left)."""
     trials, verdicts, told = [], {}, []
-    guide = make_guide(*split_pair(pair), lambda: replace(known, trials=trials), **options)
+    guide = make_guide(*split_pair(pair), lambda: replace(known, trials=trials), runs=lambda: 1 + iterations, **options)
     memory = Memory()
     searching, winner = search(algorithm, known.elements, memory.of(guide)), None
     try:

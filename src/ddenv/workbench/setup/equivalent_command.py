@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv import processor
-from ddenv.settings import OPTIONS, number_text, read
+from ddenv.settings import OPTIONS, PRINTED, number_text, read
 from ddenv.workbench.setup.form import read_key
 
 if TYPE_CHECKING:
@@ -40,10 +40,12 @@ def command(
         numbers = [read_key(after, key) for key in keys]
         if own is None or numbers != [read_key(before, key) for key in keys]:
             words.append(f"--{place}={','.join(map(number_text, numbers))}")
-    for one in OPTIONS:
-        value = read(after, one)
-        if value != read(before, one):
-            words += one.words(value)
+    changed = [one for one in OPTIONS if read(after, one) != read(before, one)]
+    # As printed sets the others.
+    others = PRINTED if any(one.name == "as_printed" for one in changed) else {}
+    for one in changed:
+        if one.name not in others:
+            words += one.words(read(after, one))
     for option, values in reading.items():
         for value in values:
             words += [f"--{option.replace('_', '-')}", _path(value) if isinstance(value, Path) else str(value)]
