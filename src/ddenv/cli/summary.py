@@ -10,7 +10,7 @@ from ddenv.claims import current, drift, is_minimal, meaning, missing, promise, 
 from ddenv.errors import printable
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim
-from ddenv.runfile.state import Node, RunState
+from ddenv.runfile.state import BROKEN, Node, RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 
 # The maximum number of names in a line, and of models with a line each.
@@ -128,5 +128,5 @@ def _removal(claim: Claim) -> str:
 
 def broken(state: RunState) -> list[str]:
     """Why the last broken test broke, if any did: broken tests say nothing about the failure."""
-    tests = [test for test in state.tests if test.outcome in ("error", "timeout")]
+    tests = [test for test in state.tests if test.outcome in BROKEN]
     return [f"{count(len(tests), 'test')} broke, the last one: {tests[-1].failure}"] if tests else []

@@ -15,7 +15,7 @@ from ddenv.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
 from ddenv.runfile.failures import SeenFailure, grouped
-from ddenv.runfile.state import Test
+from ddenv.runfile.state import BROKEN, Test
 from ddenv.words import count
 from ddenv.world.scenario import FailureSpec, Reduction
 
@@ -57,7 +57,7 @@ def fix_failure(
     others. If no run failed, or if there is no such number, returns a line that tells the user so. The rate counts f only, not
     other failures; runs that broke say nothing, and are not in it.
     """
-    sound = [test for test in tests if test.outcome not in ("error", "timeout")]
+    sound = [test for test in tests if test.outcome not in BROKEN]
     failing = [test for test in sound if test.outcome == "failed" and test.end_pose is not None]
     if not failing:
         return _no_failure(tests)
@@ -112,7 +112,7 @@ def _no_such_failure(seen: Sequence[SeenFailure], wanted: int, runs: int) -> str
 
 
 def _no_failure(tests: Sequence[Test]) -> str:
-    broken = [test for test in tests if test.outcome in ("error", "timeout")]
+    broken = [test for test in tests if test.outcome in BROKEN]
     if len(broken) == len(tests):
         return f"no baseline run came to its end: {broken[0].failure}"
     reached = len(tests) - len(broken)

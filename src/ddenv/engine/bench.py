@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.journal import BROKEN, Journal, Keep
+from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Broken, Pool, Supports
 from ddenv.engine.shared import SharingPool
@@ -20,7 +20,7 @@ from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import Trial
+from ddenv.runfile.state import BROKEN, Trial
 from ddenv.runfile.store import ROBOT
 from ddenv.world.scenario import FailureSpec
 

@@ -9,12 +9,12 @@ from typing import Any
 
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Stopped
-from ddenv.engine.journal import BROKEN, Journal, Keep
+from ddenv.engine.journal import Journal, Keep
 from ddenv.rates import wilson_interval
 from ddenv.reduction.certificate import Claim, Procedure, Terms, error_of, falls, good_enough, keeps, settle
 from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import FRESH_RUNS
+from ddenv.runfile.state import BROKEN, FRESH_RUNS
 
 # After this many steps back what is left stays as it is, and is not called minimal.
 MOST_STEPS_BACK = 14

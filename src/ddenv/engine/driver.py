@@ -14,7 +14,7 @@ from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import CHANGED, Certifier
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.journal import BROKEN, Journal, Keep, other_way
+from ddenv.engine.journal import Journal, Keep, other_way
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
@@ -27,6 +27,7 @@ from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Standing, standing
+from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
 from ddenv.words import count

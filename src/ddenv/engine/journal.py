@@ -12,14 +12,13 @@ from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import FIRST_FRESH_RUN, FRESH, FRESH_RUNS, Round, RunState, Test
+from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, Round, RunState, Test
 from ddenv.runfile.store import Event, RunFile
 from ddenv.runfile.supports import stack_with
 
 Keep = frozenset[str]
 # After these events the search starts again from what the user left.
 STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back", "rate_lost", "left_out")
-BROKEN = ("error", "timeout")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, perc
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.words import count, failed_in
 
 WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
@@ -138,7 +138,7 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
     if outcome == "other":
         ways = Counter(test.failure for test in state.tests if test.outcome == "other" and test.failure in DEEDS)
         meaning += f" ({', '.join(f'{word} {times}' for word, times in ways.most_common())})" if ways else ""
-    if outcome in ("error", "timeout"):
+    if outcome in BROKEN:
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
     return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning

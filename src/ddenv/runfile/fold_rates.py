@@ -6,9 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes
-from ddenv.runfile.state import FRESH, Node, RunState, Test
-
-BROKEN = ("error", "timeout")
+from ddenv.runfile.state import BROKEN, FRESH, Node, RunState, Test
 
 
 def noted(state: RunState, test: Test) -> Changes:

@@ -13,6 +13,8 @@ from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
+# Tests that ended so say nothing about f.
+BROKEN = ("error", "timeout")
 # Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import takewhile
 
 from ddenv.rates import wilson_interval
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.fold_rates import BROKEN
-from ddenv.runfile.progress import Certificate, Claim
-from ddenv.runfile.state import FRESH, OUTCOMES, RunState, Test
+from ddenv.runfile.progress import Claim
+from ddenv.runfile.state import BROKEN, OUTCOMES, RunState, Test
 from ddenv.runfile.supports import stacks_of
 
 
@@ -43,7 +40,7 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     if certificate is None:
         return ()
     tests: dict[tuple[int, str | None], list[Test]] = {}
-    for test in _tests(state, certificate):
+    for test in (each for each in state.confirm_tests if each.run >= certificate.first_run):
         tests.setdefault((test.node, test.without), []).append(test)
     claims = {claim.without: claim for claim in certificate.claims}
     # Stacks that are kept together are named by their first models. Where the rate is lost, nothing is claimed of removals.
@@ -55,13 +52,6 @@ def fresh_runs(state: RunState) -> tuple[FreshRuns, ...]:
     keys += [*earlier, *([(first, None)] if certificate.node != first else [])]
     found = [_of(key, tests.get(key, []), claims.get(key[1]) if key[0] == certificate.node else None) for key in keys]
     return (replace(found[0], is_left=True), *found[1:])
-
-
-def _tests(state: RunState, certificate: Certificate) -> Iterable[Test]:
-    """In the order they were started."""
-    # Tries of the user may run between them.
-    last = takewhile(lambda test: test.phase in (*FRESH, "hand"), reversed(state.tests))
-    return reversed([test for test in last if test.phase in FRESH and test.run >= certificate.first_run])
 
 
 def _of(key: tuple[int, str | None], tests: list[Test], claim: Claim | None) -> FreshRuns:

@@ -14,7 +14,7 @@ from ddenv.claims import current
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
-from ddenv.runfile.state import RunState
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import STOP_WAIT, last_words, start_engine, stop_engines
@@ -148,7 +148,7 @@ def _has_ended(each: Work) -> bool:
 
 def _all_broke(state: RunState) -> bool:
     """Whether the simulator broke in all baseline runs: it may work now."""
-    broke = all(test.outcome in ("error", "timeout") for test in state.finished_tests)
+    broke = all(test.outcome in BROKEN for test in state.finished_tests)
     return state.status == "finished" and state.baseline is None and broke
 
 
