@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 from ddenv.amounts import count, first_of, percent
@@ -35,7 +36,7 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     for word, start in (
         ("unknown", "not shown that each model is needed: tests broke without"),
         ("not shown", "not shown that each model is needed: undecided without"),
-        ("not needed", "not minimal: f shows as often without"),
+        ("not needed", "not minimal: f shows about as often without"),
     ):
         names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
         if names:
@@ -107,7 +108,7 @@ def promise(certificate: Certificate) -> str:
     rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
     return (
         f"minimal means: what is left keeps {rate}, and falls below that without any one model; "
-        f"the chance that this is wrong is at most {100 * certificate.error:.1g} %"
+        f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
     )
 
 

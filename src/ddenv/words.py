@@ -106,8 +106,10 @@ def _certificate(kind: str, after: RunState) -> str:
         case "certificate_finished":
             return f"  certificate {last.number}: {verdict_on(last, len(after.pinned))}"
         case "rate_lost":
-            return f"  back to {models}, the last environment that keeps the rate"
-    return f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows as often"
+            return f"  back to {models}, the last environment that seems to keep the rate"
+    return (
+        f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
+    )
 
 
 def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:

@@ -56,7 +56,7 @@ def _what(test: Test, certificate: Certificate) -> str:
 
 def _after(certificate: Certificate) -> str:
     if certificate.claims[0].verdict == "lost":
-        return "f is rarer in what is left. Earlier environments run, to find the last one that keeps the rate."
+        return "f is rarer in what is left. Earlier environments run, to find the last one that seems to keep the rate."
     return "The certificate is finished."
 
 
