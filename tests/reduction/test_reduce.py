@@ -72,16 +72,23 @@ def test_its_history_goes_from_all_to_what_is_kept():
         assert set(after.kept) < set(before.kept)
 
 
+def four_of_five(salt):
+    """Needs b and g, and then shows in four of five runs."""
+    rng = np.random.default_rng(salt)
+    return lambda kept: kept >= {"b", "g"} and rng.random() < 0.8
+
+
 @given(salt=st.integers(0, 2**31))
 @examples(0.3)
-def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs(salt):
-    rng = np.random.default_rng(salt)
+def test_a_failure_that_shows_in_four_of_five_runs_is_never_lost_and_minimal_is_true(salt):
+    found = ddenv.reduce(ELEMENTS, four_of_five(salt), iterations=12, **ALL)
+    assert set(found.kept) >= {"b", "g"}
+    assert not found.minimal or found.kept == ("b", "g")
 
-    def flaky(kept):
-        return kept >= {"b", "g"} and rng.random() < 0.8
 
-    found = ddenv.reduce(ELEMENTS, flaky, iterations=12, **ALL)
-    assert found.kept == ("b", "g")
+def test_a_failure_that_shows_in_four_of_five_runs_is_followed_with_re_runs():
+    ends = [ddenv.reduce(ELEMENTS, four_of_five(salt), iterations=12, **ALL).kept for salt in range(40)]
+    assert ends.count(("b", "g")) >= 38
 
 
 @pytest.mark.parametrize("options", [{}, {"iterations": 3}, {"iterations": 3, "accept_rate": "first"}])
