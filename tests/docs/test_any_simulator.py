@@ -34,7 +34,6 @@ def reduced(made_once):
 
 
 @pytest.mark.examples
-@pytest.mark.witness
 def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
     (promise,) = re.findall(r"minimal environment: .*", PAGE)
     assert promise in reduced[1].splitlines()

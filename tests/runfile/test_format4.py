@@ -67,6 +67,7 @@ def test_it_is_reported(run, tmp_path):
     assert "21 tests" in text or "| 21 |" in text
 
 
+@pytest.mark.programs
 def test_an_engine_obeys_its_waiting_commands_and_goes_on(run):
     with RunFile(run) as file:
         # The recorded budget has no room for a certificate.
