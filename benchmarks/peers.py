@@ -118,7 +118,7 @@ def reducers_of(words: str) -> list[str]:
 
 def table(asked: Asked, reducers: list[str]) -> None:
     reduction = asked.scenario.reduction
-    early = ", early stop" if asked.scenario.failure.early_stop else ""
+    early = ", early stop" if asked.scenario.reduction.early_stop else ""
     order = "" if asked.shuffle is None else f", order {asked.shuffle}"
     first = f"{asked.scenario.name}, seed {reduction.seed}, {asked.jobs} jobs{order}{early}"
     print(f"\n| {' | '.join((first, *HEADER[1:]))} |\n|{'---|' * len(HEADER)}", flush=True)
@@ -155,7 +155,7 @@ def ours(asked: Asked, reducer: str, report: Callable[[int], None]) -> Result:
     path = asked.folder / f"{list(OURS).index(reducer)}.ddenv"
     words = [sys.executable, "-m", "ddenv", "run", asked.name, *OURS[reducer], "--json", "--output", str(path)]
     words += ["--jobs", str(asked.jobs), "--seed", str(asked.scenario.reduction.seed)]
-    words += ["--early-stop" if asked.scenario.failure.early_stop else "--no-early-stop"]
+    words += ["--early-stop" if asked.scenario.reduction.early_stop else "--no-early-stop"]
     started = time.time()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as log:
         # In a session of its own it hears of Ctrl+c once, from here.

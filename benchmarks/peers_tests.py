@@ -70,7 +70,7 @@ def _baseline_run(run: int) -> RunResult:
 def shows(keep: Keep, run: int) -> bool:
     """Whether f shows in one run of what is kept."""
     _write(keep, run, BEGUN)
-    result = _simulator.run(keep, _scenario.reduction.seed + run, full=not _scenario.failure.early_stop)
+    result = _simulator.run(keep, _scenario.reduction.seed + run, full=not _scenario.reduction.early_stop)
     similar = judge(result, _failure).outcome == SIMILAR
     _write(keep, run, SIMILAR if similar else WITHOUT)
     return similar

@@ -195,6 +195,13 @@ class Reduction:
         shown="more",
         cost="On needs fewer tests, but may leave models that could be removed.",
     )
+    early_stop: bool = setting(
+        True,
+        "end a test when the robot is stuck for good; full runs confirm what is left",
+        printed=False,
+        shown="more",
+        cost="On saves the rest of a test that is stuck; the runs of the certificate are full ones.",
+    )
     growth: Literal["paper", "steady"] = setting(
         "steady",
         "when n grows: after every round (paper), or only after a round without success (steady)",
@@ -243,12 +250,6 @@ class Failure:
         above=0,
         shown="basic",
         cost="Wider accepts more failures as the same one; narrower misses f more often.",
-    )
-    early_stop: bool = setting(
-        False,
-        "end a test when the robot is stuck for good; full runs confirm what is left",
-        shown="more",
-        cost="Saves the rest of a test that is stuck; at the end there are at least two full runs.",
     )
     similarity: Literal["end-pose", "trajectory"] = setting(
         "end-pose",

@@ -98,8 +98,7 @@ def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wal
     scenario = load_scenario(DATA / "wall.yaml")
     changed = {
         "world": world,
-        "reduction": scenario.reduction.model_copy(update=PRINTED | CHEAP | reduction),
-        "failure": scenario.failure.model_copy(update={"early_stop": early_stop}),
+        "reduction": scenario.reduction.model_copy(update=PRINTED | CHEAP | {"early_stop": early_stop} | reduction),
     }
     scenario = scenario.model_copy(update=changed)
     path = folder / f"run-{len(list(folder.iterdir()))}.ddenv"

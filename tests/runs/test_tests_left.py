@@ -82,7 +82,7 @@ def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, keep_r
 
 
 def test_a_rough_run_has_its_certificate():
-    asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10})
+    asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10, "keep_rate": 0.8})
     kept, printed = rough_run(43, asked), rough_run(43, asked.model_copy(update=PRINTED))
     assert kept.certificate == printed.certificate == certificate_tests(10.5 / 11, 0.8, 3, 10)
     assert kept.tests[1] == kept.search[1] + kept.certificate[1]

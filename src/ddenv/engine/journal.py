@@ -199,7 +199,7 @@ class Journal:
 
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even if the robot is stuck for good."""
-        return phase not in ("round", "hand") or not self.state.scenario["failure"].get("early_stop", False)
+        return phase not in ("round", "hand") or not self.state.scenario["reduction"].get("early_stop", False)
 
     def start_test(
         self,

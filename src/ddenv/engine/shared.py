@@ -20,6 +20,7 @@ from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.pool import Broken, Pool, Supports
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
+from ddenv.runfile.events import as_it_was
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
 from ddenv.runs.folder import SUFFIX
@@ -99,7 +100,7 @@ def _is_alike(run: RunFile, other: RunFile) -> bool:
 
 
 def _asked(scenario: Any) -> Any:
-    """A scenario without its reduction settings and its paths: the contents of the files are compared."""
+    """A scenario without its paths, and of how it is reduced only whether tests end early: the contents of files are compared."""
     if not isinstance(scenario, dict):
         return None
     kept = {
@@ -107,10 +108,10 @@ def _asked(scenario: Any) -> Any:
         for key, value in scenario.items()
         if key not in ("name", "description", "reduction", "world", "folder")
     }
-    robot = kept.get("robot")
-    if not isinstance(robot, dict):
+    robot, reduction = kept.get("robot"), as_it_was(scenario).get("reduction")
+    if not isinstance(robot, dict) or not isinstance(reduction, dict):
         return None
-    return kept | {"robot": {key: value for key, value in robot.items() if key != "model"}}
+    return kept | {"early_stop": reduction.get("early_stop"), "robot": {key: value for key, value in robot.items() if key != "model"}}
 
 
 class SharingPool:

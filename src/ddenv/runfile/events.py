@@ -139,7 +139,11 @@ def deed(failure: str) -> str:
 
 def as_it_was(scenario: Data) -> Data:
     """A scenario of a run file, with what older versions of ddenv did without a setting for it."""
-    reduction = scenario.get("reduction")
+    reduction, failure = scenario.get("reduction"), scenario.get("failure")
     if isinstance(reduction, dict):
-        scenario = {**scenario, "reduction": {"accept_rate": "first", "keep_rate": 0.8, **reduction}}
+        before = {"accept_rate": "first", "keep_rate": 0.8, "early_stop": False}
+        if isinstance(failure, dict) and "early_stop" in failure:
+            before["early_stop"] = failure["early_stop"]
+            scenario = {**scenario, "failure": {key: value for key, value in failure.items() if key != "early_stop"}}
+        scenario = {**scenario, "reduction": {**before, **reduction}}
     return scenario

@@ -54,14 +54,14 @@ async def test_algorithm_partitioning_and_prioritization_reach_the_run(scenarios
 
 @pytest.mark.screens
 async def test_early_stop_reaches_the_run_and_comes_from_the_scenario(scenarios, started):
-    own = fake_run.scenario() | {"failure": {"early_stop": True}}
+    own = fake_run.scenario() | {"reduction": {"early_stop": True}}
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(own))
     async with Opened() as session:
         await session.press("f9")
         assert session.value("early_stop") == "on"
         session.fill(early_stop="off")
         await session.press("ctrl+s")
-        assert not session.made().failure.early_stop
+        assert not session.made().reduction.early_stop
 
 
 @pytest.mark.screens
