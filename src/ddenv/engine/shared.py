@@ -111,7 +111,10 @@ def _asked(scenario: Any) -> Any:
     robot, reduction = kept.get("robot"), as_it_was(scenario).get("reduction")
     if not isinstance(robot, dict) or not isinstance(reduction, dict):
         return None
-    return kept | {"early_stop": reduction.get("early_stop"), "robot": {key: value for key, value in robot.items() if key != "model"}}
+    return kept | {
+        "early_stop": reduction.get("early_stop"),
+        "robot": {key: value for key, value in robot.items() if key != "model"},
+    }
 
 
 class SharingPool:
