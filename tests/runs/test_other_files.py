@@ -70,6 +70,10 @@ def test_folders_and_stand_ins_of_a_scenario_come_after_those_of_the_command_lin
     assert more.model_path == (other, tmp_path / "models")
     assert more.stand_ins == {"model://barrel": "sphere:1"}
     assert more.ignore == ("mesh",)
+    assert reading_of(more, stand_in=["auto", "model://x=none"]).stand_ins == more.stand_ins | {
+        "*": "auto",
+        "model://x": "none",
+    }
 
 
 WRONG = {
@@ -77,6 +81,7 @@ WRONG = {
     "no shape": ({"stand_in": ["model://x"]}, "--stand-in: expected URI=SHAPE"),
     "unknown shape": ({"stand_in": ["model://x=cone:1,2"]}, "'cone:1,2' is not a stand-in; use box:x,y,z"),
     "too few sizes": ({"stand_in": ["model://x=cylinder:1"]}, "expected radius,length in m, found '1'"),
+    "a shape for everything": ({"stand_in": ["*=sphere:1"]}, "only auto can stand for all that is missing"),
     "no size": ({"stand_in": ["model://x=sphere:0"]}, "sizes must be positive"),
     "not finite": ({"stand_in": ["model://x=sphere:nan"]}, "expected radius in m"),
     "no centre": ({"stand_in": ["model://x=sphere:1@2"]}, "expected x,y,z in m, found '2'"),

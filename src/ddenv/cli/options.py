@@ -93,8 +93,9 @@ reading_options = _together(
     click.option(
         "--stand-in",
         multiple=True,
-        metavar="URI=SHAPE",
-        help="A shape for a missing model or mesh, such as model://barrel=cylinder:0.3,1.0; may be repeated.",
+        metavar="URI=SHAPE|auto",
+        help="A shape for a missing model or mesh, such as model://barrel=cylinder:0.3,1.0, or auto: guess all that are missing; "
+        "may be repeated.",
     ),
     click.option(
         "--ignore",

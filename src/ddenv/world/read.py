@@ -20,6 +20,7 @@ from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.standin import AUTO
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
 from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
 
@@ -162,5 +163,7 @@ def _gravity(world: Element) -> Vector:
 
 def _note_unused(context: Context, root: Element) -> None:
     """An unused stand-in is probably a typing error."""
-    for uri in sorted(context.stand_ins.keys() - context.used):
+    # `auto` asks for nothing as long as nothing is missing.
+    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in.word != AUTO}
+    for uri in sorted(asked - context.used):
         context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")

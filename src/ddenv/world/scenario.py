@@ -39,7 +39,8 @@ class Reading(Section):
     """How the world's file is understood where it names other files.
 
     `model_path` are folders that hold models. `stand_ins` maps the beginning of a URI to a simple shape that stands in for what
-    cannot be found there, such as `cylinder:0.3,1.0`. `ignore` names kinds of elements to leave out instead of refusing the file.
+    cannot be found there, such as `cylinder:0.3,1.0`, or `*`, all that is missing, to `auto`. `ignore` names kinds of elements
+    to leave out instead of refusing the file.
     """
 
     model_path: tuple[Path, ...] = ()

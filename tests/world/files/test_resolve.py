@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.files.access import Missing, Unusable, read
-from ddenv.world.files.resolve import ENVIRONMENT, find, model_file, search_folders
+from ddenv.world.files.resolve import ENVIRONMENT, PACKAGES, PREFIXES, find, model_file, model_named, search_folders
 from tests.tiers import examples
 
 
 @pytest.fixture(autouse=True)
 def _no_environment(monkeypatch, tmp_path):
-    for variable in (*ENVIRONMENT, "GZ_FUEL_CACHE_PATH"):
+    for variable in (*ENVIRONMENT, PACKAGES, PREFIXES, "GZ_FUEL_CACHE_PATH"):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
 
@@ -35,14 +35,40 @@ def put(path: Path, text: str = "x") -> Path:
 
 
 def test_folders_in_order_without_doubles(tmp_path, monkeypatch):
-    folders = {name: tmp_path / name for name in ("own", "gz", "classic", "sdf", "world", "home/models")}
+    names = (
+        "own",
+        "world",
+        "gz",
+        "ignition",
+        "home/models",
+        "classic",
+        "sdf",
+        "home/.gazebo/models",
+        "ros1",
+        "ros2/share",
+    )
+    folders = {name: tmp_path / name for name in names}
     for folder in folders.values():
         folder.mkdir(parents=True)
     monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", f"{folders['gz']}{os.pathsep}{os.pathsep}{tmp_path / 'gone'}")
+    monkeypatch.setenv("IGN_GAZEBO_RESOURCE_PATH", str(folders["ignition"]))
     monkeypatch.setenv("GAZEBO_MODEL_PATH", f"~/models{os.pathsep}{folders['classic']}/{os.pathsep}~nobody/x")
     monkeypatch.setenv("SDF_PATH", f"{folders['sdf']}{os.pathsep}{folders['gz']}/../gz")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(folders["ros1"]))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'ros2'}{os.pathsep}{tmp_path / 'gone'}")
     found = search_folders([folders["own"], tmp_path / "none"], folders["world"])
-    assert found == tuple(folders[name] for name in ("own", "gz", "home/models", "classic", "sdf", "world"))
+    assert found == tuple(folders.values())
+
+
+def test_a_package_of_ros_is_found_in_its_share_folder_or_by_its_own(tmp_path, monkeypatch):
+    new = put(tmp_path / "ros2" / "share" / "cart" / "meshes" / "cart.dae")
+    old = put(tmp_path / "src" / "lamp" / "lamp.dae")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ros2"))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src" / "lamp"))
+    folders = search_folders([], tmp_path)
+    for scheme in ("package", "model"):
+        assert find(f"{scheme}://cart/meshes/cart.dae", tmp_path, folders) == new
+        assert find(f"{scheme}://lamp/lamp.dae", tmp_path, folders) == old
 
 
 @pytest.mark.parametrize(
@@ -160,6 +186,40 @@ def test_fuel_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("GZ_FUEL_CACHE_PATH", str(tmp_path / "elsewhere"))
     with pytest.raises(Missing):
         find(start, tmp_path, ())
+
+
+def test_the_fuel_cache_is_searched_for_a_models_name_last(tmp_path, models):
+    fuel = tmp_path / "home" / ".ignition" / "fuel" / "fuel.gazebosim.org"
+    for owner in ("aaron", "openrobotics"):
+        for version in ("2", "11"):
+            put(fuel / owner / "models" / "pine tree" / version / "meshes" / "pine.dae")
+            put(fuel / owner / "models" / "box" / version / "model.sdf")
+    gazebos = fuel / "openrobotics" / "models" / "pine tree" / "11"
+    assert find("model://pine_tree", tmp_path, (models,)) == gazebos
+    assert find("model://Pine%20tree/meshes/pine.dae", tmp_path, ()) == gazebos / "meshes" / "pine.dae"
+    assert find("model://box", tmp_path, (models,)) == models / "box"
+    with pytest.raises(Unusable, match="leaves its folder"):
+        find("model://pine_tree/../../secret", tmp_path, ())
+    with pytest.raises(Missing, match="and the Fuel cache"):
+        find("model://pine_tree/none.dae", tmp_path, (models,))
+
+
+@pytest.mark.parametrize(
+    ("uri", "name"),
+    [
+        ("model://sun", "sun"),
+        (" model://Construction%20Barrel/meshes/a.dae", "construction_barrel"),
+        ("package://cart/a.dae", "cart"),
+        ("https://fuel.gazebosim.org/1.0/OpenRobotics/models/Ground Plane/3", "ground_plane"),
+        ("https://fuel.gazebosim.org/1.0/OpenRobotics/worlds/Sun", ""),
+        ("https://example.org", ""),
+        ("meshes/sun.dae", ""),
+        ("file:///sun", ""),
+        ("model://", ""),
+    ],
+)
+def test_the_name_of_the_model_in_a_uri(uri, name):
+    assert model_named(uri) == name
 
 
 @pytest.mark.parametrize("name", ["Oak tree", "Oak%20tree", "oak_tree", "OAK TREE"])

@@ -6,6 +6,7 @@ import errno
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -14,7 +15,12 @@ from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason,
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
-ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
+ENVIRONMENT = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
+DOWNLOADS = "~/.gazebo/models"  # of Gazebo Classic
+# ROS packages are in the folders of the one, and in `share` of those of the other.
+PACKAGES, PREFIXES = "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"
+# The owner of Gazebo's own models in Fuel.
+GAZEBO = "openrobotics"
 # The newest supported SDF version: a model's folder may hold one file per version.
 NEWEST_SDF = (1, 12)
 MODEL_CONFIG_LIMIT = 1_000_000  # bytes
@@ -25,15 +31,32 @@ _ABSENT = (errno.ENOENT, errno.ENOTDIR)
 
 
 def search_folders(model_path: Sequence[Path], world_folder: Path) -> tuple[Path, ...]:
-    """The folders searched for models: `model_path`, then Gazebo's environment variables, then the world's own folder.
+    """The folders searched for models: `model_path`, the world's own folder, then those of Gazebo and ROS.
 
     They are absolute, exist, and are listed once.
     """
-    named = [str(folder) for folder in model_path]
-    for variable in ENVIRONMENT:
-        named += os.environ.get(variable, "").split(os.pathsep)
-    absolute = [_absolute(without_tilde(name)) for name in [*named, str(world_folder)] if name]
+    gazebo = [folder for variable in ENVIRONMENT for folder in _listed_in(variable)]
+    packages = [*_listed_in(PACKAGES), *(str(Path(prefix, "share")) for prefix in _listed_in(PREFIXES))]
+    named = [*map(str, (*model_path, world_folder)), *gazebo, DOWNLOADS, *packages]
+    absolute = [_absolute(without_tilde(name)) for name in named]
     return tuple(dict.fromkeys(folder for folder in absolute if is_folder(folder)))
+
+
+def _listed_in(variable: str) -> list[str]:
+    return [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
+
+
+def model_named(uri: str) -> str:
+    """The model that `uri` names, such as `construction_barrel`, as its folder in Gazebo is called; "" if it names none."""
+    match = _SCHEME.fullmatch(uri.strip())
+    if match is None:
+        return ""
+    words = unquote(match[2], errors="replace").strip("/").split("/")
+    if match[1].lower() in ("http", "https"):
+        words = words[4:] if words[3:4] == ["models"] else []
+    elif match[1].lower() not in ("model", "package"):
+        words = []
+    return _plain(words[0]).replace(" ", "_") if words else ""
 
 
 def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
@@ -43,7 +66,10 @@ def find(uri: str, base: Path, folders: Sequence[Path]) -> Path:
     """
     scheme, rest = _split(uri.strip())
     if scheme in ("model", "package"):
-        return _first(_of_model(_inside(rest), folders), f"looked in {_listed(folders)}")
+        path = _inside(rest)
+        return _first(
+            chain(_of_model(path, folders), _cached(path)), f"looked in {_listed(folders)} and the Fuel cache"
+        )
     if scheme in ("http", "https"):
         return _downloaded(rest, folders)
     if scheme not in ("", "file"):
@@ -110,18 +136,32 @@ def _downloaded(rest: str, folders: Sequence[Path]) -> Path:
 
 
 def in_cache(owner: str, name: str, version: str) -> Iterator[Path]:
-    """Folders where the Fuel cache may hold the model: `version`, or the newest if that is empty or "tip".
+    """Folders where the Fuel cache may hold the model: `version`, or the newest if that is empty or "tip"."""
+    for host in _caches():
+        folder = host / owner.lower() / "models" / name.lower()
+        yield from [folder / version] if version.isdecimal() else _newest(folder)
 
-    The cache is $GZ_FUEL_CACHE_PATH, by default `CACHES`. Both hosts are tried, since Fuel moved from one to the other.
-    """
+
+def _cached(path: str) -> Iterator[Path]:
+    """`path`, which begins with a model's name, in the newest version of each such model in the Fuel cache."""
+    name, _, rest = path.partition(os.sep)
+    for host in _caches():
+        for owner in sorted(folders_of(host), key=lambda each: each != GAZEBO):
+            models = of_name(name, (host / owner / "models",))
+            yield from (version / rest for model in models for version in _newest(model))
+
+
+def _caches() -> Iterator[Path]:
+    """The Fuel caches, by host: $GZ_FUEL_CACHE_PATH, by default `CACHES`. Fuel moved from one host to the other."""
     chosen = os.environ.get("GZ_FUEL_CACHE_PATH", "")
     for cache in (chosen,) if chosen else CACHES:
-        for host in HOSTS:
-            folder = without_tilde(cache) / host / owner.lower() / "models" / name.lower()
-            if version.isdecimal():
-                yield folder / version
-            elif versions := [entry for entry in folders_of(folder) if entry.isdecimal()]:
-                yield folder / max(versions, key=int)
+        yield from (without_tilde(cache) / host for host in HOSTS)
+
+
+def _newest(folder: Path) -> list[Path]:
+    """The newest version of a model in the Fuel cache, if there is one."""
+    versions = [entry for entry in folders_of(folder) if entry.isdecimal()]
+    return [folder / max(versions, key=int)] if versions else []
 
 
 def of_name(name: str, folders: tuple[Path, ...]) -> Iterator[Path]:

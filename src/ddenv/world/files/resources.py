@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from ddenv.world.files.access import Missing, Unusable, is_folder, read, size_of
+from ddenv.world.files.built_in import built_in
 from ddenv.world.files.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
 from ddenv.world.files.resolve import find, model_file, search_folders
 from ddenv.world.files.triangles import Part
@@ -60,9 +61,15 @@ class Disk:
         return self._sdfs.get(key, lambda: self._read_sdf(key, uri, base))
 
     def _read_sdf(self, key: str, uri: str, base: Path) -> tuple[Path, bytes]:
-        path = find(uri, base, self._folders)
-        path = model_file(path) if is_folder(path) else path
-        text = read(path, SDF_LIMIT)
+        try:
+            path = find(uri, base, self._folders)
+            path = model_file(path) if is_folder(path) else path
+            text = read(path, SDF_LIMIT)
+        except Missing:
+            found = built_in(uri)
+            if found is None:
+                raise
+            path, text = found
         self.taken[key] = str(path).encode("utf-8", "surrogateescape") + b"\0" + text
         return path, text
 

@@ -11,7 +11,7 @@ from ddenv.world.files.access import Unusable
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
-from ddenv.world.sdf.standin import StandIn, matching, parse_stand_ins
+from ddenv.world.sdf.standin import ALL_MISSING, AUTO, StandIn, matching, parse_stand_ins
 from ddenv.world.sdf.xml import Element, complain, floats, parse, place
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7", "1.8", "1.9", "1.10", "1.11", "1.12")
@@ -116,10 +116,15 @@ class Context:
     def stand_in(self, uri: str) -> tuple[str, StandIn] | None:
         """The stand-in for `uri`, with the text that the user gave for it; None if there is none."""
         key = matching(self.stand_ins, uri)
-        if key is None:
+        if key is None or self.stand_ins[key].word == AUTO:
             return None
         self.used.add(key)
         return self.reading.stand_ins[key], self.stand_ins[key]
+
+    def may_guess(self, uri: str) -> bool:
+        """Whether the user wants a guessed shape for `uri`, which is missing."""
+        key = matching(self.stand_ins, uri)
+        return ALL_MISSING in self.stand_ins if key is None else self.stand_ins[key].word == AUTO
 
     def root(self, element: Element, uri: str) -> Element:
         """The `<sdf>` of the file that `element` includes. Raises Missing, and UserError for a file that is not SDF."""

@@ -13,7 +13,7 @@ from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
-from ddenv.world.sdf.standin import SIZES
+from ddenv.world.sdf.standin import AUTO, NONE, SIZES, StandIn
 from ddenv.world.sdf.xml import Element, complain, numbers, text_of, truth
 
 SIDES = 32  # of a cone
@@ -31,12 +31,16 @@ class Placed:
 
 @dataclass(frozen=True)
 class Lost:
-    """A mesh that is not available, and the reason; `sibling` is the kind of shapes that the user wants in its place."""
+    """A mesh that is not available, and the reason; `word` is what the user wants in its place, as in `StandIn`.
+
+    `scale` is its own, times that of its model.
+    """
 
     element: Element
     uri: str
     reason: str
-    sibling: str = ""
+    word: str = ""
+    scale: Vector = ONE
 
 
 def read_shape(parent: Element, context: Context, scale: Vector = ONE) -> Placed | Lost | None:
@@ -129,9 +133,10 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     if given is not None:
         text, stand_in = given
         if stand_in.shape is None:
-            return Lost(element, uri, f"the {stand_in.sibling} shapes replace it", stand_in.sibling)
+            reason = "left out" if stand_in.word == NONE else f"the {stand_in.word} shapes replace it"
+            return Lost(element, uri, reason, stand_in.word)
         context.note("replaced", element, f"'{uri}' by the stand-in {text}")
-        return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.center, scale)))
+        return scaled_stand_in(stand_in, scale)
     submesh = element.find("submesh")
     name = "" if submesh is None else text_of(submesh.find("name"))
     center = submesh is not None and truth(submesh, "center", False)
@@ -139,10 +144,17 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
     try:
         mesh = context.resources.mesh(uri, element.source.parent, submesh=name, center=center, convex=convex)
     except (Missing, Unusable) as error:
-        return Lost(element, uri, str(error))
+        word = AUTO if context.may_guess(uri) else ""
+        return Lost(element, uri, str(error), word, _times(own, scale))
     if convex:
         context.note("replaced", element, f"'{uri}' by its convex hull")
     return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
+
+
+def scaled_stand_in(stand_in: StandIn, scale: Vector) -> Placed:
+    """The shape of a stand-in that has one."""
+    assert stand_in.shape is not None
+    return Placed(_scaled(stand_in.shape, scale), Pose(_times(stand_in.center, scale)))
 
 
 def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
@@ -153,7 +165,8 @@ def remedies(lost: Lost, siblings: tuple[str, ...]) -> str:
     also = "".join(f", or '{lost.uri[:200]}={kind}' for the box around its link's {kind} shapes" for kind in siblings)
     return (
         f"mesh '{lost.uri[:200]}' is not available: {lost.reason}; give its folder with --model-path, a shape in m with "
-        f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, or leave it out with --ignore mesh"
+        f"--stand-in '{package[:200]}=cylinder:0.3,1.0' (radius, length; or {others}){also}, "
+        "have one guessed with --stand-in auto, or leave it out with --ignore mesh"
     )
 
 

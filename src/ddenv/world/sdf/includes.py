@@ -7,9 +7,11 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from ddenv.world.files.access import Missing
+from ddenv.world.files.built_in import FOLDER
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
-from ddenv.world.sdf.standin import SIZES, StandIn
+from ddenv.world.sdf.guess import guess
+from ddenv.world.sdf.standin import NONE, SIZES, StandIn
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
 # Intangible things that an included file may hold in place of a model.
@@ -92,24 +94,41 @@ def _root(include: Element, uri: str, context: Context) -> Element | None:
     """The root of the included file; None if it is missing (noted or remembered in `context`)."""
     given = context.stand_in(uri)
     if given is not None:
-        outer = context.model
-        context.model = outer or text_of(include.find("name")) or _last_of(uri)
-        context.note("replaced", include, f"'{uri}' by the stand-in {given[0]}")
-        context.model = outer
-        return _stand_in_root(include, *given)
+        text, stand_in = given
+        if stand_in.word == NONE:
+            context.note("ignored", include, f"'{uri}' is left out as asked")
+            return None
+        _note(include, uri, f"the stand-in {text}", context)
+        return _stand_in_root(include, text, stand_in)
     try:
-        return context.root(include, uri)
+        root = context.root(include, uri)
+        if root.source.parent == FOLDER and root.find("model") is not None:
+            _note(include, uri, "the one built into ddenv, which is like Gazebo's", context)
+        return root
     except Missing as missing:
+        if context.may_guess(uri):
+            found = guess(uri)
+            _note(include, uri, f"a guess, {found.text}: {found.why}", context)
+            return _stand_in_root(include, found.text, found.stand_in)
         if context.ignores("include"):
             context.note("ignored", include, f"'{uri}' was not found: {missing}")
             return None
         error = complain(
             include,
             f"'{uri[:200]}' was not found ({missing}); give its folder with --model-path, a shape for it with --stand-in "
-            f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), or leave it out with --ignore include",
+            f"'{uri[:200]}=box:1,1,1' (m; or cylinder, sphere, ...), have one guessed with --stand-in auto, "
+            "or leave it out with --ignore include",
         )
         context.miss(uri, error)
         return None
+
+
+def _note(include: Element, uri: str, by: str, context: Context) -> None:
+    """Notes what replaces an included model, as a note of that model."""
+    outer = context.model
+    context.model = outer or text_of(include.find("name")) or _last_of(uri)
+    context.note("replaced", include, f"'{uri}' by {by}")
+    context.model = outer
 
 
 def _only_model(root: Element, include: Element, context: Context) -> Element | None:

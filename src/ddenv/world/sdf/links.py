@@ -9,11 +9,13 @@ import numpy as np
 
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
-from ddenv.world.pose import ONE, Pose, Vector, vector
+from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
-from ddenv.world.sdf.frames import Scope
-from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies
+from ddenv.world.sdf.frames import Scope, pose_of
+from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies, scaled_stand_in
+from ddenv.world.sdf.guess import guess
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
+from ddenv.world.sdf.standin import AUTO, NONE
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
@@ -69,7 +71,7 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
     collisions, density = [], []
     for item in items:
         if item.element.tag == "collision":
-            placed = _settled(item, items, context)
+            placed = _settled(item, items, element, context)
             if placed is not None and can_be_touched(item.element, context):
                 pose = site.pose @ item.pose @ placed.offset
                 mu = read_friction(item.element, context)
@@ -107,17 +109,23 @@ def _density(link: Element) -> float:
     return WATER if inertial is None else read_density(inertial, WATER)
 
 
-def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None:
+def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
     """The shape of a collision, with a replacement for a missing mesh; None if nothing collides. Raises UserError."""
     if not isinstance(item.shape, Lost):
         return item.shape
     lost = item.shape
-    if lost.sibling:
-        box = _box_around([other for other in items if other.element.tag == lost.sibling])
-        if box is None:
-            raise complain(lost.element, f"its link has no {lost.sibling} shape that could replace '{lost.uri[:200]}'")
-        context.note("replaced", lost.element, f"'{lost.uri}' by the box around its link's {lost.sibling} shapes")
-        return Placed(box.shape, item.pose.inverse() @ box.offset)
+    if lost.word == NONE:
+        context.note("ignored", lost.element, f"'{lost.uri}' is left out as asked: nothing collides with it")
+        return None
+    if lost.word:
+        kind = "visual" if lost.word == AUTO else lost.word
+        box = _box_around([other for other in items if other.element.tag == kind])
+        if box is not None:
+            context.note("replaced", lost.element, f"'{lost.uri}' by the box around its link's {kind} shapes")
+            return Placed(box.shape, item.pose.inverse() @ box.offset)
+        if lost.word == AUTO:
+            return _guessed(lost, item, link, context)
+        raise complain(lost.element, f"its link has no {kind} shape that could replace '{lost.uri[:200]}'")
     if context.ignores("mesh"):
         context.note(
             "ignored", lost.element, f"'{lost.uri}' is not available ({lost.reason}): nothing collides with it"
@@ -126,6 +134,19 @@ def _settled(item: _Item, items: list[_Item], context: Context) -> Placed | None
     kinds = {other.element.tag for other in items if isinstance(other.shape, Placed)}
     context.miss(lost.uri, complain(lost.element, remedies(lost, tuple(sorted(kinds)))))
     return None
+
+
+def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed:
+    """A shape for a missing mesh whose link has no other visual shape to go by."""
+    found = guess(lost.uri, link)
+    context.note("replaced", lost.element, f"'{lost.uri}' by a guess, {found.text}: {found.why}")
+    if found.at_mass:
+        mass = link.find("inertial/pose")
+        return Placed(
+            scaled_stand_in(found.stand_in, ONE).shape, item.pose.inverse() @ (HERE if mass is None else pose_of(mass))
+        )
+    by = [abs(own / usual) for own, usual in zip(lost.scale, found.scale, strict=True)]
+    return scaled_stand_in(found.stand_in, vector(by))
 
 
 def _box_around(items: list[_Item]) -> Placed | None:

@@ -19,33 +19,50 @@ SIZES = {
     "ellipsoid": "x,y,z",
 }
 SIBLINGS = ("visual", "collision")
+AUTO, NONE = "auto", "none"
+# In place of a URI: everything that is missing.
+ALL_MISSING = "*"
 LARGEST = 1e6  # m
 HOW = (
-    "box:x,y,z, cylinder:radius,length, sphere:radius, capsule:radius,length, ellipsoid:x,y,z (m), visual or collision"
+    "box:x,y,z, cylinder:radius,length, sphere:radius, capsule:radius,length, ellipsoid:x,y,z (m), visual, collision, "
+    "auto or none"
 )
 
 
 @dataclass(frozen=True)
 class StandIn:
-    """A `shape` with its `center` in the frame of what it replaces, m; or (None) the box around the link's `sibling` shapes."""
+    """A `shape` with its `center` in the frame of what it replaces, m; or (None) a `word`.
+
+    `visual` and `collision` are the box around these shapes of the link, `none` leaves it out, and `auto` guesses a shape for
+    what is missing, but leaves what is there.
+    """
 
     shape: Shape | None
     center: Vector
-    sibling: str = ""
+    word: str = ""
 
 
 def parse_stand_ins(texts: Mapping[str, str]) -> dict[str, StandIn]:
     """The stand-ins of a scenario by the URI that they replace. Raises UserError."""
-    return {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
+    found = {uri: parse_stand_in(text, f"stand-in for '{uri}'") for uri, text in texts.items()}
+    if ALL_MISSING in found and found[ALL_MISSING].word != AUTO:
+        raise UserError(f"stand-in for '{ALL_MISSING}': only {AUTO} can stand for all that is missing")
+    return found
 
 
 def parse_option(option: str) -> tuple[str, str]:
     """The URI and the shape of `--stand-in URI=SHAPE`. Raises UserError."""
+    if option.strip() == AUTO:
+        return ALL_MISSING, AUTO
     uri, sign, text = option.rpartition("=")
     if not sign or not uri.strip():
-        raise UserError(f"--stand-in: expected URI=SHAPE, such as model://barrel=cylinder:0.3,1.0; found '{option}'")
-    parse_stand_in(text.strip(), "--stand-in")
-    return uri.strip(), text.strip()
+        raise UserError(
+            f"--stand-in: expected URI=SHAPE, such as model://barrel=cylinder:0.3,1.0, or auto; found '{option}'"
+        )
+    uri, text = uri.strip(), text.strip()
+    parse_stand_in(text, "--stand-in")
+    parse_stand_ins({uri: text})
+    return uri, text
 
 
 def parse_stand_in(text: str, where: str) -> StandIn:
@@ -53,7 +70,7 @@ def parse_stand_in(text: str, where: str) -> StandIn:
 
     It stands on the origin of the frame that it replaces, as most meshes of props do; `@x,y,z` sets its centre instead.
     """
-    if text in SIBLINGS:
+    if text in (*SIBLINGS, AUTO, NONE):
         return StandIn(None, (0.0, 0.0, 0.0), text)
     kind, _, rest = text.partition(":")
     words, at, center = rest.partition("@")
