@@ -260,11 +260,17 @@ class Failure:
 
 
 class Simulation:
-    """How Drake simulates. `wall_timeout` bounds one test in real time."""
+    """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that follows the speed."""
 
     time_step: float = setting(0.005, "time step of the simulation", unit="s", above=0, most=0.05)
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
-    wall_timeout: float = setting(120.0, "maximum real time of one test, without its preparation", unit="s", above=0)
+    wall_timeout: float | None = setting(
+        None,
+        "maximum real time of one test without its preparation; unless given, it follows the speed of the baseline",
+        unit="s",
+        above=0,
+        none="by speed",
+    )
 
 
 def _kind(hint: Any) -> type:

@@ -14,7 +14,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Broken
+from ddenv.engine.pool import Broken, Pace
 from ddenv.engine.repeating import check_repeats
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState
@@ -60,6 +60,9 @@ class FakePool:
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
         self.settling = 0
+        self.limits: list[float | None] = []
+        # How far running tests are.
+        self.pace: list[Pace] = []
 
     @property
     def idle(self) -> int:
@@ -69,8 +72,9 @@ class FakePool:
     def busy(self) -> int:
         return len(self.running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True) -> None:
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
         assert self.idle
+        self.limits.append(limit)
         self.running.append((test, keep, seed, full))
 
     def finished(self, seconds: float) -> list[tuple[int, RunResult | Broken]]:
@@ -91,6 +95,9 @@ class FakePool:
 
     def live(self) -> list[Live]:
         return []
+
+    def paces(self) -> list[Pace]:
+        return self.pace
 
 
 def new_run(folder: Path, *, early_stop: bool = False, world: Path = DATA / "wall.sdf", **reduction) -> Path:

@@ -131,8 +131,7 @@ def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works(tmp_path):
         test, late = result(pool)
         assert (test, late.outcome, late.failure) == (1, "timeout", "took longer than 0.5 s of wall clock")
         (tmp_path / "go").touch()
-        pool._wall_timeout = 1e6
-        pool.submit(2, EVERYTHING, 0)
+        pool.submit(2, EVERYTHING, 0, limit=1e6)
         assert (result(pool)[1].outcome, pool.idle) == ("failed", 1)
     finally:
         pool.close()

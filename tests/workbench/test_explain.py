@@ -37,6 +37,11 @@ def test_it_is_said_that_the_piles_settle(run):
     assert "rests on" not in told(run)[1]
 
 
+def test_a_slow_world_is_told_while_its_baseline_runs(run):
+    run.created().write("slow", words="this world is slow: 0.25 s simulated in each second")
+    assert "This world is slow: 0.25 s simulated in each second." in told(run)[1]
+
+
 def test_the_baseline_counts_its_runs(run):
     run.created()
     run.test(None, "failed")

@@ -16,6 +16,8 @@ from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Broken, Pool, Supports
 from ddenv.engine.shared import SharingPool
+from ddenv.engine.slow import give_up_if_late, note_slow
+from ddenv.engine.wall_limit import wall_limit
 from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
@@ -109,7 +111,7 @@ class Bench:
                 return
             test = self._journal.start_test(phase, keep, run, round, candidate)
             self._started.add((keep, run, full))
-            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
+            self._submit(test, keep, full)
             self._control.started()
 
     def find_supports(self, elements: Keep, late: Callable[[], None]) -> Supports | Broken:
@@ -140,7 +142,11 @@ class Bench:
                 return
             test = self._journal.start_test("hand", keep, run, trial=trial)
             self._started.add((keep, run, full))
-            self._pool.submit(test, keep, self._journal.state.tests[test - 1].seed, full)
+            self._submit(test, keep, full)
+
+    def _submit(self, test: int, keep: Keep, full: bool) -> None:
+        state = self._journal.state
+        self._pool.submit(test, keep, state.tests[test - 1].seed, full, wall_limit(state))
 
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""
@@ -180,7 +186,9 @@ class Bench:
             self._show_live()
 
     def _give_up_if_all_break(self, result: RunResult | Broken) -> None:
-        """Raises UserError after too many broken tests in a row."""
+        """Raises UserError after too many broken tests in a row, or if the whole world takes too long."""
+        if result.outcome == "timeout":
+            give_up_if_late(self._journal, result.failure)
         self._broken = self._broken + 1 if result.outcome in BROKEN else 0
         if self._broken >= MOST_BROKEN:
             raise UserError(
@@ -189,6 +197,7 @@ class Bench:
             )
 
     def _show_live(self) -> None:
+        note_slow(self._journal, self._pool.paces())
         live = self._pool.live()
         if live or self._live_shown:
             self._journal.file.set_live(live)

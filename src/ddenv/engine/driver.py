@@ -18,6 +18,7 @@ from ddenv.engine.journal import Journal, Keep, other_way
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
+from ddenv.engine.wall_limit import limit_after
 from ddenv.errors import UserError
 from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
@@ -207,7 +208,8 @@ class Driver:
         found = run_baseline(self._journal, self._bench, self._reduction, self._failure_spec)
         if isinstance(found, str):
             return found
-        self._journal.record("baseline_finished", **found)
+        limit = limit_after(self._journal.state, self._failure_spec.timeout)
+        self._journal.record("baseline_finished", **found, wall_limit=limit)
         self._control.round_finished()
         return ""
 

@@ -18,6 +18,7 @@ from typing import TypeVar
 from pebble import ProcessExpired, ProcessPool
 
 from ddenv.engine import worker
+from ddenv.engine.wall_limit import GENEROUS
 from ddenv.engine.worker import REASON
 from ddenv.errors import UserError
 from ddenv.robot.deadline import Stopwatch
@@ -89,17 +90,26 @@ class Broken:
 
 @dataclass(frozen=True)
 class Job:
-    """A test in flight, in its worker slot."""
+    """A test in flight, in its worker slot. It may take `limit` s of real time, without its preparation."""
 
     test: int
     keep: frozenset[str]
     seed: int
     full: bool
+    limit: float
     slot: int
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How far a running test is: `simulated` s in `real` s of wall clock."""
+
+    simulated: float
+    real: float
+
+
 class Pool:
-    """`jobs` workers on one scenario; its `simulation.wall_timeout` bounds one test in real time, without its preparation."""
+    """`jobs` workers on one scenario."""
 
     def __init__(self, scenario: Scenario, world: World, robot: Model, jobs: int) -> None:
         self._jobs = jobs
@@ -110,7 +120,8 @@ class Pool:
         self._parts = (scenario, world, robot)
         # A simulator of the user's own has nothing to prepare.
         self._prepares = scenario.oracle is None
-        self._wall_timeout = scenario.simulation.wall_timeout + (0.0 if scenario.oracle is None else MARGIN)
+        self._limit = scenario.simulation.wall_timeout or GENEROUS
+        self._margin = 0.0 if scenario.oracle is None else MARGIN
         self._free = list(range(jobs))
         self._running: dict[Future[RunResult], Job] = {}
         # How long the test in each slot has run, or is in preparation.
@@ -135,9 +146,12 @@ class Pool:
     def busy(self) -> int:
         return len(self._running)
 
-    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True) -> None:
-        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good."""
-        job = Job(test, keep, seed, full, self._free.pop(0))
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
+        """Starts a test on an idle worker. If not `full`, it ends as soon as the robot is stuck for good.
+
+        It may take `limit` s of real time, without its preparation; None for what the scenario says.
+        """
+        job = Job(test, keep, seed, full, limit or self._limit, self._free.pop(0))
         try:
             self._schedule(job)
         except RuntimeError:
@@ -153,7 +167,7 @@ class Pool:
 
     def _schedule(self, job: Job) -> None:
         self._clear(job.slot)
-        work = (job.keep, job.seed, job.full, job.slot)
+        work = (job.keep, job.seed, job.full, job.limit, job.slot)
         self._running[self._pool.schedule(worker.run_test, args=work)] = job
 
     def _start_again(self, jobs: list[Job]) -> None:
@@ -179,7 +193,7 @@ class Pool:
         results = []
         try:
             for future, job in sorted(self._running.items(), key=lambda one: one[1].test):
-                result = self._result(future, job.slot)
+                result = self._result(future, job.slot, job.limit)
                 if result is not None:
                     del self._running[future]
                     self._free.append(job.slot)
@@ -189,26 +203,26 @@ class Pool:
             self._start_again([])
         return results
 
-    def _result(self, future: Future[Result], slot: int) -> Result | Broken | None:
-        """How the work in a slot ended; None if it is still running."""
+    def _result(self, future: Future[Result], slot: int, limit: float) -> Result | Broken | None:
+        """How the work in a slot ended; None if it is still running. Kills a test that takes longer than `limit` s."""
         start = slot * REASON
         # Its worker has ended itself. Pebble may not know that yet, or never: it misses a death that follows a start at once.
         if self._shared.reasons[start] != b"\0":
             reason = self._shared.reasons[start : start + REASON].rstrip(b"\0")
             return Broken("error", reason.decode(errors="ignore"))
         if not future.done():
-            return self._late(future, slot)
+            return self._late(future, slot, limit)
         try:
             return future.result()
         except ProcessExpired as error:
             return Broken("error", f"the simulator's process died (exit code {error.exitcode})")
 
-    def _late(self, future: Future[Result], slot: int) -> Broken | None:
+    def _late(self, future: Future[Result], slot: int, limit: float) -> Broken | None:
         """Kills what takes too long."""
         begun = self._shared.begun[slot]
         if begun and self._clocks[slot].since != begun:
             self._clocks[slot] = Stopwatch(LONGEST_LOOK, begun)
-        limit, what = (self._wall_timeout, "") if begun else (PREPARATION, " to prepare")
+        limit, what = (limit + self._margin, "") if begun else (PREPARATION, " to prepare")
         # Pebble's threads do not survive that a test is cancelled before its worker has it.
         if self._clocks[slot].look() <= limit or not future.running() or not future.cancel():
             return None
@@ -223,7 +237,7 @@ class Pool:
         def found() -> Supports | Broken | None:
             result: Supports | Broken | None
             try:
-                result = self._result(future, slot)
+                result = self._result(future, slot, PREPARATION)
             except BrokenProcessPool:
                 result = Broken("error", "the simulator's process died")
             if result is not None:
@@ -240,6 +254,14 @@ class Pool:
             if all(map(math.isfinite, values)):
                 rows.append(Live(job.slot, job.test, values[0], tuple(values[1:])))
         return rows
+
+    def paces(self) -> list[Pace]:
+        """How far the running tests are that have begun to move."""
+        clocks, shared = self._clocks, self._shared
+        # The clock is that of the preparation until it was looked at once more.
+        slots = [job.slot for job in self._running.values() if clocks[job.slot].since == shared.begun[job.slot]]
+        paces = [Pace(shared.progress[slot * COLUMNS], clocks[slot].look()) for slot in slots]
+        return [pace for pace in paces if math.isfinite(pace.simulated)]
 
     def close(self) -> None:
         """Kills what runs."""

@@ -8,6 +8,7 @@ from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
 from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.wall_limit import wall_limit
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState, Test
@@ -26,7 +27,7 @@ def check_repeats(journal: Journal, pool: Pool, control: Control, mixed: bool) -
     if state.physics.now == state.physics.proven or test is None:
         return
     journal.record("comparing", test=test.id)
-    pool.submit(0, frozenset(state.elements), test.seed)
+    pool.submit(0, frozenset(state.elements), test.seed, limit=wall_limit(state))
     while not (ended := pool.finished(WAIT)):
         control.poll()
     result = ended[0][1]

@@ -17,7 +17,7 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.journal import Journal, Keep
-from ddenv.engine.pool import Broken, Pool, Supports
+from ddenv.engine.pool import Broken, Pace, Pool, Supports
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import as_it_was
@@ -134,11 +134,11 @@ class SharingPool:
     def busy(self) -> int:
         return self._pool.busy + len(self._ready)
 
-    def submit(self, test: int, keep: Keep, seed: int, full: bool = True) -> None:
+    def submit(self, test: int, keep: Keep, seed: int, full: bool = True, limit: float | None = None) -> None:
         """Reuses the test, or starts it on an idle worker."""
         result = _result(self._known.pop((keep, seed, full), None))
         if result is None:
-            self._pool.submit(test, keep, seed, full)
+            self._pool.submit(test, keep, seed, full, limit)
         else:
             self._ready.append((test, result))
 
@@ -154,6 +154,10 @@ class SharingPool:
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""
         return self._pool.live()
+
+    def paces(self) -> list[Pace]:
+        """How far the running tests are."""
+        return self._pool.paces()
 
     def close(self) -> None:
         """Kills what runs."""

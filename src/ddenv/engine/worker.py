@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from dataclasses import dataclass
-from typing import Any, NoReturn, Protocol, cast
+from typing import Any, NoReturn, Protocol, cast, runtime_checkable
 
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import Progress, RunResult
@@ -32,6 +32,13 @@ class Simulator(Protocol):
         progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult: ...
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """A simulator that ends a test itself after `limit` s of real time, and says why."""
+
+    limit: float
 
 
 class Settling(Protocol):
@@ -84,8 +91,8 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     return Variants(world, robot, scenario)
 
 
-def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResult:
-    """One test, with its progress in `slot` of the shared memory.
+def run_test(keep: frozenset[str], seed: int, full: bool, limit: float, slot: int) -> RunResult:
+    """One test of at most `limit` s of real time, with its progress in `slot` of the shared memory.
 
     Raises UserError if the world cannot be simulated. Any other exception ends the worker, with the reason in the shared
     memory: nobody knows what it has left behind in the simulator.
@@ -104,6 +111,8 @@ def run_test(keep: frozenset[str], seed: int, full: bool, slot: int) -> RunResul
     try:
         if isinstance(_simulator, Exception):
             raise _simulator
+        if isinstance(_simulator, Limited):
+            _simulator.limit = limit
         return _simulator.run(keep, seed, report, full)
     # Drake raises SystemExit when one of its own checks fails.
     except BaseException as error:

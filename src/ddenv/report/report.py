@@ -46,7 +46,7 @@ def content(record: Record) -> Report:
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
-        lead=(*_damage(record), *_standing(record), *_failure(state)),
+        lead=(*_damage(record), *_standing(record), *_failure(state), *_noted(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
         foot=_foot(record),
@@ -114,6 +114,11 @@ def _failure(state: RunState) -> list[Paragraph]:
     words = f"The failure f: the robot {deed(state.failure)} at ({place(position)}) m"
     words += f"{_short_of(state, position)}{_after(state)}."
     return [*described, say(words)]
+
+
+def _noted(state: RunState) -> list[Paragraph]:
+    """What is wrong with the world."""
+    return [say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in map(plain, state.notes)]
 
 
 def _short_of(state: RunState, position: Place) -> str:

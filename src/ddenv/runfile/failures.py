@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from math import dist, fsum
 
@@ -36,6 +36,8 @@ class Baseline:
     `failures` of `runs` showed f; `broken` more broke, and say nothing. `seen` are all failures, the most frequent first, in the
     numbers of the setting `failure`. `miss_chance` is (1-p)^(1+iterations), the chance that all tests of a candidate miss f;
     `iterations_95` is the number of iterations for a 95 % chance of seeing f. `position` is f's end, x, y, z m.
+    `wall_limit` is what a later test may take in real time by the speed of these runs, s; None in older files. It is
+    the one thing here that differs from machine to machine.
     """
 
     runs: int
@@ -48,6 +50,7 @@ class Baseline:
     miss_chance: float
     iterations_95: int
     broken: int = 0
+    wall_limit: float | None = field(default=None, compare=False)
     seen: tuple[SeenFailure, ...] = ()
 
     @property

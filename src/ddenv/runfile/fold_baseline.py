@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ddenv.runfile.events import Changes, Data, chance, vector
+from ddenv.runfile.events import Changes, Data, chance, number, vector
 from ddenv.runfile.failures import Baseline, SeenFailure
 from ddenv.runfile.fold_decisions import with_outcomes
 from ddenv.runfile.fold_rates import seen
@@ -25,6 +25,7 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
         miss_chance=chance(data["miss_chance"]),
         iterations_95=int(data["iterations_95"]),
         broken=int(data.get("broken", 0)),
+        wall_limit=None if data.get("wall_limit") is None else number(data["wall_limit"]),
         seen=tuple(map(_seen, data.get("seen", ()))),
     )
     compared = with_outcomes(state, data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shutil
 import tempfile
@@ -38,6 +39,8 @@ class ExternalSimulator:
         self._scenario = scenario
         self._words = command_words(scenario)
         self._names = frozenset(model.name for model in world.models)
+        # What a test may take in real time, s.
+        self.limit = scenario.simulation.wall_timeout or math.inf
         self._removable = frozenset(world.elements(frozenset(scenario.protected)))
 
     def run(
@@ -89,7 +92,7 @@ class ExternalSimulator:
 
         try:
             with running(words, self._scenario.folder, environment, world.parent) as command:
-                ended = watch(command, self._scenario.simulation.wall_timeout, take, too_much)
+                ended = watch(command, self.limit, take, too_much)
                 # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE:
                     _read(file, log)

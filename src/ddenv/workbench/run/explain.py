@@ -158,9 +158,10 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f: the robot runs in it until more do."
+    noted = tuple(_sentence(plain(note)) for note in state.notes)
     if not tests:
-        return (first,)
-    return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
+        return (first, *noted)
+    return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.", *noted)
 
 
 def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:

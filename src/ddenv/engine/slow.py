@@ -1,0 +1,57 @@
+"""Says that a world is slow while its first run goes on: how slow, about how long it will all take, and what makes it faster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ddenv.amounts import count, duration
+from ddenv.engine.journal import Journal
+from ddenv.engine.pool import Pace
+from ddenv.errors import UserError
+from ddenv.runfile.state import RunState
+from ddenv.runs.tests_left import rough_run
+from ddenv.settings import SETTINGS, read
+from ddenv.world.scenario import Reduction
+
+# A run is slow if it simulates less than `SLOW` s in each real second; that is known after so many real seconds.
+SLOW = 1.0
+KNOWN_AFTER = 10.0
+# So many runs of the whole world may be too late before one has ended.
+MOST_LATE = 3
+HELPS = "what helps: fewer models that can move, a shorter --timeout, a larger simulation.time_step in the scenario"
+
+
+def note_slow(journal: Journal, paces: Iterable[Pace]) -> None:
+    """Writes an event once a run of the whole world turns out to be slow. Own simulators keep their own time."""
+    state = journal.state
+    if state.baseline is not None or state.scenario.get("oracle") is not None or journal.has("slow"):
+        return
+    for pace in paces:
+        if pace.real >= KNOWN_AFTER and pace.simulated < SLOW * pace.real:
+            journal.record("slow", words=_slow(state, pace.simulated / pace.real))
+            return
+
+
+def _slow(state: RunState, rate: float) -> str:
+    asked = Reduction.model_validate(state.scenario["reduction"])
+    timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
+    if rate <= 0.0:
+        return f"this world is slow: not even a tenth of a second was simulated in {KNOWN_AFTER:g} s; {HELPS}"
+    each = timeout / rate
+    runs, jobs = asked.baseline_runs, max(1, state.jobs)
+    baseline = duration(each * -(-runs // jobs))
+    low, _, high = (each * tests / jobs for tests in rough_run(len(state.elements), asked).tests)
+    return (
+        f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
+        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run {duration(low)} to "
+        f"{duration(high)}; {HELPS}, more --jobs"
+    )
+
+
+def give_up_if_late(journal: Journal, late: str) -> None:
+    """After a test that was too `late`, in words. Raises UserError if several runs of the whole world were, and none has ended."""
+    state = journal.state
+    if state.baseline is None and state.tests_done == state.tally["timeout"] >= MOST_LATE:
+        raise UserError(
+            f"{count(state.tally['timeout'], 'run')} of the whole world {late}, and none has ended; {HELPS}"
+        )
