@@ -55,7 +55,7 @@ def test_the_guide_names_every_key(section):
     [
         *((f"failure.{key}", FailureSpec) for key in ("epsilon", "timeout")),
         *((f"reduction.{key}", Reduction) for key in ("n_partitions", "iterations", "delta", "seed", "baseline_runs")),
-        *((f"simulation.{key}", Simulation) for key in ("time_step", "wall_timeout")),
+        ("simulation.time_step", Simulation),
         *(
             (key, Planner)
             for key in ("padding", "inflation", "look_ahead", "replan", "patience", "recoveries", "lowest")
