@@ -17,6 +17,7 @@ from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.drake.drive import Drive
 from ddenv.robot.drake.plant import Body, Built
+from ddenv.robot.drake.region import Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.oracle import kind_of
@@ -34,7 +35,7 @@ End = tuple[str, str, bool]
 
 @dataclass(frozen=True)
 class RunParts:
-    """What one run consists of besides the plant.
+    """What one run consists of besides the plant. Without `watch` all of the world is in the plant.
 
     `kept` are the moving models whose motion is recorded. With `stuck` the run is cut short once the robot is stuck for good.
     """
@@ -45,6 +46,7 @@ class RunParts:
     notice: Notice
     autonomy: Autonomy
     lidar: Lidar | None
+    watch: Watch | None
     stuck: Stuck | None
     kept: Sequence[Body]
     seed: int
@@ -68,7 +70,10 @@ class Run:
         self._wall_clock = Stopwatch(LONGEST_LOOK)
 
     def execute(self, progress: Progress | None) -> RunResult:
-        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is passed on."""
+        """Runs to the end. What breaks in the simulation becomes a result; what `progress` raises is passed on.
+
+        Raises LeftRegion if the plant lacks what comes near.
+        """
         parts = self._parts
         outcome, failure, cut, seconds = self._loop(progress)
         trajectory = self._recording.trajectory()
@@ -100,6 +105,8 @@ class Run:
                 # Sleep has just moved the models that are played back.
                 self._observer.look()
             pose = self._observer.robot()
+            if parts.watch:
+                parts.watch.look(pose[:2], sleep.awake_boxes())
             truth = self._observer.truth(pose)
             end = self._end(pose, tick)
             if end is not None or tick.record:

@@ -13,6 +13,7 @@ from ddenv.robot.drake.articulation import transform
 from ddenv.robot.drake.hold import Hold
 from ddenv.robot.drake.plant import Built
 from ddenv.robot.drake.presence import Presence
+from ddenv.robot.drake.region import Region
 from ddenv.world.pose import Pose
 
 
@@ -20,7 +21,8 @@ from ddenv.world.pose import Pose
 class RunContext:
     """A plant with the one context that all its runs use in turn.
 
-    A new context costs as much as a run. What falls below `floor` (m) has fallen out of the world.
+    A new context costs as much as a run. What falls below `floor` (m) has fallen out of the world. What never moves outside
+    `region` is not in the plant; None if everything is.
     """
 
     built: Built
@@ -30,16 +32,17 @@ class RunContext:
     hold: Hold
     clock: Clock
     floor: float
+    region: Region | None
 
     @classmethod
-    def of(cls, built: Built, robot: Pose, clock: Clock, floor: float) -> RunContext:
+    def of(cls, built: Built, robot: Pose, clock: Clock, floor: float, region: Region | None = None) -> RunContext:
         """Everything where it starts. `robot` takes the robot's own frame to the world frame."""
         context = built.diagram.CreateDefaultContext()
         plant_context = built.plant.GetMyMutableContextFromRoot(context)
         _place(built, plant_context, robot)
         start = cast(Floats, built.plant.GetPositionsAndVelocities(plant_context))
         presence = Presence(built, context)
-        return cls(built, context, plant_context, presence, Hold(built, plant_context, start), clock, floor)
+        return cls(built, context, plant_context, presence, Hold(built, plant_context, start), clock, floor, region)
 
 
 def _place(built: Built, plant_context: Context, robot: Pose) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
+from typing import TypeVar
 
 from ddenv.errors import UserError
 from ddenv.robot.autonomy import Autonomy
@@ -14,6 +16,7 @@ from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import controllers
 from ddenv.robot.drake.drive import Drive, find_drive, footprint
 from ddenv.robot.drake.plant import Body, Built, build
+from ddenv.robot.drake.region import FEW, WIDTH, LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
@@ -25,7 +28,7 @@ from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
-from ddenv.robot.surroundings import Surroundings
+from ddenv.robot.surroundings import YIELD, Surroundings, reach
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -62,6 +65,8 @@ class Template:
         self._repertoire = Repertoire(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
+        self._reach = reach(robot) + YIELD
+        self._surround(_region(world, scenario))
         self._build(names)
 
     def without(self, names: frozenset[str]) -> Template:
@@ -75,6 +80,13 @@ class Template:
         smaller = copy(self)
         smaller._build(self._names - names)
         return smaller
+
+    def wider(self, place: Place, width: float) -> Template:
+        """A template of the same models whose plant also has what never moves within `width` (m) of `place`."""
+        wider = copy(self)
+        wider._surround(self._region.with_place(place, width))
+        wider._build(self._names)
+        return wider
 
     @property
     def names(self) -> frozenset[str]:
@@ -93,13 +105,20 @@ class Template:
         kept += [body.geometry for name, body in built.moving.items() if name not in names]
         return len(built.robot.geometry) + sum(map(len, kept))
 
+    def _surround(self, region: Region) -> None:
+        """From the next `_build` on, the plant has nothing outside `region` that never moves."""
+        still = sum(len(model.collisions) for model in self._solid.models if model.static)
+        bounded = still > FEW and math.isfinite(self._reach)
+        self._region = region
+        self._far = region.far(self._solid.models) - self._always if bounded else frozenset()
+
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self._names = names
-        built = _build(_part(self._solid, names), self._robot, self._drive, self._scenario)
+        built = _build(_part(self._solid, names - self._far), self._robot, self._drive, self._scenario)
         self._surroundings = Surroundings.of(_part(self._world, names), self._robot, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
-        self._context = RunContext.of(built, at, self._clock, self._floor)
+        self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)
 
     def run(
@@ -112,7 +131,8 @@ class Template:
         """Runs the robot in the world with the models `keep`, and with protected models and grounds, which are always kept.
 
         `progress(time, pose)` gets the simulated time (s) and the pose of the robot (x, y, z in m, qw, qx, qy, qz) at each recorded
-        sample. A run that is not `full` is cut short as soon as the robot is stuck for good. Raises ValueError for unknown names.
+        sample. A run that is not `full` is cut short as soon as the robot is stuck for good. Raises ValueError for unknown names,
+        and LeftRegion if something comes near what is not in the plant.
         """
         unknown = keep - self._names
         if unknown:
@@ -130,6 +150,7 @@ class Template:
                 notice=self._notice(sleep, kept, present),
                 autonomy=self._autonomy(suite, seed),
                 lidar=self._lidar(present, kept, suite),
+                watch=Watch(self._region, self._reach) if self._far else None,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
                 kept=kept,
                 seed=seed,
@@ -137,7 +158,7 @@ class Template:
             return Run(self._context, parts).execute(progress)
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
-        """What rests on what in the whole world, as `piles.support.supports` has it."""
+        """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
         return supports(self._context, self._rehearsals, self._names, elements)
 
     @contextmanager
@@ -195,6 +216,12 @@ def _with_ground(world: World, scenario: Scenario) -> World:
     return with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
 
 
+def _region(world: World, scenario: Scenario) -> Region:
+    spawn, goal = scenario.robot.spawn, scenario.goal
+    moving = (model for model in world.models if not model.static)
+    return Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving)
+
+
 def _part(world: World, names: frozenset[str]) -> World:
     """`world` with the models `names` alone."""
     return replace(world, models=tuple(model for model in world.models if model.name in names))
@@ -218,6 +245,7 @@ def lowest(world: World) -> float:
     return min((float(shape_bounds(one.shape, one.pose)[0][2]) for one in collisions), default=0.0)
 
 
+Result = TypeVar("Result")
 # What a moving model that is switched off costs in each step of a run, s.
 HELD = 5e-6
 # The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15 kB.
@@ -249,12 +277,26 @@ class Variants:
         progress: Progress | None = None,
         full: bool = True,
     ) -> RunResult:
-        """As `Template.run`."""
-        return self._template(keep).run(keep, seed, progress, full)
+        """As `Template.run`, in a plant that has all that comes near."""
+        return self._within(lambda: self._template(keep).run(keep, seed, progress, full))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """As `Template.supports`."""
-        return self._whole.supports(elements)
+        return self._within(lambda: self._whole.supports(elements))
+
+    def _within(self, work: Callable[[], Result]) -> Result:
+        """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
+        width = WIDTH
+        while True:
+            try:
+                return work()
+            except LeftRegion as left:
+                place = left.place
+            width *= 2
+            # Held plants would take as much memory as the new ones.
+            self._smaller = []
+            self._whole = self._whole.wider(place, width)
+            gc.collect()
 
     def _template(self, keep: frozenset[str]) -> Template:
         """A template that has at least the models `keep`, chosen for the least time of one run."""

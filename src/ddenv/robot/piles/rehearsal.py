@@ -213,6 +213,9 @@ class Rehearsals:
 
     def _rehearse(self, pile: tuple[Body, ...], present: frozenset[str]) -> Known:
         script = self._simulate(pile)
+        if script and self._context.region:
+            for motion in script.motions:
+                self._context.region.check((motion.low, motion.high))
         fastest = max(motion.speed.max() for motion in script.motions) if script else 0.0
         return self._repertoire.add(_names(pile), present, script, NEAR + fastest * self._context.clock.period)
 

@@ -18,6 +18,7 @@ from ddenv.robot.piles.moving_links import Links, Motion, gaps, spread
 from ddenv.robot.piles.rehearsal import CALM, NEAR, SLOW, Script
 from ddenv.world.extent import Bounds
 
+NOTHING = np.empty((0, 3)), np.empty((0, 3))
 TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
 
 
@@ -99,6 +100,13 @@ class Sleep:
             self._look(np.arange(len(self._kept)), 0.0)
         low, high = self._motion.low, self._motion.high
         return np.minimum.reduceat(low, self._links.first), np.maximum.reduceat(high, self._links.first)
+
+    def awake_boxes(self) -> Bounds:
+        """As `boxes`, for the models alone that are simulated."""
+        if not self._awake.any():
+            return NOTHING
+        low, high = self.boxes()
+        return low[self._awake], high[self._awake]
 
     def poses(self) -> tuple[Floats, Floats]:
         """The poses of all L links of the kept models at the last tick: places (L, 3) m and rotations (L, 3, 3)."""

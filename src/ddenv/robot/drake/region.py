@@ -1,0 +1,122 @@
+"""The part of a world that is in the plant: what never moves is left out where nothing comes near it.
+
+Drake knows every pair of shapes: 5,000 crates take minutes to build and gigabytes to hold. What nothing touches changes no bit of a
+run, so the plant has only what lies around the robot's way and around models that can move. A run in which something comes near the
+region's edge is given up, and made again from its start in a larger one: as if that had been the plant from the beginning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.arrays import Booleans, Floats
+from ddenv.world.extent import Bounds, model_bounds
+from ddenv.world.model import Model
+
+# How far a region extends to each side of the straight way to the goal, and around each model that can move, m.
+WIDTH = 8.0
+# Whatever is simulated keeps this distance from the edge at each tick, m. Only something that goes so far and comes back between two
+# ticks, at hundreds of kilometres an hour, would not be noticed.
+MARGIN = 2.0
+# A world with at most so many shapes that never move is in the plant as a whole: that costs less than to watch an edge.
+FEW = 300
+
+Place = tuple[float, float]
+
+
+class LeftRegion(Exception):
+    """Something that is simulated came near the edge of the region, at `place` (x, y, m)."""
+
+    def __init__(self, place: Place) -> None:
+        super().__init__(place)
+        self.place = place
+
+
+@dataclass(frozen=True)
+class Region:
+    """All places within `widths` (S,) m of straight lines from `starts` (S, 2) m to `ends` (S, 2) m, seen from above."""
+
+    starts: Floats
+    ends: Floats
+    widths: Floats
+
+    @classmethod
+    def of(cls, spawn: Place, goal: Place, moving: Iterable[Model]) -> Region:
+        """The region around the way from `spawn` to `goal` and around the models `moving`."""
+        boxes = (box for model in moving if (box := model_bounds(model)) is not None)
+        places = [((low + high) / 2)[:2] for low, high in boxes]
+        starts, ends = np.array([spawn, *places], dtype=float), np.array([goal, *places], dtype=float)
+        return cls(starts, ends, np.full(len(starts), WIDTH))
+
+    def with_place(self, place: Place, width: float) -> Region:
+        """A region that has also all places within `width` (m) of `place`."""
+        starts, ends = np.vstack([self.starts, place]), np.vstack([self.ends, place])
+        return Region(starts, ends, np.append(self.widths, width))
+
+    def far(self, models: Iterable[Model]) -> frozenset[str]:
+        """The names of those among `models` that never move and lie outside."""
+        found = [(model.name, box) for model in models if model.static and (box := model_bounds(model)) is not None]
+        low = np.array([box[0] for _, box in found]).reshape(-1, 3)
+        high = np.array([box[1] for _, box in found]).reshape(-1, 3)
+        outside = self._depths((low + high)[:, :2] / 2) + _radii(low, high) < 0
+        return frozenset(name for (name, _), out in zip(found, outside, strict=True) if out)
+
+    def check(self, boxes: Bounds) -> None:
+        """Raises LeftRegion unless all boxes, between corners (N, 3) m and (N, 3) m, keep their distance from the edge."""
+        low, high = boxes
+        if not len(low):
+            return
+        places = (low + high)[:, :2] / 2
+        # A box around nothing has its highest corner below its lowest.
+        solid = (low <= high).all(axis=1)
+        near: Booleans = solid & ~(self._depths(places) >= _radii(low, high) + MARGIN)
+        if near.any():
+            x, y = places[near.argmax()].tolist()
+            raise LeftRegion((x, y))
+
+    def depth(self, place: Place) -> float:
+        """How far inside the edge `place` is, m; below 0 outside."""
+        return float(self._depths(np.array([place]))[0])
+
+    def _depths(self, places: Floats) -> Floats:
+        """How far inside the edge each of `places` (N, 2) m is."""
+        depths = np.full(len(places), -np.inf)
+        for start, end, width in zip(self.starts, self.ends, self.widths, strict=True):
+            way = end - start
+            along = np.clip((places - start) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+            apart = np.linalg.norm(places - start - along[:, None] * way, axis=1)
+            depths = np.maximum(depths, width - apart)
+        return depths
+
+
+class Watch:
+    """Watches one run in a region. No part of the robot is more than `reach` (m) away from its first link."""
+
+    def __init__(self, region: Region, reach: float) -> None:
+        self._region = region
+        self._reach = reach
+        # Within `_free` m of `_start` the robot is far enough from the edge.
+        self._start = (math.inf, math.inf)
+        self._free = 0.0
+
+    def look(self, place: Place, models: Bounds) -> None:
+        """Raises LeftRegion if the robot or a model comes near the edge.
+
+        The robot's first link is at `place` (m), the models that are simulated are in the boxes `models`.
+        """
+        self._region.check(models)
+        if math.dist(place, self._start) < self._free:
+            return
+        self._start, self._free = place, self._region.depth(place) - self._reach - MARGIN
+        if not self._free >= 0:
+            raise LeftRegion(place)
+
+
+def _radii(low: Floats, high: Floats) -> Floats:
+    """The radii (N,) of circles around boxes, seen from above, m."""
+    radii: Floats = np.linalg.norm((high - low)[:, :2], axis=1) / 2
+    return radii
