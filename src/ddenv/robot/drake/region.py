@@ -52,14 +52,17 @@ class Region:
         starts, ends = np.array([spawn, *places], dtype=float), np.array([goal, *places], dtype=float)
         return cls(starts, ends, np.full(len(starts), WIDTH))
 
-    def with_place(self, place: Place, width: float) -> Region:
-        """A region that has also all places within `width` (m) of `place`."""
+    def with_place(self, place: Place, times: int) -> Region:
+        """A region that extends also around `place` (m), `times` as far as around the way."""
         starts, ends = np.vstack([self.starts, place]), np.vstack([self.ends, place])
-        return Region(starts, ends, np.append(self.widths, width))
+        return Region(starts, ends, np.append(self.widths, times * WIDTH))
 
     def far(self, models: Iterable[Model]) -> frozenset[str]:
-        """The names of those among `models` that never move and lie outside."""
-        found = [(model.name, box) for model in models if model.static and (box := model_bounds(model)) is not None]
+        """The names of those among `models` that never move and lie outside; none if there are few shapes in all."""
+        static = [model for model in models if model.static]
+        if sum(len(model.collisions) for model in static) <= FEW:
+            return frozenset()
+        found = [(model.name, box) for model in static if (box := model_bounds(model)) is not None]
         low = np.array([box[0] for _, box in found]).reshape(-1, 3)
         high = np.array([box[1] for _, box in found]).reshape(-1, 3)
         outside = self._depths((low + high)[:, :2] / 2) + _radii(low, high) < 0

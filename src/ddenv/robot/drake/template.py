@@ -16,7 +16,7 @@ from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import controllers
 from ddenv.robot.drake.drive import Drive, find_drive, footprint
 from ddenv.robot.drake.plant import Body, Built, build
-from ddenv.robot.drake.region import FEW, WIDTH, LeftRegion, Place, Region, Watch
+from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
@@ -81,10 +81,10 @@ class Template:
         smaller._build(self._names - names)
         return smaller
 
-    def wider(self, place: Place, width: float) -> Template:
-        """A template of the same models whose plant also has what never moves within `width` (m) of `place`."""
+    def wider(self, place: Place, times: int) -> Template:
+        """A template of the same models with a larger region, see `Region.with_place`."""
         wider = copy(self)
-        wider._surround(self._region.with_place(place, width))
+        wider._surround(self._region.with_place(place, times))
         wider._build(self._names)
         return wider
 
@@ -107,10 +107,8 @@ class Template:
 
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
-        still = sum(len(model.collisions) for model in self._solid.models if model.static)
-        bounded = still > FEW and math.isfinite(self._reach)
         self._region = region
-        self._far = region.far(self._solid.models) - self._always if bounded else frozenset()
+        self._far = region.far(self._solid.models) if math.isfinite(self._reach) else frozenset()
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
@@ -286,16 +284,16 @@ class Variants:
 
     def _within(self, work: Callable[[], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
-        width = WIDTH
+        times = 1
         while True:
             try:
                 return work()
             except LeftRegion as left:
                 place = left.place
-            width *= 2
+            times *= 2
             # Held plants would take as much memory as the new ones.
             self._smaller = []
-            self._whole = self._whole.wider(place, width)
+            self._whole = self._whole.wider(place, times)
             gc.collect()
 
     def _template(self, keep: frozenset[str]) -> Template:
