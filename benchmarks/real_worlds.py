@@ -1,18 +1,19 @@
-"""How fast real worlds run: a world file, or `friction` among thousands of crates that the robot cannot reach.
+"""How fast real worlds run: a world file, or `friction` among crates that the robot cannot reach.
 
     python benchmarks/real_worlds.py [--models 25,5000] [--clear M] [--tests N] [--jobs N]
     python benchmarks/real_worlds.py WORLD --spawn X,Y,Z,YAW --goal X,Y
 
-Prints a row for each world. *Read* and *build* are the times until it can be simulated. *Simulated s a second* counts CPU seconds of
-one core over full runs of the whole world, without the first one, in which piles are rehearsed. Then an engine with one worker
+Prints a row for each world. *Read* and *build* are the times until it can be simulated. *Simulated s a second* counts CPU seconds
+of one core over full runs of the whole world, without the first one, in which piles are rehearsed. Then an engine with one worker
 makes tests: *between tests* is the time that passes for each of them besides the run itself. *Memory* is the largest sum over all
-processes of an engine with `--jobs` workers, where shared pages count once.
+processes of an engine with `--jobs` workers; a page that several of them share counts once.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import math
 import tempfile
 import threading
 import time
@@ -21,6 +22,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from ddenv.robot.drake.region import WIDTH, Region
 from ddenv.robot.drake.template import Variants
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
@@ -46,7 +48,9 @@ def main() -> None:
     parser.add_argument("--tests", type=int, default=14, help="tests to measure time between tests and memory with")
     parser.add_argument("--jobs", type=int, default=2, help="workers to measure the memory with")
     options = parser.parse_args()
-    print("| world | models | read, s | build, s | simulated s a second | CPU s a test | between tests, ms | memory, MB |")
+    print(
+        "| world | models | read, s | build, s | simulated s a second | CPU s a test | between tests, ms | memory, MB |"
+    )
     print("|---|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for scenario in scenarios(options, Path(folder)):
@@ -69,26 +73,20 @@ def scenarios(options: argparse.Namespace, folder: Path) -> Iterator[Scenario]:
 def among_crates(scenario: Scenario, crates: int, clear: float) -> bytes:
     """The world of a scenario with static crates around it, none within `clear` (m) of the straight way to the goal."""
     spawn, goal = scenario.robot.spawn, scenario.goal
-    text = "".join(crate(number, *place) for number, place in zip(range(crates), places(spawn, goal, clear), strict=False))
+    way = Region.of((spawn.x, spawn.y), (goal.x, goal.y), ())
+    grid = [(GAP * i, GAP * j) for i in range(-60, 61) for j in range(-60, 61)]
+    far = [
+        place for place in sorted(grid, key=lambda place: math.dist(place, (0, 0))) if WIDTH - way.depth(place) > clear
+    ]
+    text = "".join(crate(number, *place) for number, place in enumerate(far[:crates]))
     return scenario.world.read_bytes().replace(b"</world>", text.encode() + b"</world>")
 
 
-def places(spawn: object, goal: object, clear: float) -> Iterator[tuple[float, float]]:
-    """Points of a grid around the middle of the way, the nearest first."""
-    x0, y0, x1, y1 = spawn.x, spawn.y, goal.x, goal.y
-    grid = [(GAP * i, GAP * j) for i in range(-60, 61) for j in range(-60, 61)]
-    middle = (x0 + x1) / 2, (y0 + y1) / 2
-    length2 = (x1 - x0) ** 2 + (y1 - y0) ** 2
-    for x, y in sorted(grid, key=lambda at: (at[0] - middle[0]) ** 2 + (at[1] - middle[1]) ** 2):
-        along = min(1.0, max(0.0, ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length2))
-        if (x - x0 - along * (x1 - x0)) ** 2 + (y - y0 - along * (y1 - y0)) ** 2 > clear**2:
-            yield x, y
-
-
 def crate(number: int, x: float, y: float) -> str:
+    box = f"<box><size>{CRATE} {CRATE} {CRATE}</size></box>"
+    link = f'<link name="link"><collision name="box"><geometry>{box}</geometry></collision></link>'
     return (
-        f'<model name="crate_{number:04}"><static>true</static><pose>{x:g} {y:g} {CRATE / 2:g} 0 0 0</pose><link name="link">'
-        f'<collision name="box"><geometry><box><size>{CRATE:g} {CRATE:g} {CRATE:g}</size></box></geometry></collision></link></model>\n'
+        f'<model name="crate_{number:04}"><static>true</static><pose>{x} {y} {CRATE / 2} 0 0 0</pose>{link}</model>\n'
     )
 
 

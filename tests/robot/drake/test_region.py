@@ -40,9 +40,7 @@ def world(world_of, add) -> World:
 @pytest.fixture
 def scenario(scenario_of) -> Scenario:
     sensors = {"lidar": {"beams": 31}, "view_range": 6.0}
-    return scenario_of(
-        failure={"timeout": 4.0}, goal={"x": 9, "y": 0}, sensors=sensors, simulation={"time_step": 0.01}
-    )
+    return scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0}, sensors=sensors, simulation={"time_step": 0.01})
 
 
 @pytest.fixture
@@ -88,7 +86,9 @@ def test_a_run_that_leaves_the_region_is_made_again_from_its_start_in_a_larger_o
 
 
 @pytest.mark.parametrize("x", [0.0, 3.0], ids=["beside the robot", "played back"])
-def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(world_of, add, variants, husky, scenario, x):
+def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
+    world_of, add, variants, husky, scenario, x
+):
     ramp = model_of("ramp", link_of("link", Box((0.6, 1.6, 0.1)), Pose.from_rpy(x, 1.2, 0.0, -0.3, 0, 0), None, mu=0.0))
     slides = model_of("slides", link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, 0.52, 0.52)), mu=0.0))
     world = add(world_of(), ramp, slides, cube("stop", x, 5.2, mass=None))

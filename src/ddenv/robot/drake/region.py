@@ -19,8 +19,8 @@ from ddenv.world.model import Model
 
 # How far a region extends to each side of the straight way to the goal, and around each model that can move, m.
 WIDTH = 8.0
-# Whatever is simulated keeps this distance from the edge at each tick, m. Only something that goes so far and comes back between two
-# ticks, at hundreds of kilometres an hour, would not be noticed.
+# Whatever is simulated keeps this distance from the edge at each tick, m: between two ticks nothing gets so far and back, unless it
+# does 40 m/s.
 MARGIN = 2.0
 # A world with at most so many shapes that never move is in the plant as a whole: that costs less than to watch an edge.
 FEW = 300
