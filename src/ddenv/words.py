@@ -118,8 +118,8 @@ def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
         return "".join(_judged(after, one) for one in changed)
     if kind == "supports":
         return _supports(after)
-    if kind == "slow":
-        return after.notes[-1]
+    if kind == "noted":
+        return after.notes[-1][1]
     if kind == "command_refused":
         return f"not done: {after.refusal[1]}"
     # All other decisions of the user carry their own words.

@@ -16,7 +16,9 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken, Pace
 from ddenv.engine.repeating import check_repeats
+from ddenv.engine.worker import Start
 from ddenv.robot.result import RunResult
+from ddenv.robot.settled import Settled
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
@@ -60,6 +62,7 @@ class FakePool:
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
         self.settling = 0
+        self.settled = Settled()
         self.limits: list[float | None] = []
         # How far running tests are.
         self.pace: list[Pace] = []
@@ -89,9 +92,10 @@ class FakePool:
         outcome, x = ENDS[shown]
         return [(test, result(outcome, seed, x, bool(cut)))]
 
-    def find_supports(self, elements: frozenset[str]) -> Callable[[], list[tuple[str, str]] | Broken | None]:
+    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         looks = iter([None] * self.settling)
-        return lambda: next(looks, self.supports)
+        settled = self.supports if isinstance(self.supports, Broken) else Start(self.supports, self.settled)
+        return lambda: next(looks, settled)
 
     def live(self) -> list[Live]:
         return []

@@ -199,11 +199,11 @@ def test_a_worker_finds_what_rests_on_what(tmp_path):
     path.write_text(text.replace(fixed, free.replace("4 4 0.3", "0 0.8 0.6")))
     pool = Pool(scenario, read_world(path), robot, 1)
     try:
-        found = pool.find_supports(frozenset(world.elements()))
+        found = pool.settle(frozenset(world.elements()))
         assert pool.idle == 0
         known = []
         wait_until(lambda: known.append(found()) or known[-1] is not None, lambda: "it was not found")
-        assert known[-1] == [("ball", "deck")]
+        assert known[-1].supports == [("ball", "deck")]
         # The worker is free again.
         pool.submit(1, EVERYTHING, 0)
         assert result(pool)[1].outcome == "failed"

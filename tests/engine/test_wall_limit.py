@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from ddenv.engine.noting import KNOWN_AFTER, MOST_LATE
 from ddenv.engine.pool import Broken, Pace
-from ddenv.engine.slow import KNOWN_AFTER, MOST_LATE
 from ddenv.engine.wall_limit import FACTOR, GENEROUS, LEAST
 from ddenv.errors import UserError
 from ddenv.report.report import content
@@ -71,10 +71,10 @@ def test_a_slow_world_is_told_once_while_its_first_run_goes_on(tmp_path):
     drive(path, pool)
     written = events(path)
     kinds = [event.kind for event in written]
-    assert kinds.count("slow") == 1
-    assert kinds.index("slow") < kinds.index("baseline_finished")
-    before, after = (fold(written[: kinds.index("slow") + more]) for more in (0, 1))
-    said = news("slow", before, after)
+    assert kinds.count("noted") == 1
+    assert kinds.index("noted") < kinds.index("baseline_finished")
+    before, after = (fold(written[: kinds.index("noted") + more]) for more in (0, 1))
+    said = news("noted", before, after)
     assert said.startswith(
         "this world is slow: 0.25 s simulated in each second; at this rate a test of 5 s takes 20 s, "
     )

@@ -38,7 +38,7 @@ def test_it_is_said_that_the_piles_settle(run):
 
 
 def test_a_slow_world_is_told_while_its_baseline_runs(run):
-    run.created().write("slow", words="this world is slow: 0.25 s simulated in each second")
+    run.created().write("noted", about="slow", words="this world is slow: 0.25 s simulated in each second")
     assert "This world is slow: 0.25 s simulated in each second." in told(run)[1]
 
 

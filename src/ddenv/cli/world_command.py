@@ -1,4 +1,4 @@
-"""`ddenv world ...`: looks at SDF worlds, and writes clean ones."""
+"""`ddenv world ...`: looks at SDF worlds, and writes clean or settled ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @click.group("world")
 def world_group() -> None:
-    """Shows how SDF worlds are read, draws their maps, and writes clean worlds."""
+    """Shows how SDF worlds are read, draws their maps, and writes clean or settled worlds."""
 
 
 @world_group.command()
@@ -75,6 +75,19 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
 
     for path in write_converted(_read(file, reading), output):
         print(f"wrote {path}")
+    return 0
+
+
+@world_group.command()
+@click.argument("file", type=Path)
+@reading_options
+@click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
+def settle(file: Path, output: Path, **reading: Any) -> int:
+    """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
+    from ddenv.cli.world_settle import settle_world
+    from ddenv.runs.scenarios import reading_of
+
+    print("\n".join(settle_world(_read(file, reading), reading_of(**reading), output)))
     return 0
 
 

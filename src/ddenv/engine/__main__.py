@@ -20,6 +20,7 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.engine.repeating import check_repeats
+from ddenv.engine.settle import note_start
 from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
@@ -77,6 +78,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         try:
             if scenario.oracle is None:
                 check_repeats(journal, workers, control, options.bits == "mixed")
+            note_start(scenario, world, robot, journal)
             driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
             if options.certify:
                 driver.certify(options.certify)

@@ -14,10 +14,11 @@ import numpy as np
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal, Keep
 from ddenv.engine.judging import failures_of, result_data
-from ddenv.engine.pool import Broken, Pool, Supports
+from ddenv.engine.noting import give_up_if_late, note_slow
+from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import SharingPool
-from ddenv.engine.slow import give_up_if_late, note_slow
 from ddenv.engine.wall_limit import wall_limit
+from ddenv.engine.worker import Start
 from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
@@ -114,9 +115,9 @@ class Bench:
             self._submit(test, keep, full)
             self._control.started()
 
-    def find_supports(self, elements: Keep, late: Callable[[], None]) -> Supports | Broken:
-        """Which of `elements` rest on which; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
-        found = self._pool.find_supports(elements)
+    def settle(self, elements: Keep, late: Callable[[], None]) -> Start | Broken:
+        """How the world settles; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
+        found = self._pool.settle(elements)
         until = time.monotonic() + PATIENCE
         while (result := found()) is None:
             if time.monotonic() > until:

@@ -19,7 +19,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from ddenv.engine import worker
 from ddenv.engine.wall_limit import GENEROUS
-from ddenv.engine.worker import REASON
+from ddenv.engine.worker import REASON, Start
 from ddenv.errors import UserError
 from ddenv.robot.deadline import Stopwatch
 from ddenv.robot.result import RunResult
@@ -35,8 +35,6 @@ FOR_DRAKE = {
     "OPENBLAS_NUM_THREADS": "1",
 }
 
-# (upper, lower) where a model rests on another.
-Supports = list[tuple[str, str]]
 Result = TypeVar("Result")
 
 _one_at_a_time = threading.Lock()
@@ -228,14 +226,16 @@ class Pool:
             return None
         return Broken("timeout", f"took longer than {limit:g} s of wall clock{what}")
 
-    def find_supports(self, elements: frozenset[str]) -> Callable[[], Supports | Broken | None]:
-        """Lets an idle worker find which of `elements` rest on which. The result returns it, or None until it is known."""
+    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
+        """Lets an idle worker settle the world, and find which of `elements` rest on which. The result returns it, or None until it
+        is known.
+        """
         slot = self._free.pop(0)
         self._clear(slot)
-        future: Future[Supports] = self._pool.schedule(worker.find_supports, args=(elements, slot))
+        future: Future[Start] = self._pool.schedule(worker.settle, args=(elements, slot))
 
-        def found() -> Supports | Broken | None:
-            result: Supports | Broken | None
+        def found() -> Start | Broken | None:
+            result: Start | Broken | None
             try:
                 result = self._result(future, slot, PREPARATION)
             except BrokenProcessPool:

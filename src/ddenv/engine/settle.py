@@ -4,14 +4,27 @@ from __future__ import annotations
 
 from ddenv.engine.bench import Bench
 from ddenv.engine.journal import Journal
+from ddenv.engine.noting import note
 from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
-from ddenv.world.model import World
+from ddenv.robot.settled import notes_on
+from ddenv.world.inside import notes_on_start
+from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 
+def note_start(scenario: Scenario, world: World, robot: Model, journal: Journal) -> None:
+    """Notes what the files alone show of the start, before the first test."""
+    if journal.state.baseline is None:
+        for about, words in notes_on_start(world, robot, scenario.robot.spawn):
+            note(journal, about, words)
+
+
 def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> None:
-    """Does nothing where nothing can move, or if it is known. Raises UserError if stacks are to be kept and it cannot be known."""
+    """Does nothing where nothing can move, or if it is known. Notes what is wrong with the start of the world.
+
+    Raises UserError if stacks are to be kept and it cannot be known.
+    """
     moves = any(model.links and not model.static for model in world.models)
     if journal.has("supports") or not moves:
         return
@@ -23,10 +36,12 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
             )
         return
     elements = journal.state.elements
-    found = bench.find_supports(frozenset(elements), lambda: journal.record("supports_started"))
+    found = bench.settle(frozenset(elements), lambda: journal.record("supports_started"))
     if not isinstance(found, Broken):
+        for about, words in notes_on(world, found.settled):
+            note(journal, about, words)
         number = {name: index for index, name in enumerate(elements)}
-        journal.record("supports", pairs=[[number[upper], number[lower]] for upper, lower in found])
+        journal.record("supports", pairs=[[number[upper], number[lower]] for upper, lower in found.supports])
     elif needed:
         raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
     else:

@@ -17,7 +17,8 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.journal import Journal, Keep
-from ddenv.engine.pool import Broken, Pace, Pool, Supports
+from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.worker import Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import as_it_was
@@ -147,9 +148,9 @@ class SharingPool:
         ready, self._ready = self._ready, []
         return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
 
-    def find_supports(self, elements: Keep) -> Callable[[], Supports | Broken | None]:
-        """As `Pool.find_supports`."""
-        return self._pool.find_supports(elements)
+    def settle(self, elements: Keep) -> Callable[[], Start | Broken | None]:
+        """As `Pool.settle`."""
+        return self._pool.settle(elements)
 
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""

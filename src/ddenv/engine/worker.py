@@ -13,6 +13,7 @@ from typing import Any, NoReturn, Protocol, cast, runtime_checkable
 
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.settled import Settled
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -42,9 +43,18 @@ class Limited(Protocol):
 
 
 class Settling(Protocol):
-    """A simulator that finds what rests on what."""
+    """A simulator that lets a world come to rest."""
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
+    def settled(self) -> Settled: ...
+
+
+@dataclass(frozen=True)
+class Start:
+    """What rests on what in the settled world, as (upper, lower), and how it settled."""
+
+    supports: list[tuple[str, str]]
+    settled: Settled
 
 
 @dataclass(frozen=True)
@@ -119,14 +129,18 @@ def run_test(keep: frozenset[str], seed: int, full: bool, limit: float, slot: in
         _break(error, slot)
 
 
-def find_supports(elements: frozenset[str], slot: int) -> list[tuple[str, str]]:
-    """Which of `elements` rest on which, as (upper, lower). The user's own simulator cannot say. Raises as `run_test`."""
+def settle(elements: frozenset[str], slot: int) -> Start:
+    """How the world settles, and which of `elements` rest on which then. The user's own simulator cannot say.
+
+    Raises as `run_test`.
+    """
     if isinstance(_simulator, UserError):
         raise _simulator
     try:
         if isinstance(_simulator, Exception):
             raise _simulator
-        return cast(Settling, _simulator).supports(elements)
+        world = cast(Settling, _simulator)
+        return Start(world.supports(elements), world.settled())
     except BaseException as error:
         _break(error, slot)
 

@@ -118,7 +118,7 @@ def _failure(state: RunState) -> list[Paragraph]:
 
 def _noted(state: RunState) -> list[Paragraph]:
     """What is wrong with the world."""
-    return [say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in map(plain, state.notes)]
+    return [say(f"{words[:1].upper()}{words[1:]}.", notice=True) for words in (plain(each) for _, each in state.notes)]
 
 
 def _short_of(state: RunState, position: Place) -> str:

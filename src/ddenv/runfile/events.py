@@ -9,7 +9,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     compared             same: whether its bits are the same; if not, the user goes on with mixed tests
     supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
     supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled
-    slow                 words: a run of the whole world turned out to be slow; its rate, and what that means
+    noted                about, words: what is wrong with the whole world; a sentence about each thing, once
     test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
                          trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,

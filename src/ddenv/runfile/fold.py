@@ -70,8 +70,8 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
     }
 
 
-def _slow(state: RunState, data: Data, _: float) -> Changes:
-    return {"notes": (*state.notes, str(data["words"]))}
+def _noted(state: RunState, data: Data, _: float) -> Changes:
+    return {"notes": (*state.notes, (str(data["about"]), str(data["words"])))}
 
 
 def _test_started(state: RunState, data: Data, _: float) -> Changes:
@@ -276,7 +276,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "compared": lambda state, data, _: {"physics": state.physics.compared(bool(data["same"]))},
     "supports_started": supports.supports_started,
     "supports": supports.supports,
-    "slow": _slow,
+    "noted": _noted,
     "test_started": _test_started,
     "test_finished": _test_finished,
     "test_lost": _test_lost,

@@ -44,7 +44,7 @@ class RunState:
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
     `settling`; `unsettled` says why it could not be found.
-    `notes` say what is wrong with the whole world: a sentence each.
+    `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
@@ -81,7 +81,7 @@ class RunState:
     certificates: tuple[Certificate, ...] = ()
     lower_bound: int = 0
     supports: Supports = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
     settling: bool = False
     unsettled: str = ""
     last_command: int = 0

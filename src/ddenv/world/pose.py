@@ -62,6 +62,15 @@ class Pose:
         w, x, y, z = self.quaternion
         return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
+    def rpy(self) -> Vector:
+        """SDF's roll, pitch and yaw, rad. Where x points straight up or down, only yaw turns."""
+        w, x, y, z = self.quaternion
+        sine = 2 * (w * y - z * x)
+        if abs(sine) > 1 - 1e-12:
+            yaw = math.atan2(2 * (w * z - x * y), 1 - 2 * (x * x + z * z))
+            return 0.0, math.copysign(math.pi / 2, sine), yaw
+        return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.asin(sine), self.yaw()
+
     def inverse(self) -> Pose:
         w, x, y, z = self.quaternion
         turn = Pose((0.0, 0.0, 0.0), (w, -x, -y, -z))

@@ -20,6 +20,7 @@ from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
+from ddenv.robot.piles.settling import settled
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.piles.support import supports
 from ddenv.robot.protocol import Setup
@@ -28,6 +29,7 @@ from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
+from ddenv.robot.settled import Settled
 from ddenv.robot.surroundings import YIELD, Surroundings, reach
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
@@ -158,6 +160,10 @@ class Template:
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
         return supports(self._context, self._rehearsals, self._names, elements)
+
+    def settled(self) -> Settled:
+        """How the whole world settles. Raises LeftRegion."""
+        return settled(self._context, self._rehearsals, self._names)
 
     @contextmanager
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[Sleep]:
@@ -295,6 +301,10 @@ class Variants:
             self._smaller = []
             self._whole = self._whole.wider(place, times)
             gc.collect()
+
+    def settled(self) -> Settled:
+        """As `Template.settled`."""
+        return self._within(lambda: self._whole.settled())
 
     def _template(self, keep: frozenset[str]) -> Template:
         """A template that has at least the models `keep`, chosen for the least time of one run."""

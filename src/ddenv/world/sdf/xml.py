@@ -94,6 +94,12 @@ def parse(text: bytes, path: Path) -> Element:
         raise UserError(f"{path}: cannot be decoded: {error}; save it as UTF-8") from None
 
 
+def tag_end(text: bytes, element: Element) -> int:
+    """Where the start tag of `element` ends in `text`, the content of its file."""
+    found = _TAG_END.match(text, element.start)
+    return element.end if found is None else found.end()
+
+
 def xpath(element: Element) -> str:
     """The XPath of `element`, such as /sdf/world/model[@name='box']/link[@name='link']/pose."""
     steps = []

@@ -1,4 +1,4 @@
-"""Says that a world is slow while its first run goes on: how slow, about how long it will all take, and what makes it faster."""
+"""Notes what is wrong with the whole world, once each: where it is slow, while its first run goes on; what is odd at its start."""
 
 from __future__ import annotations
 
@@ -18,17 +18,29 @@ SLOW = 1.0
 KNOWN_AFTER = 10.0
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
+SLOWNESS = "slow"
 HELPS = "what helps: fewer models that can move, a shorter --timeout, a larger simulation.time_step in the scenario"
+
+
+def note(journal: Journal, about: str, words: str) -> None:
+    """Writes an event with a sentence, unless one `about` the same is there."""
+    if not is_noted(journal, about):
+        journal.record("noted", about=about, words=words)
+
+
+def is_noted(journal: Journal, about: str) -> bool:
+    """Whether a sentence `about` this is written."""
+    return any(about == known for known, _ in journal.state.notes)
 
 
 def note_slow(journal: Journal, paces: Iterable[Pace]) -> None:
     """Writes an event once a run of the whole world turns out to be slow. Own simulators keep their own time."""
     state = journal.state
-    if state.baseline is not None or state.scenario.get("oracle") is not None or journal.has("slow"):
+    if state.baseline is not None or state.scenario.get("oracle") is not None or is_noted(journal, SLOWNESS):
         return
     for pace in paces:
         if pace.real >= KNOWN_AFTER and pace.simulated < SLOW * pace.real:
-            journal.record("slow", words=_slow(state, pace.simulated / pace.real))
+            note(journal, SLOWNESS, _slow(state, pace.simulated / pace.real))
             return
 
 

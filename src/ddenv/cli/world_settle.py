@@ -1,0 +1,50 @@
+"""Lets a world come to rest, and writes it with the poses of its models then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ddenv.cli.options import announce
+from ddenv.errors import UserError
+from ddenv.words import count, first_of
+from ddenv.world.model import World
+from ddenv.world.scenario import Reading
+
+# A line names so many models.
+MOST_NAMES = 5
+
+
+def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
+    """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
+    from ddenv.robot.drake.template import Template
+    from ddenv.robot.settled import moved, notes_on
+    from ddenv.runs.scenarios import scenario_for_world
+    from ddenv.world.files.access import write_file
+    from ddenv.world.inside import note_inside
+    from ddenv.world.moved import with_places
+    from ddenv.world.read import read_model
+
+    if output.resolve() == world.path.resolve():
+        raise UserError(f"{output}: is the world itself; choose another file")
+    able = sum(bool(model.links) and not model.static for model in world.models)
+    announce(f"settling {count(able, 'model')} that can move")
+    # Drake's plant needs a robot; piles settle as if there were none.
+    scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    settled = Template(world, read_model(scenario.robot.model), scenario).settled()
+    for about, words in (*note_inside(world), *notes_on(world, settled)):
+        if about != "unrest":
+            announce(words)
+    places = {name: links for name, links in settled.places.items() if name not in settled.fallen}
+    text, stay = with_places(world, places, reading)
+    write_file(output, text)
+    ways = moved(world, settled)
+    farthest = max((name for name in ways if name not in stay), key=lambda name: ways[name], default="")
+    far = f"; the farthest, {farthest}, by {ways[farthest]:.3f} m" if farthest else ""
+    lines = [
+        f"wrote {output}: after {settled.seconds:.1f} s {count(len(places) - len(stay), 'model')} have new poses{far}"
+    ]
+    if stay:
+        lines.append(
+            f"not moved: {first_of(stay, MOST_NAMES)}: their parts move, or others are placed relative to them"
+        )
+    return lines

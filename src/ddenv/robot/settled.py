@@ -1,0 +1,68 @@
+"""How a world comes to rest before the robot comes, and what is wrong with its start, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ddenv.amounts import count, first_of
+from ddenv.world.model import World
+from ddenv.world.pose import Pose
+
+# A model that moves farther than this before anything touches it was not at rest in the file, m.
+UNREST = 0.05
+# A line names so many models.
+MOST_NAMES = 3
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What the models that can move do in `seconds` of simulated time while nobody comes near them.
+
+    `places` are the poses of their links at the end, in the world frame and in the order of the file. `restless` models still
+    move then, `fallen` ones have fallen out of the world, `wild` ones were faster than anything that falls. What is `broken`
+    could not be simulated, and has no place.
+    """
+
+    seconds: float = 0.0
+    places: Mapping[str, tuple[Pose, ...]] = field(default_factory=dict)
+    restless: tuple[str, ...] = ()
+    fallen: tuple[str, ...] = ()
+    wild: tuple[str, ...] = ()
+    broken: tuple[str, ...] = ()
+
+
+def moved(world: World, settled: Settled) -> dict[str, float]:
+    """How far each model has moved that is still in the world, m."""
+    starts = {model.name: [link.pose for link in model.links] for model in world.models}
+    gone = frozenset(settled.fallen)
+    return {name: _way(starts[name], places) for name, places in settled.places.items() if name not in gone}
+
+
+def _way(before: Sequence[Pose], after: Sequence[Pose]) -> float:
+    return max(math.dist(one.position, other.position) for one, other in zip(before, after, strict=True))
+
+
+def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of `world`: a word and a sentence for each."""
+    ways = {name: way for name, way in moved(world, settled).items() if way > UNREST}
+    if ways:
+        farthest = max(ways, key=lambda name: ways[name])
+        yield (
+            "unrest",
+            f"the world is not at rest at the start: {_do(len(ways), 'moves', 'move')} before the robot comes, "
+            f"{farthest} by {ways[farthest]:.2f} m; 'ddenv world settle' writes where all of them come to rest",
+        )
+    for about, names, does, do, why in (
+        ("restless", settled.restless, "does", "do", f"not come to rest within {settled.seconds:.1f} s"),
+        ("fallen", settled.fallen, "falls", "fall", "out of the world"),
+        ("wild", settled.wild, "flies", "fly", "apart, faster than anything falls: look for models inside each other"),
+        ("broken", settled.broken, "cannot", "cannot", "be simulated: the numbers grow beyond all limits"),
+    ):
+        if names:
+            yield about, f"{_do(len(names), does, do)} {why} ({first_of(names, MOST_NAMES)})"
+
+
+def _do(number: int, does: str, do: str) -> str:
+    return f"{count(number, 'model')} {does if number == 1 else do}"
