@@ -1,6 +1,7 @@
 """`ddenv world`: what is told of a world, and the files it writes."""
 
 import json
+import re
 
 import pytest
 
@@ -157,3 +158,26 @@ def test_mistakes_get_one_line(monkeypatch, capsys, words, said):
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1 and done.stdout == ""
+
+
+CRATE = """<model name='{name}'><pose>3 {y} 0.9 0 0 0</pose><link name='l'>
+<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
+<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision></link></model>
+"""
+
+
+def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, monkeypatch, capsys):
+    ground = WORLD[WORLD.index(b"<model name='ground'") : WORLD.index(b"<model name='crate'")]
+    crates = CRATE.format(name="falls", y=1) + CRATE.format(name="leans", y=1.2)
+    path, out = tmp_path / "hall.world", tmp_path / "settled.world"
+    path.write_bytes(b"<sdf version='1.6'><world name='hall'>\n" + ground + crates.encode() + b"</world></sdf>")
+    said = in_process(monkeypatch, capsys, "world", "settle", path, "-o", out)
+    assert said.returncode == 0, said.stderr
+    assert f"wrote {out}: after " in said.stdout and "2 models have new poses; the farthest, " in said.stdout
+    assert "settling 2 models that can move" in said.stderr
+    assert "falls starts 0.80 m inside leans: they push each other apart" in said.stderr
+    assert parse_world(out.read_bytes(), out).model("falls").pose.position[2] < 0.6
+    before, after = (re.sub(rb"<pose>[^<]*</pose>", b"", each.read_bytes()) for each in (path, out))
+    assert before == after
+    refused = in_process(monkeypatch, capsys, "world", "settle", path, "-o", path)
+    assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr

@@ -8,18 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine import bench
+from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
+from ddenv.engine.settle import note_start
 from ddenv.errors import UserError
 from ddenv.resting import stacks
+from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run
+from ddenv.runs.creation import create_run, read_parts
 from ddenv.words import news
 from ddenv.world.load import load_scenario
+from ddenv.world.pose import Pose
+from ddenv.world.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.test_certify import DRIFTING, _killed, _resumed, at_rates, claims
-from tests.engine.test_driver import needs, story
+from tests.engine.test_driver import Killed, _kill, needs, story
 from tests.engine.test_steering import Guided, numbers, until
 from tests.tiers import examples
 
@@ -53,6 +58,35 @@ def pool(oracle, jobs=2, seed=0, supports=PAIRS):
 def events(path):
     with RunFile(path) as file:
         return list(file.events())
+
+
+def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tmp_path, world):
+    path = new_run(tmp_path, world=world, budget=1)
+    made = pool(needs("wall"))
+    made.settled = Settled(3.0, {"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",))
+    # The engine is killed after the first line.
+    with pytest.raises(Killed):
+        drive(path, made, prepare=lambda file: _kill(file, 1))
+    with pytest.raises(Exception, match="budget"):
+        drive(path, made)
+    kinds = [event.kind for event in events(path)]
+    assert kinds.index("supports") < kinds.index("test_started")
+    with RunFile(path) as file:
+        notes = fold(file.events()).notes
+    assert notes == tuple(notes_on(read_world(world), made.settled))
+    assert [about for about, _ in notes] == ["unrest", "restless"]
+
+
+def test_what_the_files_show_of_the_start_is_noted(tmp_path, world):
+    path = new_run(tmp_path, world=world)
+    with RunFile(path) as file:
+        scenario, seen, robot = read_parts(file)
+        journal = Journal(file)
+        high = scenario.robot.spawn.model_copy(update={"z": 3.0})
+        scenario = scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"spawn": high})})
+        for _ in range(2):
+            note_start(scenario, seen, robot, journal)
+        assert [about for about, _ in journal.state.notes] == ["drop"]
 
 
 def test_it_is_found_before_the_first_test_and_once(tmp_path, world):

@@ -93,6 +93,8 @@ def _placed(text: bytes, at: Element, model: Model, turn: Pose) -> Edit:
     own = at.find("pose")
     if own is None:
         return _inserted(text, at, turn @ model.pose)
+    if not (own.get("relative_to") or own.get("frame")):
+        return _replaced(text, own, turn @ pose_of(own))
     return _replaced(text, own, pose_of(own) @ model.pose.inverse() @ turn @ model.pose)
 
 
