@@ -16,7 +16,7 @@ MOST_NAMES = 5
 
 def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
-    from ddenv.robot.drake.template import Template
+    from ddenv.robot.drake.template import Variants
     from ddenv.robot.settled import moved, notes_on
     from ddenv.runs.scenarios import scenario_for_world
     from ddenv.world.files.access import write_file
@@ -30,7 +30,7 @@ def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     announce(f"settling {count(able, 'model')} that can move")
     # Drake's plant needs a robot; piles settle as if there were none.
     scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
-    settled = Template(world, read_model(scenario.robot.model), scenario).settled()
+    settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
     for about, words in (*note_inside(world), *notes_on(world, settled)):
         if about != "unrest":
             announce(words)
