@@ -76,6 +76,7 @@ class Bench:
         self._failures: tuple[Failure, ...] = ()
         self._failed: tuple[int, ...] = ()
         self._journal = journal
+        self._numbers = {name: number for number, name in enumerate(journal.state.elements)}
         self._pool = pool
         self._control = control
         self._started: set[tuple[Keep, int, bool]] = set()
@@ -227,7 +228,7 @@ class Bench:
 
     def _numbered(self, times: dict[str, float]) -> list[list[float]]:
         """`times` by name, s, as [number of the model, s] in order of time; only for elements."""
-        numbers = {name: number for number, name in enumerate(self._journal.state.elements)}
+        numbers = self._numbers
         pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
         return [[number, seconds] for seconds, number in pairs]
 

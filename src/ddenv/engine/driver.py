@@ -37,6 +37,9 @@ from ddenv.world.scenario import Reduction, Scenario
 
 # Tests looked for at a time, for each worker: those that run are among them.
 AHEAD = 4
+# The sets of models of so many candidates are held: with thousands of models, one takes a while to make and to find in the ledger,
+# and 10,000 of them would take gigabytes.
+HELD = 64
 
 
 class Driver:
@@ -56,6 +59,8 @@ class Driver:
         self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
         self._pinned: Keep = frozenset()
+        # By the identities of candidates, which live as long as they are held here.
+        self._keeps: dict[int, tuple[Candidate, Keep]] = {}
         # How many candidates of the round were dissimilar, and how many refusals there were at that time.
         self._judged = 0
         self._refusals = 0
@@ -113,6 +118,7 @@ class Driver:
         """What the search may leave out of `environment`: whole stacks, and none with a model that is pinned."""
         together = Stacks.of(stacks_of(self._journal.state, environment))
         self._pinned = pinned | together.of_any(pinned)
+        self._keeps.clear()
         free = (stack for stack in together.by_first.values() if self._pinned.isdisjoint(stack))
         self._stacks = Stacks.of(free)
 
@@ -166,7 +172,12 @@ class Driver:
 
     def _keep(self, candidate: Candidate) -> Keep:
         """All models that are in the world when a candidate is tested."""
-        return candidate.models | self._pinned
+        held = self._keeps.get(id(candidate))
+        if held is None:
+            if len(self._keeps) >= HELD:
+                self._keeps.clear()
+            held = self._keeps[id(candidate)] = candidate, candidate.models | self._pinned
+        return held[1]
 
     def _finish(self, kept: Keep) -> None:
         # Their results count, too.

@@ -79,6 +79,8 @@ class Journal:
         self._rested_on: set[int] = set()
         self._steps_back = 0
         self._again: tuple[tuple[str, ...], ...] = ()
+        # Of thousands of models, a set that is made anew takes a while to be found in the ledger.
+        self._whole: tuple[tuple[str, ...], Keep] = (), frozenset()
         for event in file.events():
             self._take(event)
 
@@ -138,7 +140,10 @@ class Journal:
     @property
     def whole(self) -> Keep:
         """The models in the world that f was seen in: what is left has to keep its rate."""
-        return frozenset(origin(self.state, self.state.node).environment)
+        environment = origin(self.state, self.state.node).environment
+        if self._whole[0] is not environment:
+            self._whole = environment, frozenset(environment)
+        return self._whole[1]
 
     @property
     def has_broken(self) -> bool:

@@ -21,8 +21,9 @@ from ddenv.reduction.round import Candidate
 
 # How likely one, two, ... models are needed of a world of up to `SMALL_WORLD` models; more in a larger one.
 NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
-# A forecast is made of this many plays. In large worlds it ends earlier, after this many candidates, but not before a few plays.
-PLAYS, CANDIDATES, FEWEST_PLAYS = 30, 6_000, 8
+# A forecast is made of this many plays. In large worlds it ends earlier, after this many candidates, but not before a few plays. A
+# round takes as long as one candidate for each `SPLIT` models of its environment, and those that it has.
+PLAYS, CANDIDATES, FEWEST_PLAYS, SPLIT = 30, 6_000, 8, 50
 # A play that goes on for longer says nothing new.
 MOST_ROUNDS = 1500
 # The interval holds eight of ten plays, and somewhat more: a play knows less than there is to know.
@@ -150,6 +151,7 @@ class _Play:
             except StopIteration:
                 return
             whole = _code(self._codes, round.environment)
+            self.looked_at += len(round.environment) // SPLIT
             rule = self._rule.within(round.runs)
             winner = next((one for one in round.candidates if self._is_similar(one, whole, rule)), None)
 
