@@ -179,5 +179,8 @@ def test_a_settled_world_is_written_with_nothing_else_changed(tmp_path, monkeypa
     assert parse_world(out.read_bytes(), out).model("falls").pose.position[2] < 0.6
     before, after = (re.sub(rb"<pose>[^<]*</pose>", b"", each.read_bytes()) for each in (path, out))
     assert before == after
+    # `check` says it, too.
+    checked = in_process(monkeypatch, capsys, "world", "check", path)
+    assert checked.stdout.splitlines()[-1].startswith("falls starts 0.80 m inside leans")
     refused = in_process(monkeypatch, capsys, "world", "settle", path, "-o", path)
     assert refused.returncode == 2 and "is the world itself; choose another file" in refused.stderr

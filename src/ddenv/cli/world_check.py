@@ -10,6 +10,7 @@ from ddenv.errors import printable
 from ddenv.map.names import padded, shortened, width
 from ddenv.words import count, first_of
 from ddenv.world.extent import center, model_bounds
+from ddenv.world.inside import inside, note_inside
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -61,6 +62,7 @@ def report(world: World) -> dict[str, Any]:
         "gravity": list(world.gravity),
         "models": [_described(model, model.name in elements, world.notes) for model in world.models],
         "notes": [_note(note) for note in world.notes if not note.model],
+        "inside": [{"model": one.name, "other": one.other, "depth": one.depth} for one in inside(world)],
     }
 
 
@@ -108,7 +110,8 @@ def lines(world: World, columns: int | None = None) -> list[str]:
     table = _table([HEADER, *(_row(model, by_model.get(model.name, {})) for model in world.models)], columns)
     notes = [line for text, number in numbers.items() for line in wrapped(text, columns, f"{number:4}  ")]
     below = ["", "notes", *notes] if notes else []
-    return [*wrapped(_title(world), columns), "", *table, *below, "", *wrapped(_totals(world), columns)]
+    wrong = [line for _, words in note_inside(world) for line in wrapped(words, columns)]
+    return [*wrapped(_title(world), columns), "", *table, *below, "", *wrapped(_totals(world), columns), *wrong]
 
 
 def _table(rows: Sequence[tuple[str, ...]], columns: int | None) -> list[str]:

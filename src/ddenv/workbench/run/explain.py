@@ -158,10 +158,11 @@ def _baseline_so_far(state: RunState, options: Settings) -> tuple[str, ...]:
     )
     if any(test.run >= options.baseline_runs for test in state.tests):
         first = "Few runs of the whole world show f: the robot runs in it until more do."
-    noted = tuple(_sentence(plain(words)) for _, words in state.notes)
+    # The last one first: that the world is slow.
+    noted = tuple(_sentence(plain(words)) for _, words in reversed(state.notes))
     if not tests:
-        return (first, *noted)
-    return (first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.", *noted)
+        return (*noted, first)
+    return (*noted, first, f"Of {count(len(tests), 'run')} so far {failed} failed and {reached} reached the goal.")
 
 
 def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
