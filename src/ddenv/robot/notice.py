@@ -126,7 +126,10 @@ class Notice:
         if not self._views:
             return
         times, places, headings = zip(*self._views, strict=True)
-        shown = self._present & self._around.visible
+        eyes = np.array(places)
+        # Thousands of boxes would take as long as the run.
+        far = np.maximum(self._around.low - eyes.max(axis=0), eyes.min(axis=0) - self._around.high).max(axis=1)
+        shown = self._present & self._around.visible & (far <= self._sensors.view_range)
         still: list[Floats] = [
             np.broadcast_to(side[shown], (len(times), shown.sum(), 3)) for side in (self._around.low, self._around.high)
         ]
@@ -136,7 +139,7 @@ class Notice:
             groups.append((self._moving[self._solid], low, high))
         for names, low, high in groups:
             rows = first_in_view(
-                low, high, np.array(places), np.array(headings), self._sensors.view_range, self._sensors.view_angle
+                low, high, eyes, np.array(headings), self._sensors.view_range, self._sensors.view_angle
             )
             yield from ((name, times[row]) for name, row in zip(names, rows, strict=True) if row >= 0)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ from ddenv.world.pose import Vector
 
 # A margin for surfaces that sink into each other, and joints that exceed their limits, m.
 YIELD = 0.1
+# A model, the lowest and the highest corner (3,) m of a box around parts of it that never move, and whether these are visible.
+Still = tuple[str, Floats, Floats, bool]
 
 
 @dataclass(frozen=True)
@@ -42,9 +44,8 @@ class Surroundings:
     visible: Booleans
 
     @classmethod
-    def of(cls, world: World, robot: Model, built: Built) -> Surroundings:
+    def of(cls, boxes: Sequence[Still], robot: Model, built: Built) -> Surroundings:
         geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        boxes = [(model.name, *box) for model in world.models for box in _boxes(model)]
         return cls(
             contacts=built.plant.get_contact_results_output_port(),
             robot=frozenset(one.get_value() for one in built.robot.geometry),
@@ -55,6 +56,11 @@ class Surroundings:
             high=np.array([high for _, _, high, _ in boxes]).reshape(-1, 3),
             visible=np.array([visible for *_, visible in boxes], dtype=bool),
         )
+
+
+def still_boxes(world: World) -> list[Still]:
+    """The boxes around all parts of `world` that never move."""
+    return [(model.name, *box) for model in world.models for box in _boxes(model)]
 
 
 def reach(robot: Model) -> float:

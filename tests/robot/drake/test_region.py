@@ -9,6 +9,7 @@ import pytest
 from ddenv.robot.drake import region
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.result import RunResult
+from ddenv.robot.sensing import lidar
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario
@@ -39,7 +40,7 @@ def world(world_of, add) -> World:
 
 @pytest.fixture
 def scenario(scenario_of) -> Scenario:
-    sensors = {"lidar": {"beams": 31}, "view_range": 6.0}
+    sensors = {"lidar": {"beams": 91, "range": 9.0, "z": 0.0}, "view_range": 3.0}
     return scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0}, sensors=sensors, simulation={"time_step": 0.01})
 
 
@@ -101,6 +102,15 @@ def test_a_model_that_slides_out_of_the_region_is_stopped_by_what_lies_there(
         assert "stop" in one._whole._context.built.static
     assert found == expected
     assert expected[0][3] != expected[1][3]
+
+
+def test_the_lidar_gathers_what_is_in_its_range_with_the_same_bits(variants, world, monkeypatch):
+    names = frozenset(world.elements())
+    monkeypatch.setattr(lidar, "AWAY", 1e9)
+    expected = bits(variants(EVERYTHING).run(names, seed=1))
+    assert {"crate 2 1", "pushed"} <= expected[-1][0].keys()
+    monkeypatch.setattr(lidar, "AWAY", 0.3)
+    assert bits(variants(EVERYTHING).run(names, seed=1)) == expected
 
 
 def test_what_rests_on_what_is_found_where_a_pile_leaves_the_region(variants, world):

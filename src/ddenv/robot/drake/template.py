@@ -30,7 +30,7 @@ from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
-from ddenv.robot.surroundings import YIELD, Surroundings, reach
+from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -50,7 +50,6 @@ class Template:
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
-        self._world = world
         self._solid = _with_ground(world, scenario)
         self._robot = robot
         self._scenario = scenario
@@ -65,6 +64,7 @@ class Template:
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
         self._repertoire = Repertoire(world)
+        self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
         self._reach = reach(robot) + YIELD
@@ -116,7 +116,8 @@ class Template:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self._names = names
         built = _build(_part(self._solid, names - self._far), self._robot, self._drive, self._scenario)
-        self._surroundings = Surroundings.of(_part(self._world, names), self._robot, built)
+        boxes = [box for box in self._boxes if box[0] in names]
+        self._surroundings = Surroundings.of(boxes, self._robot, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)

@@ -24,6 +24,8 @@ from ddenv.world.pose import Pose, Vector
 TOGETHER = 16
 # The lidar collects what is near for later scans only if it moved less than this part of near since the last scan.
 CALM = 0.5
+# How far the lidar goes before it looks again for shapes in its range, m: of thousands, this takes a while.
+AWAY = 10.0
 # Random numbers reserved for the noise of each scan.
 DRAWS = 2**40
 
@@ -53,23 +55,16 @@ class Lidar:
         self._unseen: Booleans = np.ones(len(obstacles.names), dtype=bool)
 
         there = np.array([name in present for name in obstacles.names], dtype=bool)
-        (rows,) = there[obstacles.owners].nonzero()
-        self._owners = obstacles.owners[rows]
-        self._shapes = Shapes.of(obstacles, rows)
-        (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
-        first = dict(zip((model.name for model in moving), _firsts(moving), strict=True))
-        owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
-        self._links = obstacles.links[rows][self._movers] + np.array([first[name] for name in owners], dtype=int)
+        self._obstacles = obstacles
+        (self._rows,) = there[obstacles.owners].nonzero()
+        self._first = dict(zip((model.name for model in moving), _firsts(moving), strict=True))
+        self._gathered: Vector = (math.inf, math.inf, math.inf)
         # The shapes that beams may hit from near the pose at which they were collected.
         self._near: Near | None = None
         self._place: Pose | None = None
         # Whether one of their models was not seen yet, and the scans that may show it.
         self._may_notice = True
         self._waiting: list[Turn] = []
-        self._poses: tuple[Floats, Floats] | None = None
-        # In the frames of their links, which do not change during the run.
-        self._centers = self._shapes.centers[:, self._movers]
-        self._frames = self._shapes.frames[:, :, self._movers]
 
     @property
     def first_seen(self) -> dict[str, float]:
@@ -84,6 +79,8 @@ class Lidar:
         moving models, model after model. All are in the world frame.
         """
         place = Pose(pose[:3], pose[3:]) @ self._mount
+        if math.dist(place.position, self._gathered) > AWAY:
+            self._gather(place.position)
         moved, before, self._place = self._move(places, turns), self._place, place
         if moved or not (self._near and self._near.has(place)):
             self._work_out_waiting()
@@ -130,6 +127,23 @@ class Lidar:
         bits.state = self._state
         bits.advance(number * DRAWS)
         return self._settings.noise * self._random.standard_normal(len(self._fan.angles))
+
+    def _gather(self, position: Vector) -> None:
+        """Takes the shapes that move, and those that beams may reach until the lidar is `AWAY` m from `position`."""
+        obstacles, rows = self._obstacles, self._rows
+        away = obstacles.centers[:, rows] - np.array(position)[:, None]
+        gaps = np.sqrt((away * away).sum(axis=0)) - np.sqrt((obstacles.halves[:, rows] ** 2).sum(axis=0))
+        rows = rows[(obstacles.links[rows] >= 0) | (gaps <= (self._settings.range + AWAY + AROUND) * (1.0 + SPARE))]
+        self._gathered = position
+        self._owners = obstacles.owners[rows]
+        self._shapes = Shapes.of(obstacles, rows)
+        (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
+        owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
+        self._links = obstacles.links[rows][self._movers] + np.array([self._first[name] for name in owners], dtype=int)
+        self._poses: tuple[Floats, Floats] | None = None
+        # In the frames of their links, which do not change during the run.
+        self._centers = self._shapes.centers[:, self._movers]
+        self._frames = self._shapes.frames[:, :, self._movers]
 
     def _move(self, places: Floats, turns: Floats) -> bool:
         """Moves the shapes to where their links are. Returns whether anything moved."""
