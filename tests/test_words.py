@@ -108,6 +108,7 @@ def test_a_certificate_is_told_with_what_follows_from_it():
 def test_the_headline_counts_tests_that_ended_and_that_run():
     state = states(*map(started, (1, 2, 3, 4)), ended(2, "pass"), ("test_lost", {"test": 3}))[-1]
     assert headline(state).endswith("4 of 4 models · 1 tests, 2 running")
+    assert headline(state, 3.25).endswith("2 running, 3.2 s simulated")
 
 
 def test_why_tests_broke_is_told_at_the_end():

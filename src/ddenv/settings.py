@@ -266,7 +266,7 @@ class Simulation:
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
     wall_timeout: float | None = setting(
         None,
-        "maximum real time of one test without its preparation; unless given, it follows the speed of the baseline",
+        "maximum real time of one test without its preparation; unless given, 1800 in the baseline, then by its speed",
         unit="s",
         above=0,
         none="by speed",

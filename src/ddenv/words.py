@@ -32,11 +32,13 @@ HINTS = {
 }
 
 
-def headline(state: RunState) -> str:
-    """The state in one line, cut to the terminal's width."""
+def headline(state: RunState, simulated: float | None = None) -> str:
+    """The state in one line, cut to the terminal's width. The running test that is farthest has `simulated` so much time, s."""
     models = f"{len(state.environment)} of {len(state.elements)} models"
     running = state.tally["running"]
     line = f"{state.status} · {_where(state)} · {models} · {state.tests_done} tests, {running} running"
+    if running and simulated is not None:
+        line += f", {simulated:.1f} s simulated"
     return line[: shutil.get_terminal_size().columns - 1]
 
 

@@ -14,6 +14,7 @@ from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.settings import SETTINGS
 from ddenv.words import news
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
@@ -43,6 +44,7 @@ def events(path):
 
 @pytest.mark.parametrize(("real", "later"), [(0.1, LEAST), (30.0, FACTOR * 30 * TIMEOUT)])
 def test_the_baseline_has_a_long_time_and_later_tests_a_multiple_of_what_it_took(tmp_path, real, later):
+    assert f"{GENEROUS:g} in the baseline" in SETTINGS["wall_timeout"].meaning
     path = new_run(tmp_path)
     with suppress(Killed):
         drive(path, first := Timed(real), prepare=lambda file: _kill(file, 20))

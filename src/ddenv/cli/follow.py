@@ -51,7 +51,7 @@ def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState
     with RunFile(path) as file:
         state = fold(file.events())
         before = state.revision
-        view.now(state)
+        view.now(state, None)
         try:
             while engine.poll() is None:
                 state = _update(file, state, view)
@@ -81,7 +81,7 @@ def _update(file: RunFile, state: RunState, view: _Line | _Plain) -> RunState:
     for event in file.events(state.revision):
         before, state = state, apply(state, event)
         view.happened(event.kind, before, state)
-    view.now(state)
+    view.now(state, max((live.time for live in file.live()), default=None))
     return state
 
 
@@ -96,7 +96,7 @@ class _Plain:
         if line:
             print(printable(line), file=self._out, flush=True)
 
-    def now(self, state: RunState) -> None:
+    def now(self, state: RunState, simulated: float | None) -> None:
         pass
 
     def close(self) -> None:
@@ -111,8 +111,8 @@ class _Line(_Plain):
         if line:
             print(f"\r\x1b[K{printable(line)}", file=self._out, flush=True)
 
-    def now(self, state: RunState) -> None:
-        print(f"\r\x1b[K{printable(headline(state))}", end="", file=self._out, flush=True)
+    def now(self, state: RunState, simulated: float | None) -> None:
+        print(f"\r\x1b[K{printable(headline(state, simulated))}", end="", file=self._out, flush=True)
 
     def close(self) -> None:
         print("\r\x1b[K", end="", file=self._out, flush=True)
