@@ -37,12 +37,10 @@ def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     places = {name: links for name, links in settled.places.items() if name not in settled.fallen}
     text, stay = with_places(world, places, reading)
     write_file(output, text)
-    ways = moved(world, settled)
-    farthest = max((name for name in ways if name not in stay), key=lambda name: ways[name], default="")
-    far = f"; the farthest, {farthest}, by {ways[farthest]:.3f} m" if farthest else ""
-    lines = [
-        f"wrote {output}: after {settled.seconds:.1f} s {count(len(places) - len(stay), 'model')} have new poses{far}"
-    ]
+    ways = {name: way for name, way in moved(world, settled).items() if name not in stay and way > 0}
+    farthest = max(ways, key=lambda name: ways[name], default="")
+    far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
+    lines = [f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"]
     if stay:
         lines.append(
             f"not moved: {first_of(stay, MOST_NAMES)}: their parts move, or others are placed relative to them"
