@@ -22,7 +22,7 @@ from ddenv.engine.wall_limit import limit_after
 from ddenv.errors import UserError
 from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.forecast import Memory, Moment, interval, plays
+from ddenv.reduction.forecast import Memory, Moment, interval, playing
 from ddenv.reduction.guide import Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
@@ -281,18 +281,18 @@ class Driver:
             self._journal.state.jobs,
         )
 
-    def _forecast(self, number: int, moment: Moment) -> Iterator[float]:
+    def _forecast(self, number: int, moment: Moment) -> Iterator[object]:
         """Simulates the search from `moment` on, and records how many tests are left; once a round."""
         if self._journal.has("forecast", number):
             return
-        done, tests = self._journal.state.tests_done, []
-        for play in plays(moment):
-            tests.append(play)
+        done, tests = self._journal.state.tests_done, list[float]()
+        for play in playing(moment):
+            tests += [] if play is None else [play]
             yield play
         if tests:
             self._journal.record_once("forecast", number, tests=interval(tests), tests_done=done)
 
-    def _judge(self, number: int, round: Round, forecast: Iterator[float]) -> int | None:
+    def _judge(self, number: int, round: Round, forecast: Iterator[object]) -> int | None:
         """The index of the first similar candidate that was not rejected, or None when all are judged."""
 
         def wanted() -> Wanted:

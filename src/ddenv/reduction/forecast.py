@@ -24,6 +24,7 @@ NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
 # A forecast is made of this many plays. In large worlds it ends earlier, after this many candidates, but not before a few plays. A
 # round takes as long as one candidate for each `SPLIT` models of its environment, and those that it has.
 PLAYS, CANDIDATES, FEWEST_PLAYS, SPLIT = 30, 6_000, 8, 50
+STEP = 100
 # A play that goes on for longer says nothing new.
 MOST_ROUNDS = 1500
 # The interval holds eight of ten plays, and somewhat more: a play knows less than there is to know.
@@ -86,6 +87,11 @@ class Moment:
 
 def plays(moment: Moment) -> Iterator[float]:
     """How many tests are left in each of up to `PLAYS` plays. The same moment gives the same plays."""
+    return (tests for tests in playing(moment) if tests is not None)
+
+
+def playing(moment: Moment) -> Iterator[float | None]:
+    """As `plays`, with None every few milliseconds: in large worlds a play takes a while."""
     random = Random(f"{moment.evidence.seed} {len(moment.environment)} {len(moment.evidence.trials)}")
     codes = {name: random.getrandbits(62) for name in moment.elements}
     guide, line = _quick_guide(moment), _near_to_far(moment)
@@ -98,7 +104,7 @@ def plays(moment: Moment) -> Iterator[float]:
         needed = _needed(random, len(moment.elements), len(line), groups)
         play = _Play(moment, random, frozenset(line[place] for place in needed), codes, dict(verdicts), dict(missed))
         try:
-            play.run(search(moment.algorithm, moment.elements, guide))
+            yield from play.run(search(moment.algorithm, moment.elements, guide))
         except Exception:
             # An algorithm of another package may not bear answers that its own schemas would not give.
             return
@@ -142,9 +148,9 @@ class _Play:
         self._verdicts = verdicts
         self._missed = missed
 
-    def run(self, searching: Search) -> None:
-        """To the end of the search."""
-        winner = None
+    def run(self, searching: Search) -> Iterator[None]:
+        """To the end of the search, with a break after about `STEP` candidates."""
+        winner, last = None, 0
         for _ in range(MOST_ROUNDS):
             try:
                 round = searching.send(winner)
@@ -154,6 +160,9 @@ class _Play:
             self.looked_at += len(round.environment) // SPLIT
             rule = self._rule.within(round.runs)
             winner = next((one for one in round.candidates if self._is_similar(one, whole, rule)), None)
+            if self.looked_at - last > STEP:
+                last = self.looked_at
+                yield
 
     def _is_similar(self, candidate: Candidate, whole: int, rule: Acceptance) -> bool:
         """Its verdict by `rule`; `whole` is the code of the round's environment."""
