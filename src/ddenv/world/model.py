@@ -59,12 +59,14 @@ class Ellipsoid:
 class Mesh:
     """A closed surface: `vertices` (N, 3) m, `faces` (M, 3) vertex indices, counterclockwise seen from outside.
 
-    Convex in a collision. Meshes are equal if they have the same `origin`: the same file, read in the same way.
+    Convex in a collision. Meshes are equal if they have the same `origin`: the same file, read in the same way. A `simplified`
+    mesh is the convex hull of one that is too fine to be drawn.
     """
 
     origin: str
     vertices: np.ndarray = field(compare=False, repr=False)
     faces: np.ndarray = field(compare=False, repr=False)
+    simplified: bool = field(default=False, compare=False)
 
 
 Shape = Box | Cylinder | Sphere | Plane | Capsule | Ellipsoid | Mesh

@@ -8,7 +8,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.world.files import meshes
+from ddenv.world.files import hull, meshes
 from ddenv.world.files.access import Unusable
 from ddenv.world.files.meshes import SUFFIXES, read_parts
 from tests.world.files.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
@@ -199,7 +199,40 @@ def test_flat_meshes_get_a_thin_hull(tmp_path, points, volume):
 def test_large_visual_becomes_its_hull(tmp_path, monkeypatch):
     monkeypatch.setattr(meshes, "MOST_DRAWN", 100)
     ball = trimesh.creation.icosphere(subdivisions=3)
-    assert len(mesh_of(tmp_path / "a.stl", ball.export(file_type="stl")).vertices) <= 256
+    mesh = mesh_of(tmp_path / "a.stl", ball.export(file_type="stl"))
+    assert len(mesh.vertices) <= 256
+    assert mesh.simplified
+    assert not mesh_of(tmp_path / "b.stl", BOX.export(file_type="stl")).simplified
+    stored = meshes.unpack("a", meshes.pack(mesh.vertices, mesh.faces, simplified=True))
+    assert stored.simplified
+
+
+def test_the_hull_of_many_points_is_that_of_all(monkeypatch):
+    spread = np.random.default_rng(1)
+    ball = spread.normal(size=(3000, 3))
+    shapes = {
+        "a cloud": ball,
+        "a ball": ball / np.linalg.norm(ball, axis=1)[:, None],
+        "a sheet": ball * [5, 1, 0],
+        "a line": ball * [5, 0, 0],
+        "a box with a needle": np.vstack([spread.uniform(-1, 1, (3000, 3)), [[0.3, 0.2, 9]]]),
+    }
+    usual = {name: hull.convex_hull(points) for name, points in shapes.items()}
+    monkeypatch.setattr(hull, "MANY_POINTS", 1000)
+    monkeypatch.setattr(hull, "CHUNK", 700)
+    for name, points in shapes.items():
+        vertices, faces = hull.convex_hull(points)
+        assert np.array_equal(vertices, usual[name][0]), name
+        # Faces in one plane can be cut in several ways.
+        assert len(faces) == len(usual[name][1]), name
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "glb"])
+def test_a_mesh_of_too_many_triangles_is_refused_in_a_line(tmp_path, monkeypatch, suffix):
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    monkeypatch.setattr("ddenv.world.files.triangles.MOST_FACES", 1000)
+    with pytest.raises(Unusable, match=r"has 0\.0 million triangles; the maximum is 0\.001 million: simplify it"):
+        mesh_of(tmp_path / f"a.{suffix}", ball.export(file_type=suffix), convex=True)
 
 
 def test_large_file_is_refused(tmp_path, monkeypatch):

@@ -115,6 +115,13 @@ def test_the_box_around_the_other_shapes_of_a_link_can_stand_in(read, kind):
     assert found.pose.position == (0, 0, 1)
 
 
+def test_a_visual_that_is_too_fine_is_drawn_as_its_hull(read, tmp_path, monkeypatch):
+    monkeypatch.setattr("ddenv.world.files.meshes.MOST_DRAWN", 3)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 1 3 4\n")
+    world = read(model("<mesh><uri>a.obj</uri></mesh>", tag="visual"))
+    assert world.notes[0].why == "'a.obj' by its convex hull, since it is too fine to be drawn"
+
+
 def test_a_stand_in_that_nothing_asks_for_is_noted(read):
     world = read(model("<box><size>1 1 1</size></box>"), stand_ins={"model://bariel": "sphere:1"})
     assert "stand-in for 'model://bariel' is not used" in world.notes[0].why

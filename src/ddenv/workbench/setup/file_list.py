@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 from rich.text import Text
 from textual import on
@@ -19,13 +20,36 @@ from ddenv.workbench.wording import plain
 KEPT = 12
 
 
-def recent_file() -> Path:
-    """The path of the list of recent files: in `$DDENV_HOME`, or in the user's state folder."""
+def state_file(name: str) -> Path:
+    """The path of what the workbench remembers: in `$DDENV_HOME`, or in the user's state folder."""
     import platformdirs
 
     home = os.environ.get("DDENV_HOME")
     folder = Path(home) if home else Path(platformdirs.user_state_dir("ddenv", appauthor=False))
-    return folder / "recent.json"
+    return folder / name
+
+
+def write_state(name: str, content: object) -> None:
+    """Remembers `content` as JSON, if it can be written."""
+    from ddenv.world.files.access import write_file
+
+    place = state_file(name)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_file(place, json.dumps(content).encode())
+    except (OSError, UserError, ValueError):
+        return
+
+
+def read_state(name: str) -> Any:
+    """What was remembered; None if it is missing or damaged."""
+    try:
+        return json.loads(state_file(name).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+RECENT = "recent.json"
 
 
 def recent_files() -> list[Path]:
@@ -35,26 +59,17 @@ def recent_files() -> list[Path]:
 
 def remember(path: Path) -> None:
     """Puts a file first in the recent ones, if the list can be written; bundled scenarios are always listed."""
-    from ddenv.world.files.access import write_file
     from ddenv.world.load import SCENARIOS
 
     if path.parent == SCENARIOS:
         return
     path = path.absolute()
     names = [path, *(each for each in _listed() if each != path)][:KEPT]
-    place = recent_file()
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_file(place, json.dumps([str(each) for each in names]).encode())
-    except (OSError, UserError, ValueError):
-        return
+    write_state(RECENT, [str(each) for each in names])
 
 
 def _listed() -> list[Path]:
-    try:
-        names = json.loads(recent_file().read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return []
+    names = read_state(RECENT)
     if not isinstance(names, list):
         return []
     return [Path(name) for name in names if isinstance(name, str) and name][:KEPT]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -18,6 +19,14 @@ class Missing(Exception):
 
 class Unusable(Exception):
     """A file or URI cannot be used; the text is the reason, in one line."""
+
+
+class MissingFiles(UserError):
+    """Files that must be there are nowhere; `uris` are all of them."""
+
+    def __init__(self, message: str, uris: Sequence[str]) -> None:
+        super().__init__(message)
+        self.uris = tuple(uris)
 
 
 def read(path: Path, limit: int) -> bytes:

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from ddenv.world.files.access import Unusable, read
-from ddenv.world.files.triangles import MOST_FACES, MOST_PARTS, Part, parts_of
+from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, parts_of
 
 # Accepted accessors of positions (32-bit floats) and of vertex indices (8, 16 and 32 bits).
 _POSITIONS = ("VEC3", (5126,))
@@ -81,8 +81,9 @@ def _shape(header: dict[str, Any], limit: int) -> dict[str, Any]:
     # Primitives may share accessors, so a small file can have any number of triangles.
     placed = [primitive for node in nodes if "mesh" in node for primitive in meshes[node["mesh"]]]
     for primitives in (placed, [primitive for mesh in meshes for primitive in mesh]):
-        if sum(_size(each, accessors) for each in primitives) > MOST_FACES or len(primitives) > MOST_PARTS:
-            raise ValueError(f"has more than {MOST_FACES} triangles")
+        check_count(sum(_size(each, accessors) for each in primitives))
+        if len(primitives) > MOST_PARTS:
+            raise ValueError(f"has more than {MOST_PARTS} parts")
     used = {
         number for mesh in meshes for each in mesh for number in (*each["attributes"].values(), each.get("indices"))
     }

@@ -25,7 +25,7 @@ from ddenv.world.files.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.hull import convex_hull
-from ddenv.world.files.triangles import MOST_FACES, Part, chosen, joined, read_obj, read_stl
+from ddenv.world.files.triangles import Part, check_count, chosen, joined, read_obj, read_stl
 from ddenv.world.model import Mesh
 
 SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
@@ -34,6 +34,8 @@ MESH_LIMIT = 200_000_000  # bytes of a file
 MOST_DRAWN = 50_000
 FARTHEST = 1e6  # of a vertex from the origin, m
 _MAGIC = b"ddmesh1\0"
+# Begins a mesh that is drawn as its hull, since it has more than `MOST_DRAWN` faces.
+_MAGIC_HULL = b"ddmesh1h"
 _HEADER = struct.Struct("<8sIII")
 
 
@@ -97,10 +99,11 @@ def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = Fal
             vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         # Adding zero makes -0.0 the same as 0.0.
         vertices = vertices + 0.0
-        vertices, faces = convex_hull(vertices) if convex or len(faces) > MOST_DRAWN else _merged(vertices, faces)
+        too_fine = not convex and len(faces) > MOST_DRAWN
+        vertices, faces = convex_hull(vertices) if convex or too_fine else _merged(vertices, faces)
     except ValueError as error:
         raise Unusable(_line(str(error))) from None
-    return _mesh(name, pack(vertices, faces))
+    return _mesh(name, pack(vertices, faces, simplified=too_fine))
 
 
 def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -113,8 +116,7 @@ def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
     """The same arrays. Raises ValueError unless all numbers are valid."""
     if not len(faces):
         raise ValueError("has no triangles")
-    if len(faces) > MOST_FACES:
-        raise ValueError(f"has more than {MOST_FACES} triangles")
+    check_count(len(faces))
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ValueError("has faces with vertices that do not exist")
     if not np.isfinite(vertices).all():
@@ -124,18 +126,18 @@ def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
     return vertices, faces
 
 
-def pack(vertices: np.ndarray, faces: np.ndarray) -> bytes:
+def pack(vertices: np.ndarray, faces: np.ndarray, *, simplified: bool = False) -> bytes:
     """Header, vertices and faces as little-endian bytes; vertices in 32 bits if that loses no precision, as for most files."""
     short = vertices.astype("<f4")
     kept = short if np.array_equal(short.astype("<f8"), vertices) else vertices.astype("<f8")
-    header = _HEADER.pack(_MAGIC, kept.itemsize, len(vertices), len(faces))
+    header = _HEADER.pack(_MAGIC_HULL if simplified else _MAGIC, kept.itemsize, len(vertices), len(faces))
     return header + kept.tobytes() + faces.astype("<u4").tobytes()
 
 
 def unpack(name: str, packed: bytes) -> Mesh:
     """The packed mesh, equal to the one from `build`. Raises Unusable for damaged bytes."""
     size, vertices, faces = (0, 0, 0)
-    if len(packed) >= _HEADER.size and packed.startswith(_MAGIC):
+    if len(packed) >= _HEADER.size and packed.startswith((_MAGIC, _MAGIC_HULL)):
         _, size, vertices, faces = _HEADER.unpack_from(packed)
     if size not in (4, 8) or len(packed) != _HEADER.size + 3 * size * vertices + 12 * faces:
         raise Unusable("its stored mesh is damaged")
@@ -158,7 +160,8 @@ def _mesh(name: str, packed: bytes) -> Mesh:
     vertices, faces = _arrays(packed)
     vertices.flags.writeable = False
     faces.flags.writeable = False
-    return Mesh(f"{name} {hashlib.blake2b(packed, digest_size=8).hexdigest()}", vertices, faces)
+    digest = hashlib.blake2b(packed, digest_size=8).hexdigest()
+    return Mesh(f"{name} {digest}", vertices, faces, packed.startswith(_MAGIC_HULL))
 
 
 def origin(uri: str, submesh: str, center: bool, convex: bool) -> str:

@@ -78,7 +78,7 @@ class Disk:
             parts = self._parts(find(uri, base, self._folders))
             name = origin(uri, submesh, center, convex)
             mesh = build(parts, name, submesh=submesh, center=center, convex=convex)
-            self.taken[key] = pack(mesh.vertices, mesh.faces)
+            self.taken[key] = pack(mesh.vertices, mesh.faces, simplified=mesh.simplified)
             return mesh
 
         key = _key("mesh", uri, str(base), submesh, center, convex)

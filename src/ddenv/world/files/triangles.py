@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-# Maximum numbers in one file, whose few lines can place one geometry a million times.
-MOST_FACES = 20_000_000
+# Maximum numbers in one file, whose few lines can place one geometry a million times. They bound time and memory.
+MOST_FACES = 2_000_000
 MOST_PARTS = 100_000
 
 
@@ -62,16 +62,26 @@ def joined(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and faces of all parts together. Raises ValueError if there are none."""
     if not parts:
         raise ValueError("has no triangles")
+    check_count(sum(len(part.faces) for part in parts))
     from trimesh.util import append_faces
 
     vertices, faces = append_faces([part.vertices for part in parts], [part.faces for part in parts])
     return vertices, faces
 
 
+def check_count(faces: int) -> None:
+    """Raises ValueError for too many triangles."""
+    if faces > MOST_FACES:
+        raise ValueError(
+            f"has {faces / 1e6:.1f} million triangles; the maximum is {MOST_FACES / 1e6:g} million: simplify it"
+        )
+
+
 def read_obj(data: bytes) -> list[Part]:
     """One part for each object and group (`o`, `g`) with faces; polygons become fans. Raises ValueError, IndexError."""
     import trimesh
 
+    check_count(data.count(b"\nf "))
     text, names = _plain(data.decode("utf-8", errors="replace"))
     scene = trimesh.load_scene(BytesIO(text.encode()), "obj", process=False, skip_materials=True, split_objects=True)
     if not names:
@@ -93,7 +103,12 @@ def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
         if word == "v":
             vertices.append("v " + " ".join(rest[:3]))
         elif word == "f" and len(rest) > 2:
-            corners = " ".join(str(_counted(corner, len(vertices))) for corner in rest)
+            heads = [corner.partition("/")[0] for corner in rest]
+            # Plain positive numbers, as almost all are, need no look at each.
+            digits = "".join(heads)
+            if not (digits.isascii() and digits.isdecimal() and all(heads)) or any(head[0] == "0" for head in heads):
+                heads = [str(_counted(head, len(vertices))) for head in heads]
+            corners = " ".join(heads)
             # Without objects, groups serve as objects.
             objects.setdefault((name, group) if name else (group,), []).append("f " + corners)
         elif word == "o":
@@ -106,7 +121,7 @@ def _plain(text: str) -> tuple[str, list[tuple[str, ...]]]:
 
 def _counted(corner: str, vertices: int) -> int:
     """The 1-based index of a corner's vertex; negative ones count back from the last of the `vertices` before the face."""
-    number = int(corner.partition("/")[0])
+    number = int(corner)
     counted = number if number > 0 else vertices + 1 + number
     if number == 0 or counted < 1:
         raise ValueError(f"a face refers to the vertex {number}, which does not exist")
@@ -120,6 +135,7 @@ def read_stl(data: bytes) -> list[Part]:
     end = 84 + 50 * int.from_bytes(data[80:84], "little")
     if data.lstrip()[:5].lower() != b"solid":
         # trimesh takes a binary file for text if it has trailing bytes.
+        check_count((end - 84) // 50)
         data = data[: max(end, 84)]
     elif len(data) != end:
         # For names in other encodings, trimesh would need a library that guesses them.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import Unusable
+from ddenv.world.files.access import MissingFiles, Unusable
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
@@ -102,13 +102,14 @@ class Context:
         self.missing.setdefault(uri, error)
 
     def complain_of_missing(self) -> None:
-        """Raises the first error of a missing file, with the names of the other files."""
+        """Raises MissingFiles with the first error, and the names of the other files."""
         if not self.missing:
             return
         (_, first), *others = self.missing.items()
         names = ", ".join(f"'{uri[:100]}'" for uri, _ in others[:5])
         more = f" and {len(others) - 5} more" if len(others) > 5 else ""
-        raise UserError(f"{first}; also missing: {names}{more}") if others else first
+        message = f"{first}; also missing: {names}{more}" if others else str(first)
+        raise MissingFiles(message, list(self.missing))
 
     def ignores(self, tag: str) -> bool:
         return tag in self.reading.ignore

@@ -148,6 +148,8 @@ def _mesh(element: Element, parent: Element, context: Context, scale: Vector) ->
         return Lost(element, uri, str(error), word, _times(own, scale))
     if convex:
         context.note("replaced", element, f"'{uri}' by its convex hull")
+    elif mesh.simplified:
+        context.note("replaced", element, f"'{uri}' by its convex hull, since it is too fine to be drawn")
     return Placed(_checked(_scaled(mesh, _times(own, scale)), element))
 
 
