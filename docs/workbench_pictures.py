@@ -40,6 +40,11 @@ MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
 # Maximum time for anything, s; after this much of its run the robot is worth a picture, simulated s.
 PATIENCE, UNDER_WAY = 120.0, 14.0
 HOME = Path(tempfile.gettempdir()) / "you"
+# Models that are on no machine, by place.
+MISSING = "".join(
+    f"<include><uri>model://{name}</uri><pose>{place} 0 0 0 0</pose></include>"
+    for name, place in {"jersey_barrier": "3 -4", "old_shelf": "5 4", "construction_cone": "6 -3"}.items()
+)
 FLOOR = ("asphalt_near", "asphalt_far")
 
 
@@ -55,6 +60,7 @@ PICTURES = {
     "setup": Picture("SetupScreen", "The setup screen: what to choose from, the world, the settings"),
     "setup-small": Picture("SetupScreen", "The setup screen at 80x24: its settings"),
     "setup-start": Picture("SetupScreen", "Picking the robot's start on the map of a world"),
+    "setup-missing": Picture("SetupScreen", "Missing files, each with its remedy"),
     "open": Picture("OpenFile", "Opening a file"),
     "save": Picture("SaveScenario", "Saving the settings as a scenario"),
     "baseline": Picture("RunScreen", "The baseline: the whole world is run ten times"),
@@ -95,7 +101,9 @@ def main() -> None:
     SCREENS.mkdir()
     (HOME / "runs").mkdir(parents=True)
     (HOME / "worlds").mkdir()
-    shutil.copy(SDF / "worlds/friction.sdf", HOME / "worlds/depot.sdf")
+    depot = (SDF / "worlds/friction.sdf").read_text(encoding="utf-8")
+    (HOME / "worlds/depot.sdf").write_text(depot, encoding="utf-8")
+    (HOME / "worlds/yard.sdf").write_text(depot.replace("</world>", f"{MISSING}</world>"), encoding="utf-8")
     os.chdir(HOME / "worlds")
     os.environ.update(HOME=str(HOME), DDENV_HOME=str(HOME), LOGNAME="you", TZ="UTC")
     for name in ("NO_COLOR", "DDENV_CONFIG"):
@@ -264,6 +272,11 @@ async def set_up() -> None:
         await pilot.pause(1.0)
         await press(pilot, "f4")
         await take(pilot, "setup-small")
+        await press(pilot, "f2", "ctrl+o", *"yard.sdf", "enter")
+        await pilot.pause(1.0)
+        await press(pilot, "escape", "m", "down", "w")
+        await pilot.pause(1.0)
+        await take(pilot, "setup-missing")
 
 
 # What all of them need.

@@ -2,7 +2,8 @@
 
 import pytest
 
-from ddenv.workbench.setup.file_list import KEPT, FileList, recent_file, recent_files, remember
+from ddenv.workbench.setup.file_list import KEPT, RECENT, FileList, recent_files, remember
+from ddenv.workbench.setup.remembered import state_file
 from tests.workbench.setup.setup_session import Opened
 
 
@@ -31,7 +32,7 @@ def test_missing_files_drop_out(files):
 
 @pytest.mark.parametrize("content", ["", "no list", '{"a": 1}', "[1, null, {}]", "[" * 50_000, '["\\u0000"]'])
 def test_a_damaged_list_is_an_empty_one(content, files):
-    recent_file().write_text(content)
+    state_file(RECENT).write_text(content)
     assert recent_files() == []
     remember(files[0])
     assert recent_files() == [files[0]]
@@ -73,4 +74,4 @@ async def test_what_cannot_be_read_and_what_is_bundled_is_not_remembered(scenari
         await session.open(broken)
         await session.open(scenarios / "crates.yaml")
         assert session.screen.preview.choice.name == "crates"
-    assert not recent_file().exists()
+    assert not state_file(RECENT).exists()

@@ -95,25 +95,3 @@ async def test_without_scenarios_the_map_names_the_key_that_opens_a_file(tmp_pat
     monkeypatch.setattr("ddenv.world.load.SCENARIOS", tmp_path / "none")
     async with Opened() as session:
         assert "ctrl+o" in session.screen.query_one(WorldMap).notice
-
-
-LOST = (
-    "<model name='barrel'><static>1</static><pose>3 0 0 0 0 0</pose><link name='l'><collision name='c'><geometry><mesh>"
-    "<uri>model://barrel/barrel.dae</uri></mesh></geometry></collision></link></model>"
-)
-
-
-@pytest.mark.screens
-async def test_a_missing_file_is_shown_with_the_option_that_replaces_it(scenarios, tmp_path, started):
-    path = tmp_path / "depot.world"
-    path.write_text(f"<sdf version='1.6'><world name='w'>{LOST}</world></sdf>")
-    async with Opened() as session:
-        await session.open(path)
-        assert "--stand-in 'model://barrel=cylinder:0.3,1.0'" in session.screen.query_one(WorldMap).notice
-        assert str(session.screen.query_one("#preview").border_title) == "depot.world"
-    async with Opened(reading={"stand_in": ("model://barrel=cylinder:0.3,1",)}) as session:
-        await session.open(path)
-        assert "1 part replaced" in session.screen.query_one("#about", Static).render().plain
-        session.fill(spawn_x="0", spawn_y="0", spawn_z="0.2", spawn_yaw="0", goal_x="6", goal_y="0")
-        await session.press("ctrl+s")
-        assert len(started) == 1

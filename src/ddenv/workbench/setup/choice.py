@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
+from ddenv.workbench.setup.remedies import Missing, read_with_remedies
 from ddenv.workbench.wording import count, plain
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ class Choice:
     """A world, how it was read, and its scenario unless a bare world was chosen.
 
     `settings` has the options that the form starts with: the scenario's own, or the defaults. `clearance` is how far the robot's
-    frame is above the ground, m. With `run`, all comes from the run file `path`.
+    frame is above the ground, m. With `run`, all comes from the run file `path`. `options` are those of the command line that
+    read the world so, `missing` is what it names but is nowhere.
     """
 
     path: Path
@@ -35,6 +37,14 @@ class Choice:
     settings: Scenario
     clearance: float
     run: bool = False
+    options: Mapping[str, Any] = field(default_factory=dict)
+    missing: tuple[Missing, ...] = ()
+
+    def check_remedies(self) -> None:
+        """Raises UserError while a missing file has no remedy: its guess is shown, but only run with if the user takes it."""
+        undecided = sum(not each.remedy for each in self.missing)
+        if undecided:
+            raise UserError(f"{count(undecided, 'missing file')} without a remedy: press m")
 
     @property
     def name(self) -> str:
@@ -72,15 +82,16 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
         return _read_run(path)
     from ddenv.runs.scenarios import reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
-    from ddenv.world.read import read_world
     from ddenv.world.scenario import PLAIN
 
     scenario = load_scenario(path) if path.suffix.lower() in (".yaml", ".yml") else None
-    reading = reading_of(scenario.reading if scenario else PLAIN, **options)
+    own = scenario.reading if scenario else PLAIN
     settings = scenario or scenario_for_world(path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    world, chosen, missing = read_with_remedies(settings.world, own, options)
+    reading = reading_of(own, **chosen)
     settings = settings.model_copy(update={"reading": reading})
-    world = read_world(settings.world, reading)
-    return Choice(path, world, reading, scenario, settings, _clearance(world, settings, scenario is not None))
+    clearance = _clearance(world, settings, scenario is not None)
+    return Choice(path, world, reading, scenario, settings, clearance, options=chosen, missing=missing)
 
 
 def _read_run(path: Path) -> Choice:

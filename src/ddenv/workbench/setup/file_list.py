@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
-from typing import Any
 
 from rich.text import Text
 from textual import on
@@ -13,40 +10,11 @@ from textual.message import Message
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.errors import UserError
+from ddenv.workbench.setup.remembered import read_state, write_state
 from ddenv.workbench.wording import plain
 
 # The maximum number of recent files: in a longer list files are hard to find.
 KEPT = 12
-
-
-def state_file(name: str) -> Path:
-    """The path of what the workbench remembers: in `$DDENV_HOME`, or in the user's state folder."""
-    import platformdirs
-
-    home = os.environ.get("DDENV_HOME")
-    folder = Path(home) if home else Path(platformdirs.user_state_dir("ddenv", appauthor=False))
-    return folder / name
-
-
-def write_state(name: str, content: object) -> None:
-    """Remembers `content` as JSON, if it can be written."""
-    from ddenv.world.files.access import write_file
-
-    place = state_file(name)
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_file(place, json.dumps(content).encode())
-    except (OSError, UserError, ValueError):
-        return
-
-
-def read_state(name: str) -> Any:
-    """What was remembered; None if it is missing or damaged."""
-    try:
-        return json.loads(state_file(name).read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return None
 
 
 RECENT = "recent.json"

@@ -25,6 +25,8 @@ from ddenv.workbench.setup.choice import Choice, read_choice, spawn_height
 from ddenv.workbench.setup.costs import Past, past_of
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.file_list import remember
+from ddenv.workbench.setup.missing_list import MissingList
+from ddenv.workbench.setup.remedies import remember_remedies
 from ddenv.workbench.wording import plain, shorten
 
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
@@ -41,10 +43,11 @@ class Preview(Vertical):
 
     @dataclass
     class Read(Message):
-        """The choice was read; `free_name` is the name that its next run gets."""
+        """The choice was read; `free_name` is the name that its next run gets. `again`: only its remedies changed."""
 
         choice: Choice
         free_name: str
+        again: bool = False
 
     @dataclass
     class Failed(Message):
@@ -62,12 +65,14 @@ class Preview(Vertical):
         super().__init__(id=id, classes="panel")
         self._reading = reading
         self.map = WorldMap(id="map")
+        self.missing = MissingList(id="missing")
         self.picker = PlacePicker(self.map, form, id="picking")
         self.choice: Choice | None = None
         self.border_title = "World"
 
     def compose(self) -> ComposeResult:
         yield self.map
+        yield self.missing
         yield self.picker
         yield About(id="about")
 
@@ -82,6 +87,7 @@ class Preview(Vertical):
         self._choose(None)
         self.picker.pick("")
         self.query_one(About).show("")
+        self.missing.show(())
         self.map.set_place(Place(), why)
 
     def _choose(self, choice: Choice | None) -> None:
@@ -91,7 +97,7 @@ class Preview(Vertical):
         self.border_title, self.border_subtitle = Text(shorten(plain(name), 40)), ""
 
     @work(thread=True, group="world", exclusive=True)
-    def _read(self, path: Path, opened: bool) -> None:
+    def _read(self, path: Path, opened: bool, again: bool = False) -> None:
         from textual.worker import get_current_worker
 
         from ddenv.runs.folder import runs_folder
@@ -106,7 +112,7 @@ class Preview(Vertical):
             return
         if worker.is_cancelled:
             return
-        call_if_open(self, self._show, choice, place, name)
+        call_if_open(self, self._show, choice, place, name, again)
         if opened:
             remember(path)
         past = past_of(choice.settings, runs_folder())
@@ -114,15 +120,25 @@ class Preview(Vertical):
             call_if_open(self, self.post_message, self.PastRead(choice, past))
 
     def _fail(self, why: str) -> None:
+        self._choose(None)
         self.map.set_place(Place(), why)
         self.post_message(self.Failed())
 
-    def _show(self, choice: Choice, place: Place, name: str) -> None:
+    def _show(self, choice: Choice, place: Place, name: str, again: bool) -> None:
         self._choose(choice)
         self._title(choice.name)
         self.map.set_place(place)
+        self.missing.show(choice.missing)
         self.query_one(About).show(choice.about)
-        self.post_message(self.Read(choice, name))
+        self.post_message(self.Read(choice, name, again))
+
+    @on(MissingList.Chosen)
+    def _remedies_chosen(self, event: MissingList.Chosen) -> None:
+        """Remembers them, and reads the world again; until then the map stays."""
+        event.stop()
+        if self.choice is not None:
+            remember_remedies(event.remedies)
+            self._read(self.choice.path, False, again=True)
 
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:

@@ -30,6 +30,9 @@ KEYS: list[BindingType] = [
         "h", "pick('heading')", "heading", id="setup.pick_heading", tooltip="set the heading on the map", show=False
     ),
     Binding("g", "pick('goal')", "goal", id="setup.pick_goal", tooltip="set the goal on the map", show=False),
+    Binding(
+        "m", "missing", "missing", id="setup.missing", tooltip="to the missing files and their remedies", show=False
+    ),
     Binding("plus,equals_sign", "zoom(1.25)", "closer", id="setup.closer", tooltip="map: closer", show=False),
     Binding("minus", "zoom(0.8)", "farther", id="setup.farther", tooltip="map: farther away", show=False),
     Binding("0", "fit", "fit", id="setup.fit", tooltip="map: show all of it", show=False),

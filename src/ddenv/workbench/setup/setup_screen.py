@@ -178,6 +178,10 @@ class SetupScreen(Screen[None]):
         # An error about a key pressed too early is out of date.
         self.form.show_message("")
         self.form.suggest_name(event.free_name)
+        if event.again:
+            picker.show_places()
+            self._show_outcome()
+            return
         placed = choice.scenario is not None
         self.form.show_settings(choice.settings, placed, self._keep_places)
         picker.show_places()
@@ -198,6 +202,11 @@ class SetupScreen(Screen[None]):
             return
         self.action_pane("map")
         self.preview.picker.pick(what)
+
+    def action_missing(self) -> None:
+        """To the rows of missing files, if there are any."""
+        self._show_pane("map")
+        (self.preview.missing if self.preview.missing.display else self.preview.map).focus()
 
     def action_zoom(self, factor: float) -> None:
         self.preview.map.zoom(factor)
@@ -239,8 +248,9 @@ class SetupScreen(Screen[None]):
 
     def _scenario(self) -> Scenario:
         """The scenario that the form describes. Raises UserError."""
-        pair, algorithm = self.form.method
-        return form.asked_of(self._chosen().settings, self.form.texts, pair, algorithm)
+        choice, (pair, algorithm) = self._chosen(), self.form.method
+        choice.check_remedies()
+        return form.asked_of(choice.settings, self.form.texts, pair, algorithm)
 
     def _chosen(self) -> Choice:
         """The choice. Raises UserError while there is none."""
@@ -253,7 +263,8 @@ class SetupScreen(Screen[None]):
     def _command(self) -> list[str]:
         """The words of the command that does the same, empty if there is none. Raises UserError."""
         jobs, name = form.jobs(self.form.texts["jobs"]), self.form.own_name
-        return command_words(self._chosen(), self._saved, self._scenario(), jobs=jobs, reading=self._reading, name=name)
+        choice = self._chosen()
+        return command_words(choice, self._saved, self._scenario(), jobs=jobs, reading=choice.options, name=name)
 
     def action_copy(self) -> None:
         """The whole command to the clipboard (OSC 52)."""

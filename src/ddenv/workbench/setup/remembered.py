@@ -1,0 +1,39 @@
+"""What the workbench remembers from one time to the next, in files of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from ddenv.errors import UserError
+
+
+def state_file(name: str) -> Path:
+    """The path of what the workbench remembers: in `$DDENV_HOME`, or in the user's state folder."""
+    import platformdirs
+
+    home = os.environ.get("DDENV_HOME")
+    folder = Path(home) if home else Path(platformdirs.user_state_dir("ddenv", appauthor=False))
+    return folder / name
+
+
+def write_state(name: str, content: object) -> None:
+    """Remembers `content` as JSON, if it can be written."""
+    from ddenv.world.files.access import write_file
+
+    place = state_file(name)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_file(place, json.dumps(content).encode())
+    except (OSError, UserError, ValueError):
+        return
+
+
+def read_state(name: str) -> Any:
+    """What was remembered; None if it is missing or damaged."""
+    try:
+        return json.loads(state_file(name).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None

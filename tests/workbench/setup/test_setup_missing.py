@@ -1,0 +1,158 @@
+"""What a world names but is nowhere is a row of the setup screen, with a remedy that is remembered."""
+
+import json
+import shlex
+
+import pytest
+from textual.widgets import Input, Static
+
+from ddenv.runs.scenarios import load_parts
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.setup.missing_list import AskRemedy, MissingList
+from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remember_remedies, remembered
+from ddenv.workbench.setup.remembered import state_file
+from ddenv.world.model import Box, Cylinder
+from tests.workbench.setup.setup_session import Opened
+
+BARREL, SHELF = "model://construction_barrel/barrel.dae", "model://old_shelf"
+
+
+def barrel(name, x):
+    mesh = f"<collision name='c'><geometry><mesh><uri>{BARREL}</uri></mesh></geometry></collision>"
+    return f"<model name='{name}'><static>1</static><pose>{x} 2 0 0 0 0</pose><link name='l'>{mesh}</link></model>"
+
+
+SUN = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("sun", "ground_plane"))
+INSIDE = f"{SUN}{barrel('one', 2)}{barrel('two', 4)}<include><uri>{SHELF}</uri><pose>6 -2 0 0 0 0</pose></include>"
+
+
+@pytest.fixture
+def depot(tmp_path):
+    path = tmp_path / "depot.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>{INSIDE}</world></sdf>")
+    return path
+
+
+def rows(session):
+    found = session.screen.query_one(MissingList)
+    return [option.prompt.plain for option in found.options] if found.display else []
+
+
+def shape(session, name):
+    return session.screen.preview.choice.world.model(name).collisions[0].shape
+
+
+def place(session):
+    session.fill(spawn_x="0", spawn_y="0", spawn_z="0.2", spawn_yaw="0", goal_x="8", goal_y="0")
+
+
+async def test_missing_files_are_rows_with_a_guess_that_is_on_the_map(depot, started):
+    async with Opened(size=(80, 24)) as session:
+        await session.open(depot)
+        assert rows(session) == [
+            "? old_shelf  guess box:1,1,1: nothing says how large it is",
+            "? barrel.dae  guess cylinder:0.296,1.315: the size of Gazebo's model",
+        ]
+        assert shape(session, "one") == Cylinder(0.296, 1.315)
+        assert session.screen.query_one(WorldMap).notice == ""
+        place(session)
+        await session.press("ctrl+s")
+        assert "2 missing files without a remedy: press m" in session.wrong()
+        await session.press("m", "down", "w")
+        assert rows(session)[1] == "✓ barrel.dae  left out"
+        await session.press("m", "up", "enter")
+        dialog = session.app.screen
+        assert isinstance(dialog, AskRemedy)
+        for wrong, words in {
+            "box:1,2": "expected x,y,z",
+            "/no/where": "no folder /no/where",
+            "visual": "single meshes",
+        }.items():
+            dialog.query_one("#remedy", Input).value = wrong
+            await session.press("enter")
+            assert words in dialog.query_one("#wrong", Static).render().plain
+        dialog.query_one("#remedy", Input).value = "box:0.4,2,1"
+        await session.press("enter")
+        assert rows(session)[0] == "✓ old_shelf  box:0.4,2,1"
+        assert shape(session, "old_shelf") == Box((0.4, 2, 1))
+        assert session.value("goal_x") == "8"
+        words = shlex.split(session.told("command"))
+        assert [f"{SHELF}=box:0.4,2,1", f"{BARREL}=none"] == [
+            words[n + 1] for n, word in enumerate(words) if word == "--stand-in"
+        ]
+        await session.press("ctrl+s")
+        assert len(started) == 1
+        world, _ = load_parts(session.made())
+        assert world.model("old_shelf").collisions[0].shape == Box((0.4, 2, 1))
+        assert world.model("one").collisions == ()
+
+
+async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_path):
+    async with Opened() as session:
+        await session.open(depot)
+        await session.press("m", "a")
+        assert [row[0] for row in rows(session)] == ["✓", "✓"]
+    other = tmp_path / "other.world"
+    other.write_bytes(depot.read_bytes())
+    async with Opened() as session:
+        await session.open(other)
+        assert [row[0] for row in rows(session)] == ["✓", "✓"]
+        place(session)
+        await session.pilot.pause()
+        assert f"--stand-in {SHELF}=auto" in session.told("command")
+        await session.press("m", "enter")
+        session.app.screen.query_one("#remedy", Input).value = ""
+        await session.press("enter")
+        assert [row[0] for row in rows(session)] == ["?", "✓"]
+        assert remembered() == {BARREL: "auto"}
+
+
+@pytest.mark.screens
+async def test_a_folder_is_a_remedy_if_the_file_is_in_it(depot, tmp_path):
+    folder = tmp_path / "my models" / "old_shelf"
+    folder.mkdir(parents=True)
+    shelf = "<collision name='c'><geometry><box><size>3 1 2</size></box></geometry></collision>"
+    text = f"<sdf version='1.6'><model name='shelf'><static>1</static><link name='l'>{shelf}</link></model></sdf>"
+    (folder / "model.sdf").write_text(text)
+    remember_remedies({SHELF: str(folder.parent), BARREL: str(folder.parent)})
+    async with Opened() as session:
+        await session.open(depot)
+        assert [row[:5] for row in rows(session)] == ["✓ old", "? bar"]
+        assert shape(session, "shelf") == Box((3, 1, 2))
+        await session.press("m", "a")
+        place(session)
+        await session.pilot.pause()
+        assert f"--model-path '{folder.parent}'" in session.told("command")
+
+
+@pytest.mark.screens
+async def test_a_world_that_misses_nothing_has_no_rows(scenarios, depot):
+    async with Opened() as session:
+        assert rows(session) == []
+        await session.press("m")
+        assert session.screen.focused is session.screen.query_one(WorldMap)
+        await session.open(depot)
+        assert len(rows(session)) == 2
+        await session.open(scenarios / "crates.sdf")
+        assert rows(session) == []
+    async with Opened(reading={"stand_in": ("auto",)}) as session:
+        await session.open(depot)
+        assert rows(session) == []
+        place(session)
+        await session.pilot.pause()
+        assert "--stand-in auto" in session.told("command")
+
+
+@pytest.mark.parametrize("content", ["", "[", "[1]", '{"a": 1, "b": "tube:1", "c": "/no/where"}'])
+def test_damaged_remedies_are_passed_over(content):
+    state_file(REMEDIES).parent.mkdir(parents=True, exist_ok=True)
+    state_file(REMEDIES).write_text(content)
+    assert remembered() == {}
+
+
+def test_only_the_newest_remedies_are_kept():
+    remember_remedies({f"model://{n}": "auto" for n in range(KEPT + 5)})
+    remember_remedies({"model://9": "none", "model://10": ""})
+    found = json.loads(state_file(REMEDIES).read_text())
+    assert len(found) == KEPT - 1
+    assert list(found)[-1] == "model://9"
