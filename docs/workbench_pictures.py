@@ -61,6 +61,7 @@ PICTURES = {
     "setup-small": Picture("SetupScreen", "The setup screen at 80x24: its settings"),
     "setup-start": Picture("SetupScreen", "Picking the robot's start on the map of a world"),
     "setup-missing": Picture("SetupScreen", "Missing files, each with its remedy"),
+    "remedy": Picture("AskRemedy", "Choosing a remedy"),
     "open": Picture("OpenFile", "Opening a file"),
     "save": Picture("SaveScenario", "Saving the settings as a scenario"),
     "baseline": Picture("RunScreen", "The baseline: the whole world is run ten times"),
@@ -277,6 +278,8 @@ async def set_up() -> None:
         await press(pilot, "escape", "m", "down", "w")
         await pilot.pause(1.0)
         await take(pilot, "setup-missing")
+        await press(pilot, "up", "enter")
+        await take(pilot, "remedy")
 
 
 # What all of them need.
