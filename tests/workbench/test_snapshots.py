@@ -167,6 +167,17 @@ def test_panes_of_the_setup_screen(snap_compare, scenarios, pane):
 
 
 @pytest.mark.screens
+@pytest.mark.parametrize("size", [SMALL, USUAL], ids=str)
+@pytest.mark.parametrize("keys", [["m", "down", "w"], ["m", "enter"]], ids=["rows", "remedy"])
+def test_missing_files(snap_compare, scenarios, size, keys):
+    world = scenarios / "crates.sdf"
+    names = ("jersey_barrier", "old_shelf", "construction_cone")
+    missing = "".join(f"<include><uri>model://{name}</uri><pose>3 -4 0 0 0 0</pose></include>" for name in names)
+    world.write_text(world.read_text().replace("</world>", f"{missing}</world>"))
+    assert snap_compare(Workbench(), terminal_size=size, run_before=shown("ddenv", *keys))
+
+
+@pytest.mark.screens
 def test_saving_a_scenario(snap_compare, scenarios, monkeypatch, tmp_path):
     folder = tmp_path / "work"
     folder.mkdir()
