@@ -9,8 +9,11 @@ from pathlib import Path
 import pytest
 from pebble import ProcessFuture
 
+from ddenv.engine import worker
 from ddenv.engine.pool import PREPARATION, Broken, Pool
+from ddenv.engine.worker import REASON
 from ddenv.errors import UserError
+from ddenv.runfile.store import COLUMNS
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
@@ -25,6 +28,22 @@ def parts(**simulation):
     changed = scenario.simulation.model_copy(update=simulation)
     scenario = scenario.model_copy(update={"simulation": changed})
     return scenario, *load_parts(scenario)
+
+
+def test_a_run_that_starts_again_has_all_of_its_time(monkeypatch):
+    begun = []
+
+    class Again:
+        def run(self, keep, seed, progress, full):
+            for time_s in (0.0, 1.0, 0.0, 1.0):
+                progress(time_s, (0.0,) * (COLUMNS - 1))
+                begun.append(shared.begun[0])
+
+    shared = worker.Shared([0.0] * COLUMNS, [0.0], bytearray(REASON))
+    monkeypatch.setattr(worker, "_shared", shared, raising=False)
+    monkeypatch.setattr(worker, "_simulator", Again(), raising=False)
+    worker.run_test(EVERYTHING, 1, True, 60.0, 0)
+    assert 0.0 < begun[0] == begun[1] < begun[2] == begun[3]
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.forecast import Memory, Moment, interval, plays
+from ddenv.reduction.forecast import Memory, Moment, interval, playing, plays
 from ddenv.reduction.guide import make_guide, search
 from ddenv.schemas import split_pair
 
@@ -130,6 +130,13 @@ def test_tiny_worlds(models, algorithm):
 
 def test_large_worlds_are_played_a_few_times():
     assert 8 <= len(list(plays(first(400, **AS_PRINTED)))) < len(list(plays(first(20))))
+
+
+def test_in_a_large_world_a_play_makes_way_for_other_work():
+    moment = first(400)
+    pauses = [tests is None for tests in playing(moment)]
+    assert pauses.count(False) == len(list(plays(moment)))
+    assert pauses.count(True) > 5 * pauses.count(False)
 
 
 def test_an_algorithm_that_cannot_be_played_has_no_forecast(monkeypatch):

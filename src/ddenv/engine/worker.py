@@ -111,8 +111,8 @@ def run_test(keep: frozenset[str], seed: int, full: bool, limit: float, slot: in
 
     def report(time_s: float, pose: tuple[float, ...]) -> None:
         nonlocal begun
-        if not begun:
-            # What came before, such as rehearsals of piles, is not the test's own time.
+        if not begun or time_s == 0.0:
+            # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
             _shared.begun[slot], begun = time.monotonic(), True
         _shared.progress[start : start + COLUMNS] = (time_s, *pose)
 
