@@ -199,7 +199,7 @@ class Reduction:
         True,
         "end a test when the robot is stuck for good; full runs confirm what is left",
         printed=False,
-        shown="more",
+        shown="option",
         cost="On saves the rest of a test that is stuck; the runs of the certificate are full ones.",
     )
     growth: Literal["paper", "steady"] = setting(
