@@ -6,7 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ddenv.engine.control import Control, Stopped
@@ -104,6 +104,7 @@ RUNS = {
 
 @examples(0.3)
 @given(**RUNS, mode=st.sampled_from(["automatic"]), asked=st.lists(ANY, min_size=1, max_size=6))
+@example(salt=0, plan=[], moment=3, mode="automatic", asked=[("accept_mode", {"mode": "ask"})] * 2)
 def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_words(salt, plan, moment, mode, asked):
     with tempfile.TemporaryDirectory() as folder:
         path = begun(folder, salt, plan, moment, mode)
@@ -125,6 +126,8 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
                 else:
                     assert after.refusal == before.refusal
                     decided = kind not in ("pause", "resume", "step", "accept_mode")
+                    # The mode of now, asked for again, is no decision.
+                    decided |= after.accept_mode != before.accept_mode
                     assert len(after.decisions) == len(before.decisions) + decided
 
 
