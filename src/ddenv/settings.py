@@ -197,10 +197,10 @@ class Reduction:
     )
     early_stop: bool = setting(
         True,
-        "end a test when the robot is stuck for good; full runs confirm what is left",
+        "end a test when the robot seems to be stuck for good; the runs of the certificate are full ones",
         printed=False,
         shown="option",
-        cost="On saves the rest of a test that is stuck; the runs of the certificate are full ones.",
+        cost="On saves the rest of a test that is stuck.",
     )
     growth: Literal["paper", "steady"] = setting(
         "steady",

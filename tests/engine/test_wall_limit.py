@@ -1,4 +1,4 @@
-"""The time limit of a test follows the speed of the baseline, and a slow world is told while its first run goes on."""
+"""The time limit of a test follows the speed of the baseline, and a slow world is noted during its first run."""
 
 from contextlib import suppress
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Models that start inside others, and robots that start in the air, are told before anything moves."""
+"""Models that start inside others, and robots that start in the air, are noted before anything moves."""
 
 import pytest
 

@@ -58,7 +58,7 @@ def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:
         ("restless", settled.restless, "does", "do", f"not come to rest within {settled.seconds:.1f} s"),
         ("fallen", settled.fallen, "falls", "fall", "out of the world"),
         ("wild", settled.wild, "flies", "fly", "apart, faster than anything falls: look for models inside each other"),
-        ("broken", settled.broken, "cannot", "cannot", "be simulated: the numbers grow beyond all limits"),
+        ("broken", settled.broken, "cannot", "cannot", "be simulated: their motion diverges"),
     ):
         if names:
             yield about, f"{_do(len(names), does, do)} {why} ({first_of(names, MOST_NAMES)})"

@@ -17,7 +17,7 @@ from ddenv.world.scenario import Spawn
 
 # Models at rest in a saved world overlap by millimetres; this is more, m.
 INSIDE = 0.03
-# A robot that starts higher than this above what is below it drops, m.
+# A robot that starts higher than this above the surface below it drops, m.
 DROP = 0.15
 # The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
 MOST_PAIRS = 500
@@ -38,7 +38,7 @@ def notes_on_start(world: World, robot: Model, spawn: Spawn) -> Iterator[tuple[s
     """What is wrong with the start of the robot in `world`: a word and a sentence for each."""
     height = drop(world, robot, spawn)
     if height > DROP:
-        yield "drop", f"the robot starts {height:.2f} m above what is below it, and drops; lower the spawn's z"
+        yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
     yield from note_inside(world)
 
 

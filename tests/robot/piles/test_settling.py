@@ -1,4 +1,4 @@
-"""How a world comes to rest before the robot comes, and what of it is told."""
+"""How a world comes to rest before the robot moves, and what the notes say of it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_pile_that_breaks_is_named_and_the_robot_still_runs(world_of, add, tem
     settled = one.settled()
     assert settled.broken == ("breaks", "apart")
     words = dict(notes_on(world, settled))["broken"]
-    assert words == "2 models cannot be simulated: the numbers grow beyond all limits (breaks, apart)"
+    assert words == "2 models cannot be simulated: their motion diverges (breaks, apart)"
     assert one.run(frozenset(world.elements()), 0).outcome in ("pass", "failed")
 
 

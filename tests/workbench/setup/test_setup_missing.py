@@ -1,4 +1,4 @@
-"""What a world names but is nowhere is a row of the setup screen, with a remedy that is remembered."""
+"""Files that cannot be found are rows of the setup screen, each with a remedy that is remembered."""
 
 import json
 import shlex

@@ -289,6 +289,10 @@ class Variants:
         """As `Template.supports`."""
         return self._within(lambda: self._whole.supports(elements))
 
+    def settled(self) -> Settled:
+        """As `Template.settled`."""
+        return self._within(lambda: self._whole.settled())
+
     def _within(self, work: Callable[[], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
         times = 1
@@ -302,10 +306,6 @@ class Variants:
             self._smaller = []
             self._whole = self._whole.wider(place, times)
             gc.collect()
-
-    def settled(self) -> Settled:
-        """As `Template.settled`."""
-        return self._within(lambda: self._whole.settled())
 
     def _template(self, keep: frozenset[str]) -> Template:
         """A template that has at least the models `keep`, chosen for the least time of one run."""

@@ -18,7 +18,7 @@ from ddenv.robot.piles.moving_links import Links, Motion, gaps, spread
 from ddenv.robot.piles.rehearsal import CALM, NEAR, SLOW, Script
 from ddenv.world.extent import Bounds
 
-NOTHING = np.empty((0, 3)), np.empty((0, 3))
+NO_BOXES = np.empty((0, 3)), np.empty((0, 3))
 TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
 
 
@@ -104,7 +104,7 @@ class Sleep:
     def awake_boxes(self) -> Bounds:
         """As `boxes`, for the models alone that are simulated."""
         if not self._awake.any():
-            return NOTHING
+            return NO_BOXES
         low, high = self.boxes()
         return low[self._awake], high[self._awake]
 

@@ -27,7 +27,7 @@ class Choice:
 
     `settings` has the options that the form starts with: the scenario's own, or the defaults. `clearance` is how far the robot's
     frame is above the ground, m. With `run`, all comes from the run file `path`. `options` are those of the command line that
-    read the world so, `missing` is what it names but is nowhere.
+    read the world so, `missing` are files that it names but that cannot be found.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""The rows of what a world names but is nowhere, each with its remedy, and the dialog that asks for one."""
+"""The rows of files that cannot be found, each with its remedy, and the dialog that asks for one."""
 
 from __future__ import annotations
 

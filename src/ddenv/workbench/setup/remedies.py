@@ -1,4 +1,4 @@
-"""Remedies for what a world names but is nowhere: a stand-in, `none`, or a folder; remembered by URI."""
+"""Remedies for files that a world names but that cannot be found: a stand-in, `none`, or a folder; remembered by URI."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ KEPT = 1000  # URIs
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """A URI that is nowhere, and its `remedy`: a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet.
+    """A URI that cannot be found.
 
-    `words` say what stands on the map for it.
+    Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
+    the map for it.
     """
 
     uri: str

@@ -22,7 +22,7 @@ class Unusable(Exception):
 
 
 class MissingFiles(UserError):
-    """Files that must be there are nowhere; `uris` are all of them."""
+    """Required files cannot be found; `uris` are all of them."""
 
     def __init__(self, message: str, uris: Sequence[str]) -> None:
         super().__init__(message)
