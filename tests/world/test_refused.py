@@ -70,7 +70,7 @@ ROWS: dict[str, list[str]] = {
     "frames in a cycle": [model("<link name='l'><pose relative_to='l'/></link>")],
     "true or false": [model(f"<static>maybe</static>{LINK}")],
     "`<include>` without a `<uri>`": [include("")],
-    "`<include>` of what is nowhere": [include("<uri>model://nowhere</uri>")],
+    "`<include>` of a file that cannot be found": [include("<uri>model://nowhere</uri>")],
     "`<include merge='true'>`": [include("<uri>model://nowhere</uri>", "merge='true'")],
     "includes in a cycle": [include("<uri>refused.sdf</uri>")],
     "a URI that leaves its folder": [include("<uri>model://../../x</uri>"), include("<uri>ftp://x/y</uri>")],
