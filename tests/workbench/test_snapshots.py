@@ -1,5 +1,6 @@
 """What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
 
+import math
 from contextlib import suppress
 
 import fake_run
@@ -16,9 +17,10 @@ THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
 
 
 @pytest.fixture(autouse=True)
-def no_notifications(monkeypatch):
-    """They go by the clock."""
+def no_clock(monkeypatch):
+    """Notifications go by the clock, and so does what is seen of a run that is read in parts."""
     monkeypatch.setattr(Workbench, "notify", lambda *_, **__: None)
+    monkeypatch.setattr("ddenv.workbench.run.poll.PATIENCE", math.inf)
 
 
 async def settled(pilot):
