@@ -6,6 +6,7 @@ import random
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,8 @@ CHEAP = {"keep_rate": 0.5}
 Oracle = Callable[[frozenset[str], int], str]
 # What a run that may be cut shows then, or "" where it is not cut.
 Cut = Callable[[frozenset[str], int], str]
+# The models that can have changed a bit of a run of these models, None if nobody knows.
+TookPart = Callable[[frozenset[str], int], frozenset[str] | None]
 ENDS = {"similar": ("failed", 2.0), "other": ("failed", 9.0), "pass": ("pass", 4.0)}
 
 
@@ -61,6 +64,8 @@ class FakePool:
         self.made: list[tuple[frozenset[str], int]] = []
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
+        self.ties: list[frozenset[str]] | None = None
+        self.took_part: TookPart = lambda *_: None
         self.settling = 0
         self.settled = Settled()
         self.limits: list[float | None] = []
@@ -90,11 +95,12 @@ class FakePool:
         if shown == "error":
             return [(test, Broken("error", "it broke"))]
         outcome, x = ENDS[shown]
-        return [(test, result(outcome, seed, x, bool(cut)))]
+        made = result(outcome, seed, x, bool(cut))
+        return [(test, replace(made, took_part=self.took_part(keep, seed)))]
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         looks = iter([None] * self.settling)
-        settled = self.supports if isinstance(self.supports, Broken) else Start(self.supports, self.settled)
+        settled = self.supports if isinstance(self.supports, Broken) else Start(self.supports, self.settled, self.ties)
         return lambda: next(looks, settled)
 
     def live(self) -> list[Live]:

@@ -92,13 +92,17 @@ def test_what_the_files_show_of_the_start_is_noted(tmp_path, world):
 def test_it_is_found_before_the_first_test_and_once(tmp_path, world):
     path = new_run(tmp_path, world=world, budget=1)
     for _ in range(2):
+        made = pool(needs("wall"))
+        made.ties = [frozenset({"ball", "post"})]
         with pytest.raises(Exception, match="budget"):
-            drive(path, pool(needs("wall")))
+            drive(path, made)
     kinds = [event.kind for event in events(path)]
     assert kinds.count("supports") == 1
     assert kinds.index("supports") < kinds.index("test_started")
     assert "supports_started" not in kinds
-    assert fold(events(path)).supports == (("ball", "post"), ("beam", "far_box"))
+    state = fold(events(path))
+    assert state.supports == (("ball", "post"), ("beam", "far_box"))
+    assert [set(tie) for tie in state.ties] == [{"ball", "post"}]
 
 
 def test_a_world_where_nothing_moves_needs_none(tmp_path):

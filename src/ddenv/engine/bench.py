@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -215,7 +216,9 @@ class Bench:
             # It is made again, unless that has happened already.
             started = self._journal.state.tests[test - 1]
             self._started.discard((self._journal.keep_of_test(test), started.run, self._journal.is_full(started.phase)))
-        noticed = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
+        noticed: dict[str, Any] = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
+        if "took_part" in data:
+            noticed["took_part"] = sorted(self._numbers[name] for name in data["took_part"] if name in self._numbers)
         self._journal.record("test_finished", motions, test=test, **data | noticed)
 
     def _counted(self) -> tuple[Failure, ...]:

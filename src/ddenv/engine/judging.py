@@ -24,7 +24,8 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     `failures` are f and the failures that the user accepted as f; the nearest one counts.
     `first_sensed` and `first_touched` are the first times by model name, s, rounded to 1 ms.
     Without f, a run that failed is "failed"; with it, "similar" or "other". What a run lacks is None. `cut` says that it
-    ended early because the robot was stuck for good, `taken` from which other run it was reused.
+    ended early because the robot was stuck for good, `taken` from which other run it was reused, `took_part` which
+    models can have changed a bit of it; both only if there is something to say.
     """
     if isinstance(result, Broken):
         nothing = {"distance": None, "end_pose": None, "simulated_seconds": 0.0, "wall_seconds": 0.0}
@@ -35,7 +36,9 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
         judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
     pose = [float(value) for value in result.end_pose]
-    taken = {"taken": result.taken} if result.taken else {}
+    more: dict[str, Any] = {"taken": result.taken} if result.taken else {}
+    if result.took_part is not None:
+        more["took_part"] = sorted(result.took_part)
     return {
         "outcome": outcome,
         "failure": result.failure,
@@ -46,7 +49,7 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
         "first_sensed": _to_ms(result.first_sensed),
         "first_touched": _to_ms(result.first_touched),
         "cut": result.cut,
-        **taken,
+        **more,
     }
 
 

@@ -41,7 +41,9 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
         for about, words in notes_on(world, found.settled):
             note(journal, about, words)
         number = {name: index for index, name in enumerate(elements)}
-        journal.record("supports", pairs=[[number[upper], number[lower]] for upper, lower in found.supports])
+        pairs = [[number[upper], number[lower]] for upper, lower in found.supports]
+        ties = None if found.ties is None else [sorted(number[name] for name in tie) for tie in found.ties]
+        journal.record("supports", pairs=pairs, ties=ties)
     elif needed:
         raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
     else:

@@ -189,5 +189,6 @@ def _result(place: Place | None) -> RunResult | None:
         first_sensed=dict(test.first_sensed),
         first_touched=dict(test.first_touched),
         cut=test.cut,
+        took_part=test.took_part,
         taken=place.path.stem,
     )

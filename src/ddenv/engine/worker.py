@@ -43,18 +43,24 @@ class Limited(Protocol):
 
 
 class Settling(Protocol):
-    """A simulator that lets a world come to rest."""
+    """A simulator that lets a world come to rest.
+
+    `ties` groups the models of `elements` that go together, or not at all, without a test: without one of them another would move
+    by itself. It returns None where that is unknown: then nothing is known without a test.
+    """
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
     def settled(self) -> Settled: ...
+    def ties(self, elements: frozenset[str]) -> list[frozenset[str]] | None: ...
 
 
 @dataclass(frozen=True)
 class Start:
-    """What rests on what in the settled world, as (upper, lower), and how it settled."""
+    """What rests on what in the settled world, as (upper, lower), how it settled, and the ties of its models if they are known."""
 
     supports: list[tuple[str, str]]
     settled: Settled
+    ties: list[frozenset[str]] | None = None
 
 
 @dataclass(frozen=True)
@@ -140,7 +146,7 @@ def settle(elements: frozenset[str], slot: int) -> Start:
         if isinstance(_simulator, Exception):
             raise _simulator
         world = cast(Settling, _simulator)
-        return Start(world.supports(elements), world.settled())
+        return Start(world.supports(elements), world.settled(), world.ties(elements))
     except BaseException as error:
         _break(error, slot)
 

@@ -28,6 +28,8 @@ class RunResult:
     `first_touched` maps a model to the time (s) when the robot first touched it, `first_sensed` to the time when it first had it in
     view or touched it, which is never later. Models that it never touched or sensed are absent.
     `cut` is True if the run was cut short because the robot was stuck for good.
+    `took_part` names the models that can have changed a bit of the run; None if that is unknown. A run with the same seed in a
+    world that lacks others, as whole ties, repeats every bit of this one. Equal runs name the same models.
     `taken` names the finished run that implies this one, "" for a run that was made.
     """
 
@@ -41,6 +43,7 @@ class RunResult:
     first_sensed: dict[str, float] = field(default_factory=dict)
     first_touched: dict[str, float] = field(default_factory=dict)
     cut: bool = False
+    took_part: frozenset[str] | None = None
     taken: str = ""
 
     @property

@@ -8,13 +8,14 @@ The kinds of events with their data. Models are indices into the run's `elements
     comparing            test: it is made again, because this engine computes with something else than the earlier ones
     compared             same: whether its bits are the same; if not, the user goes on with mixed tests
     supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
-    supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled
+    supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled; ties?
+                         [[models]] or null: what goes together, or not at all, without a test, null if that is unknown
     noted                about, words: what is wrong with the whole world; a sentence about each thing, once
     test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
                          trial
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
-                         first_sensed [[model, s]], first_touched [[model, s]], cut, taken? (the run whose result was
-                         copied); trajectories beside it
+                         first_sensed [[model, s]], first_touched [[model, s]], cut, took_part? [models that can have
+                         changed a bit of it], taken? (the run whose result was copied); trajectories beside it
     test_lost            test: it was running when the engine died
     baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
     leg_started          round (number of the next one), n_partitions: a new search starts after a decision of the user

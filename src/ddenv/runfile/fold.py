@@ -116,6 +116,7 @@ def _test_finished(state: RunState, data: Data, _: float) -> Changes:
         "first_sensed": moments(state.elements, data["first_sensed"]),
         "first_touched": moments(state.elements, data["first_touched"]),
         "cut": bool(data["cut"]),
+        "took_part": None if data.get("took_part") is None else frozenset(names(state.elements, data["took_part"])),
         "taken": "taken" in data,
     }
     if values["outcome"] not in ("similar", "other"):

@@ -43,7 +43,8 @@ class RunState:
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
-    `settling`; `unsettled` says why it could not be found.
+    `settling`; `unsettled` says why it could not be found. `ties` has groups of models that
+    go together, or not at all, without a test; None if that is unknown.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -81,6 +82,7 @@ class RunState:
     certificates: tuple[Certificate, ...] = ()
     lower_bound: int = 0
     supports: Supports = ()
+    ties: tuple[tuple[str, ...], ...] | None = None
     notes: tuple[tuple[str, str], ...] = ()
     settling: bool = False
     unsettled: str = ""
@@ -333,6 +335,7 @@ class Test:
     is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says
     how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
     sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
+    `took_part` are the models that can have changed a bit of it, None if unknown.
     `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.
     """
 
@@ -351,6 +354,7 @@ class Test:
     first_sensed: tuple[tuple[str, float], ...] = ()
     first_touched: tuple[tuple[str, float], ...] = ()
     cut: bool = False
+    took_part: frozenset[str] | None = None
     without: str | None = None
     trial: int | None = None
     taken: bool = False

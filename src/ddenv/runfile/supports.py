@@ -18,6 +18,7 @@ def supports(state: RunState, data: Data, _: float) -> Changes:
         "settling": False,
         "unsettled": str(data.get("why", "")),
         "supports": tuple((upper, lower) for upper, lower in pairs),
+        "ties": None if data.get("ties") is None else tuple(names(state.elements, tie) for tie in data["ties"]),
     }
 
 

@@ -293,6 +293,10 @@ class Variants:
         """As `Template.settled`."""
         return self._within(lambda: self._whole.settled())
 
+    def ties(self, elements: frozenset[str]) -> list[frozenset[str]] | None:
+        """The models that go together, or not at all, without a test; None: unknown."""
+        return None
+
     def _within(self, work: Callable[[], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
         times = 1
