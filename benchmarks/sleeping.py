@@ -1,20 +1,29 @@
 """Drives through a field of loose boards, with and without sleep for the boards that nothing comes near.
 
     python benchmarks/sleeping.py [--boards N] [--seconds S]
+    python benchmarks/sleeping.py --compare SCENARIO [--runs N] [--seconds S]
+    python benchmarks/sleeping.py --compare WORLD --spawn X,Y,Z,YAW --goal X,Y [--runs N] [--seconds S]
 
 Each world has N boards (2 kg, 0.9 m long): every tenth lies across the robot's path, the others are piled up in threes beside it,
 two with a third across them. The first run in a world also rehearses how each pile settles alone; later runs reuse that.
+
+With `--compare` the whole world runs twice with each seed, until the robot is stuck for good: prints ends and costs
+with and without sleep.
 """
 
 import argparse
 import math
 import time
+from collections import Counter
 from pathlib import Path
 
+from ddenv.rates import wilson_interval
 from ddenv.robot.drake.template import Template
-from ddenv.world.load import SDF, validate
+from ddenv.runs.scenarios import load_parts, scenario_for_world, with_options
+from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import World
 from ddenv.world.read import parse_world, read_model
+from ddenv.world.scenario import Scenario
 
 SIZE = (0.9, 0.09, 0.04)  # m
 MASS = 2.0  # kg
@@ -27,8 +36,15 @@ GROUND = (
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--boards", type=int, default=60)
-    parser.add_argument("--seconds", type=float, default=12.0)
+    parser.add_argument("--seconds", type=float, default=12.0, help="simulated time of a run")
+    parser.add_argument("--compare", metavar="SCENARIO|WORLD")
+    parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
+    parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
+    parser.add_argument("--runs", type=int, default=20)
     arguments = parser.parse_args()
+    if arguments.compare:
+        compare(compared(arguments), arguments.runs)
+        return
     print("| boards | first run, s a simulated s | later runs, s a simulated s | without sleeping | faster |")
     print("|---|---|---|---|---|")
     for boards in sorted({10, 30, arguments.boards}):
@@ -49,6 +65,47 @@ def cost(template: Template, keep: frozenset[str]) -> float:
     started = time.perf_counter()
     result = template.run(keep, seed=1)
     return (time.perf_counter() - started) / result.simulated_seconds
+
+
+def compared(arguments: argparse.Namespace) -> Scenario:
+    """The scenario or world to compare, with the time limit asked for."""
+    bundled = SCENARIOS / f"{arguments.compare}.yaml"
+    if bundled.exists():
+        scenario = load_scenario(bundled)
+    else:
+        x, y, z, yaw = map(float, arguments.spawn.split(","))
+        goal_x, goal_y = map(float, arguments.goal.split(","))
+        scenario = scenario_for_world(Path(arguments.compare), (x, y, z, yaw), (goal_x, goal_y))
+    return with_options(scenario, timeout=arguments.seconds)
+
+
+def compare(scenario: Scenario, runs: int) -> None:
+    world, robot = load_parts(scenario)
+    template = Template(world, robot, scenario)
+    everything = frozenset(world.elements())
+    cost, ends = {True: 0.0, False: 0.0}, []
+    for seed in range(runs):
+        pair = []
+        for sleeping in (True, False):
+            template._sleeping = sleeping
+            began = time.process_time()
+            result = template.run(everything, seed, full=False)
+            cost[sleeping] += (time.process_time() - began) / result.simulated_seconds
+            pair.append((result.failure or result.outcome, result.end_position))
+        ends.append(pair)
+        print(seed, *(f"{kind} at {x:.2f} {y:.2f} {z:.2f}" for kind, (x, y, z) in pair), sep="   ", flush=True)
+    for number, label in enumerate(("asleep", "awake")):
+        kinds = Counter(pair[number][0] for pair in ends)
+        print(label, *(f"{kind}: {share(count, runs)}" for kind, count in kinds.most_common()), sep="   ")
+    epsilon = scenario.failure.epsilon
+    other = sum(one[0] != two[0] or math.dist(one[1], two[1]) > epsilon for one, two in ends)
+    print(f"end otherwise, or more than {epsilon} m apart: {share(other, runs)}")
+    print(f"CPU s a simulated s: {cost[True] / runs:.3f} asleep, {cost[False] / runs:.3f} awake")
+
+
+def share(count: int, runs: int) -> str:
+    low, high = wilson_interval(count, runs)
+    return f"{count} of {runs} ({low:.0%} to {high:.0%})"
 
 
 def template_of(world: World, seconds: float) -> Template:

@@ -64,7 +64,7 @@ class Run:
         # The motors ignore the wheels' desired positions, which come first, and follow their desired speeds.
         self._commanded = np.zeros(motors.size())
         self._motors = motors.FixValue(context.plant_context, self._commanded)
-        self._observer = Observer(built, parts.drive, context.plant_context)
+        self._observer = Observer(built, parts.drive, parts.sleep, context.plant_context)
         self._simulator = Simulator(built.diagram, context.diagram_context)
         self._recording = Recording()
         self._wall_clock = Stopwatch(LONGEST_LOOK)
@@ -171,8 +171,9 @@ class Run:
 class Observer:
     """Reads poses, and what ideal sensors would measure, from one context of the plant."""
 
-    def __init__(self, built: Built, drive: Drive, plant_context: Context) -> None:
+    def __init__(self, built: Built, drive: Drive, sleep: Sleep, plant_context: Context) -> None:
         plant, base = built.plant, built.robot.base
+        self._sleep = sleep
         self._plant = plant
         self._context = plant_context
         self._place = base.floating_positions_start()
@@ -185,7 +186,7 @@ class Observer:
 
     def look(self) -> bool:
         """Reads the state as it is now. Returns whether it is finite."""
-        self._state = self._plant.GetPositionsAndVelocities(self._context).tolist()
+        self._state = self._sleep.state().tolist()
         # A sum of finite states does not overflow: none comes near the largest float.
         return math.isfinite(sum(self._state))
 

@@ -35,18 +35,11 @@ def boards(boards_world, husky, scenario_of) -> Template:
 ALL = frozenset({"in_the_way", "lower", "upper", "crate"})
 
 
-def position(boards: Template, name: str) -> np.ndarray:
-    plant = boards._context.built.plant
-    return plant.EvalBodyPoseInWorld(
-        boards._context.plant_context, boards._context.built.moving[name].base
-    ).translation()
-
-
 def test_boards_at_rest_do_not_creep(boards):
-    boards.run(ALL, seed=1)
-    assert np.linalg.norm(position(boards, "lower") - (1, 3, 0.02)) < 0.01
-    assert np.linalg.norm(position(boards, "upper") - (1, 3, 0.06)) < 0.01
-    assert np.linalg.norm(position(boards, "crate") - (1.6, -3, 0.25)) < 0.01
+    motions = boards.run(ALL, seed=1).motions
+    for name, start in (("lower", (1, 3, 0.02)), ("upper", (1, 3, 0.06)), ("crate", (1.6, -3, 0.25))):
+        # What did not move is not recorded.
+        assert name not in motions or np.linalg.norm(motions[name][-1, 1:4] - start) < 0.01
 
 
 def test_a_board_that_is_hit_moves_and_its_motion_is_recorded(boards):
@@ -93,10 +86,6 @@ def test_a_model_of_several_links_moves_as_one(world_of, husky, scenario_of, box
     rows = template.run(frozenset({"pair"}), seed=1).motions["pair"]
     assert rows[0, 1:4] == pytest.approx([0, 3, 1])
     assert rows[-1, 3] == pytest.approx(0.1, abs=0.005)
-    upper = template._context.built.plant.GetBodyByName("b")
-    assert template._context.built.plant.EvalBodyPoseInWorld(template._context.plant_context, upper).translation()[
-        2
-    ] == pytest.approx(0.3, abs=0.005)
     assert "pair" not in template.run(frozenset(), seed=1).motions
 
 

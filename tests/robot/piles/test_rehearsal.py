@@ -17,7 +17,11 @@ ROWS = 10
 def script(*names: str) -> Script:
     links = len(names)
     return Script(
-        names, np.zeros((ROWS, 13 * links)), (Motion.still(links),) * ROWS, (np.zeros(links),) * ROWS, rests=True
+        names,
+        np.zeros((ROWS, 13 * links)),
+        (Motion.still(links),) * ROWS,
+        (np.zeros(links),) * ROWS,
+        np.ones(links, dtype=bool),
     )
 
 

@@ -56,7 +56,13 @@ def script_of(heights, speeds) -> Script:
         turns = np.tile(np.eye(3), (len(places), 1, 1))
         motions.append(Motion(places - 0.1, places + 0.1, np.array(rows[1], dtype=float), places, turns))
     still = tuple(np.zeros(len(row)) for row in speeds)
-    return Script(tuple("ab"[: len(heights[0])]), np.zeros((len(heights), 1)), tuple(motions), still, rests=True)
+    return Script(
+        tuple("ab"[: len(heights[0])]),
+        np.zeros((len(heights), 1)),
+        tuple(motions),
+        still,
+        resting=np.ones(1, dtype=bool),
+    )
 
 
 def test_what_falls_is_not_wild_and_what_is_thrown_is():

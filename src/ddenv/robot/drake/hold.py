@@ -14,6 +14,8 @@ from ddenv.robot.drake.plant import Body, Built
 
 # Held joints are kept this far inside their limits (rad or m): a joint at its limit is work for the solver.
 INSIDE = 1e-6
+# Where models wait that are not simulated: this far from each other along x, and this high, m.
+APART, HIGH = 1e3, 1e5
 
 
 class Hold:
@@ -38,6 +40,11 @@ class Hold:
         high = cast(Floats, built.plant.GetPositionUpperLimits())
         inside = np.minimum(INSIDE, (high - low) / 4)
         self._low, self._high = low + inside, high - inside
+        self.away = start.copy()
+        able = [built.robot, *(body for body in self._bodies if body.name in built.twins)]
+        for number, body in enumerate(able):
+            first = body.base.floating_positions_start()
+            self.away[first + 4 : first + 7] = APART * (number + 1), 0.0, HIGH
 
     def entries(self, bodies: Iterable[Body]) -> Integers:
         """The indices (E,) of the positions and velocities of `bodies` in the plant's state."""
@@ -50,13 +57,17 @@ class Hold:
         return np.concatenate([np.empty(0), *found]).astype(int)
 
     def begin(self, others: Sequence[Body] = ()) -> None:
-        """Puts everything where it starts, and holds all moving models and `others`."""
+        """Puts everything where it starts, but all moving models and `others` away, where it holds them."""
         self._held[:] = False
+        self.reset()
+        entries = self.entries([*self._bodies, *others])
+        self.put(entries, self.away[entries])
+        self.apply()
+
+    def reset(self) -> None:
+        """Puts everything where it starts."""
         self._state[:] = self.start
         self._plant.SetPositionsAndVelocities(self._context, to_drake(self.start))
-        entries = self.entries([*self._bodies, *others])
-        self.put(entries, self.start[entries])
-        self.apply()
 
     def put(self, entries: Integers, values: Floats) -> None:
         """Holds `entries` (E,) of the state at the positions in `values` (E,), from the next `apply` on."""

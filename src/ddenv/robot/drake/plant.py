@@ -6,23 +6,42 @@ There is no visual geometry: nobody looks at a worker.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.robot.drake.articulation import add_joint, anchored, is_fixed, spatial_inertia, transform
+from ddenv.robot.drake.articulation import add_joint, anchored, is_fixed, spatial_inertia, to_drake, transform
 from ddenv.robot.drake.drive import Drive
 from ddenv.robot.drake.shapes import drake_shapes, solid_bounds, surface, wheel_friction, world_friction
 from ddenv.world.extent import Bounds
 from ddenv.world.model import Link, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Simulation
+
+# Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
+# Drake's search for contacts slow.
+DEEP, APART = -1e5, 1e3
+
+
+@dataclass(frozen=True)
+class Part:
+    """A collision shape of a twin: of the link with the number `link`, at `pose` in that link's frame.
+
+    While it is not needed it waits at `away` in the world.
+    """
+
+    geometry: GeometryId
+    link: int
+    shape: Shape
+    pose: RigidTransform
+    away: RigidTransform
 
 
 @dataclass(frozen=True)
@@ -52,7 +71,8 @@ class Built:
     """The plant of a world.
 
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order of the world file.
+    world. `moving` are the dynamic models in the order of the world file; `twins` are the shapes that stand for those of them that
+    float where they lie at rest.
     """
 
     diagram: Diagram
@@ -61,6 +81,7 @@ class Built:
     robot: Body
     static: dict[str, tuple[GeometryId, ...]]
     moving: dict[str, Body]
+    twins: dict[str, tuple[Part, ...]]
 
 
 def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
@@ -89,13 +110,35 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         for model in world.models
         if not model.static and model.links
     }
+    twins = {
+        model.name: tuple(_twin(plant, model, wheels))
+        for model in world.models
+        if model.name in moving and _floats(model)
+    }
     filters = scene_graph.collision_filter_manager()
     for body in moving.values():
         own = GeometrySet(list(static[body.name])), GeometrySet(list(body.geometry))
         filters.Apply(CollisionFilterDeclaration().ExcludeBetween(*own))
     plant.Finalize()
     moving = {name: replace(body, own_pairs=_own_pairs(plant, scene_graph, body)) for name, body in moving.items()}
-    return Built(builder.Build(), plant, scene_graph, driver, static, moving)
+    return Built(builder.Build(), plant, scene_graph, driver, static, moving, twins)
+
+
+def _floats(model: Model) -> bool:
+    """Whether `model` can lie anywhere, and touches itself nowhere."""
+    return not model.self_collide and not any("world" in (joint.parent, joint.child) for joint in model.joints)
+
+
+def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Iterator[Part]:
+    for number, link in enumerate(model.links):
+        for collision in link.collisions:
+            # Without corners: each shape that is put somewhere costs Drake half a millisecond.
+            for shape, pose in drake_shapes(collision, corners=False):
+                name = str(plant.num_collision_geometries())
+                properties = surface(world_friction(collision.mu, wheels))
+                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
+                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
+                yield Part(geometry, number, shape, transform(link.pose.inverse() @ pose), away)
 
 
 def _own_pairs(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet
 from pydrake.systems.framework import Context
@@ -25,6 +24,10 @@ class Presence:
             built.scene_graph.GetMyMutableContextFromRoot(context)
         )
         self._robot = GeometrySet(list(built.robot.geometry))
+        # What has a twin waits away from everything while it is not simulated, and needs no filter.
+        self._free = [body.geometry for body in built.moving.values() if body.name in built.twins]
+        self._movers = _set([built.robot.geometry, *self._free])
+        self._free += [tuple(part.geometry for part in parts) for parts in built.twins.values()]
         self._removed: frozenset[str] = frozenset()
         self._kept = built.static
         self._all_kept: GeometrySet | None = None
@@ -37,21 +40,12 @@ class Presence:
         """
         gone, back = self._static(removed - self._removed), self._static(self._removed - removed)
         if gone:
-            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._robot))
+            self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(_set(gone), self._movers))
         if back:
-            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._robot))
+            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(_set(back), self._movers))
         if gone or back:
             self._removed, self._all_kept = removed, None
             self._kept = {name: geometry for name, geometry in self._built.static.items() if name not in removed}
-
-    @contextmanager
-    def without_robot(self) -> Iterator[None]:
-        """The robot touches nothing that is kept and never moves."""
-        self._filters.Apply(CollisionFilterDeclaration().ExcludeBetween(self._ground, self._robot))
-        try:
-            yield
-        finally:
-            self._filters.Apply(CollisionFilterDeclaration().AllowBetween(self._ground, self._robot))
 
     @property
     def _ground(self) -> GeometrySet:
@@ -80,9 +74,10 @@ class Presence:
     def _pairs(
         self, bodies: Sequence[Body], others: Sequence[Body], robot: bool
     ) -> Iterator[tuple[GeometrySet, GeometrySet]]:
+        bodies = [body for body in bodies if body.name not in self._built.twins]
         for number, body in enumerate(bodies):
             mine = GeometrySet(list(body.geometry))
-            yield mine, _set(other.geometry for other in (*bodies[number + 1 :], *others))
+            yield mine, _set([*self._free, *(other.geometry for other in (*bodies[number + 1 :], *others))])
             if robot:
                 yield mine, self._robot
             yield mine, self._ground_of(body)

@@ -14,6 +14,7 @@ from ddenv.robot.drake.hold import Hold
 from ddenv.robot.drake.plant import Built
 from ddenv.robot.drake.presence import Presence
 from ddenv.robot.drake.region import Region
+from ddenv.robot.drake.twins import Twins
 from ddenv.world.pose import Pose
 
 
@@ -30,6 +31,7 @@ class RunContext:
     plant_context: Context
     presence: Presence
     hold: Hold
+    twins: Twins
     clock: Clock
     floor: float
     region: Region | None
@@ -42,7 +44,17 @@ class RunContext:
         _place(built, plant_context, robot)
         start = cast(Floats, built.plant.GetPositionsAndVelocities(plant_context))
         presence = Presence(built, context)
-        return cls(built, context, plant_context, presence, Hold(built, plant_context, start), clock, floor, region)
+        return cls(
+            built,
+            context,
+            plant_context,
+            presence,
+            Hold(built, plant_context, start),
+            Twins(built, context),
+            clock,
+            floor,
+            region,
+        )
 
 
 def _place(built: Built, plant_context: Context, robot: Pose) -> None:

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
 
+NEAR = 0.1  # m; models this near to something that moves are simulated with it
 # Half the size of a box around nothing: no other box is ever near it, m.
 NOTHING = -1e6
 
@@ -106,6 +107,11 @@ class Links:
         turn = np.linalg.norm(after.turns - before.turns, axis=(1, 2)) / np.sqrt(2.0)
         return cast(Floats, (way + turn * self.reach[numbers]) / seconds)
 
+    @property
+    def models(self) -> Integers:
+        """The model (N,) of each link."""
+        return np.repeat(np.arange(len(self.first)), np.diff([*self.first, len(self.bodies)]))
+
     def of_models(self, numbers: Sequence[int] | Integers) -> list[int]:
         """The numbers of all links of the models `numbers`."""
         ends = [*self.first[1:], len(self.bodies)]
@@ -120,6 +126,38 @@ def gaps(a: Links, of_a: Motion, b: Links, of_b: Motion) -> Floats:
     apart = np.maximum(of_a.low[:, None] - of_b.high[None], of_b.low[None] - of_a.high[:, None]).max(axis=2)
     rows: Floats = np.minimum.reduceat(apart, a.first, axis=0)
     return np.minimum.reduceat(rows, b.first, axis=1)
+
+
+def tight_gaps(a: Links, of_a: Motion, b: Links, of_b: Motion, wanted: Booleans) -> Floats:
+    """As `gaps`, but between boxes along the links' own axes, which lie closer around long models that lie askew.
+
+    `wanted` (A, B) are the pairs of models that matter: the gaps of all others are infinite.
+    """
+    apart = np.full((len(a.bodies), len(b.bodies)), np.inf)
+    rows, columns = np.nonzero(wanted[a.models][:, b.models])
+    if len(rows):
+        apart[rows, columns] = _parted(
+            (a.centers[rows], a.halves[rows], of_a.places[rows], of_a.turns[rows]),
+            (b.centers[columns], b.halves[columns], of_b.places[columns], of_b.turns[columns]),
+        )
+    least: Floats = np.minimum.reduceat(apart, a.first, axis=0)
+    return np.minimum.reduceat(least, b.first, axis=1)
+
+
+def _parted(a: tuple[Floats, ...], b: tuple[Floats, ...]) -> Floats:
+    """The gap (N,) between N pairs of boxes: along the axis where it is widest, of the 15 that can part two boxes."""
+    way = np.einsum("nij,nj->ni", b[3], b[0]) + b[2] - np.einsum("nij,nj->ni", a[3], a[0]) - a[2]
+    own, others = np.swapaxes(a[3], 1, 2), np.swapaxes(b[3], 1, 2)
+    crosses = np.cross(own[:, :, None], others[:, None]).reshape(len(way), 9, 3)
+    lengths = np.linalg.norm(crosses, axis=2, keepdims=True)
+    crosses = np.where(lengths > 1e-6, crosses / np.maximum(lengths, 1e-6), 0.0)
+    axes = np.concatenate([own, others, crosses], axis=1)
+    spans = [
+        np.einsum("nkj,nj->nk", np.abs(np.einsum("nka,nja->nkj", axes, each[3].swapaxes(1, 2))), each[1])
+        for each in (a, b)
+    ]
+    gap: Floats = (np.abs(np.einsum("nka,na->nk", axes, way)) - spans[0] - spans[1]).max(axis=1)
+    return gap
 
 
 def spread(start: Booleans, joined: Booleans) -> Booleans:

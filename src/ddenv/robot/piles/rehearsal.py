@@ -9,50 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.arrays import Booleans, Floats
 from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.moving_links import Links, Motion, gaps, spread
+from ddenv.robot.piles.moving_links import NEAR, Links, Motion, gaps, spread
+from ddenv.robot.piles.script import ARRAY, Script
+from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import model_bounds
 from ddenv.world.model import Model, World
 
-NEAR = 0.1  # m; models this near to something that moves are simulated with it
-SLOW = 0.03  # m/s
-CALM = 0.3  # s; a model that was slow for this long is at rest
 # The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
 BUDGET = 200.0
 LEAST = 1.0
-# What the scripts of a world may take in a worker's memory, and an array besides its numbers, bytes.
+# What the scripts of a world may take in a worker's memory, bytes.
 MEMORY = 200e6
-ARRAY = 128
-
-
-@dataclass(frozen=True)
-class Script:
-    """How a pile moves alone, with a row for each tick of the clock.
-
-    `names` are its models in the order of the world file. `states` (T, E) are the pile's positions and velocities in the order of
-    `Hold.entries`; `motions` and `paces` (T of each; `Links.pace`, m/s) are those of its links. `rests` is True if everything is
-    at rest after the last row, or has fallen out of the world, and False if something still moves.
-    """
-
-    names: tuple[str, ...]
-    states: Floats
-    motions: tuple[Motion, ...]
-    paces: tuple[Floats, ...]
-    rests: bool
-
-    @property
-    def size(self) -> int:
-        """About how much memory it takes, bytes."""
-        arrays = [self.states, *self.paces, *(part for motion in self.motions for part in vars(motion).values())]
-        return sum(array.nbytes + ARRAY for array in arrays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +112,7 @@ class Rehearsals:
         self._bodies = tuple(context.built.moving.values())
         # The same for every run in this world, whatever is kept: removing a model must not end the script of another.
         self._longest = max(LEAST, BUDGET / max(repertoire.moving, 1))
-        context.hold.begin()
+        context.hold.reset()
         self._apart, self._to_robot = self._start_gaps()
 
     def scripts(self, kept: Sequence[Body], present: frozenset[str]) -> list[Script]:
@@ -187,9 +162,8 @@ class Rehearsals:
         found = [self._repertoire.find(_names(pile), present) for pile in piles]
         if None not in found:
             return [known for known in found if known is not None]
-        with self._context.presence.without_robot():
-            # What was found is held here: a rehearsal may push it out of the repertoire.
-            return [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
+        # What was found is held here: a rehearsal may push it out of the repertoire.
+        return [known or self._rehearse(pile, present) for pile, known in zip(piles, found, strict=True)]
 
     def _start_gaps(self) -> tuple[Floats, Floats]:
         """The gaps between all moving models (M, M), and from each to the robot (M,), at the start, m."""
@@ -221,47 +195,40 @@ class Rehearsals:
 
     def _simulate(self, pile: tuple[Body, ...]) -> Script | None:
         """Simulates the pile alone until all of it rests or its time is up; None if the simulation breaks."""
-        hold, presence = self._context.hold, self._context.presence
-        entries = hold.entries(pile)
         self._context.diagram_context.SetTime(0.0)
-        hold.begin(others=(self._context.built.robot,))
-        hold.release(entries, hold.start[entries])
-        hold.apply()
-        presence.join(pile, (), robot=False)
+        sleep = Sleep(self._context, pile, (), alone=True)
         try:
-            return self._rows(pile, entries)
+            return self._rows(pile, sleep)
         # Drake raises SystemExit when one of its own checks fails.
         except (RuntimeError, ValueError, SystemExit):
             return None
         finally:
-            presence.part(pile, ())
+            sleep.end()
 
-    def _rows(self, pile: tuple[Body, ...], entries: Integers) -> Script:
-        """Simulates what was released, and records the pile at each tick."""
-        built, plant_context, hold = self._context.built, self._context.plant_context, self._context.hold
-        links = Links.of(pile)
+    def _rows(self, pile: tuple[Body, ...], sleep: Sleep) -> Script:
+        """Records the pile at each tick."""
+        built, plant_context, entries = (
+            self._context.built,
+            self._context.plant_context,
+            self._context.hold.entries(pile),
+        )
         motors = self._plant.get_desired_state_input_port(built.robot.instance)
         motors.FixValue(plant_context, np.zeros(motors.size()))
         simulator = Simulator(built.diagram, self._context.diagram_context)
-        everything = range(len(links.bodies))
-        states = [hold.state()[entries]]
-        motions = [links.observe(self._plant, plant_context, everything)]
-        paces: list[Floats] = [np.zeros(len(everything))]
-        calm = 0.0
-        for before, tick in pairwise(self._context.clock.ticks):
-            simulator.AdvanceTo(tick.time)
-            states.append(hold.state()[entries])
-            if not np.isfinite(states[-1]).all():
+        states, motions, paces = [], [], []
+        for tick in self._context.clock.ticks:
+            if tick.step:
+                simulator.AdvanceTo(tick.time)
+            if not np.isfinite(self._context.hold.state()).all():
                 raise ValueError("not finite")
-            seconds = (tick.step - before.step) * self._context.clock.step
-            motions.append(links.observe(self._plant, plant_context, everything))
-            paces.append(links.pace(everything, motions[-2], motions[-1], seconds))
-            rests = ((paces[-1] < SLOW) | motions[-1].below(self._context.floor)).all()
-            calm = calm + seconds if rests else 0.0
-            hold.apply()
-            if calm >= CALM or tick.time >= self._longest:
+            sleep.tick(tick.step)
+            motion, pace = sleep.motion()
+            states.append(sleep.state()[entries])
+            motions.append(motion)
+            paces.append(pace)
+            if sleep.at_rest.all() or tick.time >= self._longest:
                 break
-        return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), rests=calm >= CALM)
+        return Script(_names(pile), np.array(states), tuple(motions), tuple(paces), sleep.at_rest)
 
 
 def _names(pile: Iterable[Body]) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ from pydrake.math import RotationMatrix
 from ddenv.arrays import Booleans, Floats
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.rehearsal import CALM, SLOW, Rehearsals, Script
+from ddenv.robot.piles.rehearsal import Rehearsals
+from ddenv.robot.piles.script import Script
 from ddenv.robot.settled import Settled
 from ddenv.world.pose import Pose, vector
 
@@ -31,16 +32,15 @@ def settled(context: RunContext, rehearsals: Rehearsals, present: frozenset[str]
             found["broken"].update(body.name for body in pile)
             continue
         seconds = max(seconds, ticks[len(script.states) - 1].time)
-        last = [tick.time > ticks[len(script.states) - 1].time - CALM for tick in ticks[: len(script.states)]]
-        restless, wild = _restless(script, last), _wild(script, gravity)
+        wild = _wild(script, gravity)
         gone = script.motions[-1].below(context.floor)
-        for body, links in _links(pile):
+        for (body, links), rests in zip(_links(pile), script.resting, strict=True):
             places[body.name] = tuple(_place(script, link) for link in links)
             if gone[links].all():
                 found["fallen"].add(body.name)
             elif wild[links].any():
                 found["wild"].add(body.name)
-            elif not script.rests and restless[links].any():
+            elif not rests:
                 found["restless"].add(body.name)
     in_order = [name for name in context.built.moving if name in present]
     return Settled(
@@ -62,12 +62,6 @@ def _place(script: Script, link: int) -> Pose:
     last = script.motions[-1]
     w, x, y, z = RotationMatrix(last.turns[link]).ToQuaternion().wxyz().tolist()
     return Pose(vector(last.places[link]), (w, x, y, z))
-
-
-def _restless(script: Script, last: list[bool]) -> Booleans:
-    """Which links were not at rest all the time at the end."""
-    paces = [pace for pace, late in zip(script.paces, last, strict=True) if late]
-    return cast(Booleans, np.max(paces, axis=0) >= SLOW)
 
 
 def _wild(script: Script, gravity: float) -> Booleans:

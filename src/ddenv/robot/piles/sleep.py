@@ -1,12 +1,14 @@
-"""Which moving models are simulated: those that are near the robot or near something that moves.
+"""Which moving models are simulated: those that the robot or something that moves reaches.
 
-All others are held where they are, or played back from a script (`rehearsal.py`): they cost little, do not creep, and change no
-bit of what is simulated. So removing a model that takes no part leaves every bit of a run as it was.
+All others lie where they are as part of the ground (`Twins`), or are played back from a script (`rehearsal.py`): they cost little,
+do not creep, and change no bit of what does not touch them. So removing a model that takes no part leaves every bit of a run as it
+was. A model at rest wakes by itself, not with its neighbours: by a robot that comes close, by what presses on it, by a support
+that goes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,23 +16,29 @@ import numpy as np
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.drake.plant import Body
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.moving_links import Links, Motion, gaps, spread
-from ddenv.robot.piles.rehearsal import CALM, NEAR, SLOW, Script
+from ddenv.robot.piles.loads import Loads
+from ddenv.robot.piles.moving_links import NEAR, Links, Motion, gaps, spread, tight_gaps
+from ddenv.robot.piles.script import Script
+from ddenv.robot.piles.stillness import SLOW, Stillness
 from ddenv.world.extent import Bounds
 
 NO_BOXES = np.empty((0, 3)), np.empty((0, 3))
-TOUCH = 0.02  # m; models this near to each other wake and fall asleep together
+TOUCH = 0.02  # m; models this near to each other may touch
+# A model at rest wakes when the robot is this near, m: it has a twin that the robot can touch.
+CLOSE = 0.01
+FAST = 0.1  # m/s, the mean speed of what wakes all that it reaches
+PASSED = 0.02  # m; a robot that has moved less since a model fell asleep beside it does not wake it
 
 
 @dataclass(frozen=True)
 class Situation:
     """What the rules look at: for each of M models (M,), or for each pair of them (M, M).
 
-    `near` the robot; `met` by something that moves, so that both must be simulated together; `stirred` by something near that is
-    not slow; `touching`, near enough to carry each other; `together`, moved by the same script.
+    `close` to a robot that moves; `met` by something that moves, so that both must be simulated together; `stirred` by something
+    near that is not slow; `touching`, near enough to carry each other; `together`, moved by the same script.
     """
 
-    near: Booleans
+    close: Booleans
     met: Booleans
     stirred: Booleans
     touching: Booleans
@@ -38,19 +46,28 @@ class Situation:
 
 
 class Sleep:
-    """The moving models that are kept in one run. Each is awake (simulated), played back from a script, or asleep (held).
+    """The moving models that are kept in one run. Each is awake (simulated), played back from a script, or asleep.
 
-    Models without a script start awake. With `never` they stay awake.
+    Models without a script start awake. With `never` they stay awake. With `alone` the robot waits away from everything.
+
+    Models that hang on the world, or that touch themselves, have no twin: asleep, they are held and nothing touches them. So they
+    wake and fall asleep with what is near.
     """
 
     def __init__(
-        self, context: RunContext, kept: Sequence[Body], scripts: Sequence[Script], never: bool = False
+        self,
+        context: RunContext,
+        kept: Sequence[Body],
+        scripts: Sequence[Script],
+        never: bool = False,
+        alone: bool = False,
     ) -> None:
         hold, clock = context.hold, context.clock
         self._plant = context.built.plant
         self._context = context.plant_context
         self._presence = context.presence
         self._hold = hold
+        self._twins = context.twins
         self._period = clock.period
         self._step = clock.step
         self._floor = context.floor
@@ -62,6 +79,10 @@ class Sleep:
         number_of = {body.name: number for number, body in enumerate(kept)}
         self._scripts = [(script, [number_of[name] for name in script.names]) for script in scripts]
         self._entries_of = [hold.entries([kept[number] for number in members]) for _, members in self._scripts]
+        self._has_twin: Booleans = np.array([body.name in context.built.twins for body in kept], dtype=bool)
+        # The state of what is not simulated, where it really is.
+        self._real = hold.start.copy()
+        self._away: Booleans = np.zeros(len(hold.start), dtype=bool)
         count = len(kept)
         self._awake: Booleans = np.zeros(count, dtype=bool)
         # Fallen out of the world.
@@ -72,12 +93,18 @@ class Sleep:
             self._played[members] = number
         # Models whose script has ended although they still move.
         self._due: Booleans = np.zeros(count, dtype=bool)
-        self._calm = np.zeros(count)  # s
         self._motion = Motion.still(len(self._links.bodies))
         self._pace = np.zeros(len(self._links.bodies))
+        self._stillness = Stillness(self._links)
+        self._loads = Loads(context, kept)
+        # Where the robot was (M, 12) when each model last woke, or was awake, beside it, m.
+        self._robot_was = np.full((count, 12), np.inf)
         self._tick = 0
         self._now = 0
-        hold.begin()
+        hold.begin(others=[context.built.robot] if alone else ())
+        self._twins.lift_all()
+        for entries in self._entries:
+            self._away[entries] = True
         self._wake(self._played < 0)
         hold.apply()
 
@@ -114,8 +141,22 @@ class Sleep:
             self._look(np.arange(len(self._kept)), 0.0)
         return self._motion.places, self._motion.turns
 
+    def state(self) -> Floats:
+        """The plant's positions and velocities (P + V,), with everything where it really is."""
+        return np.where(self._away, self._real, self._hold.state())
+
+    def motion(self) -> tuple[Motion, Floats]:
+        """The motion of all L links of the kept models at the last tick, and their mean speeds (L,) since the one before, m/s."""
+        return self._motion.of(range(len(self._links.bodies))), self._pace.copy()
+
+    @property
+    def at_rest(self) -> Booleans:
+        """Which of the kept models (M,) are neither simulated nor played back."""
+        return ~self._awake & (self._played < 0)
+
     def end(self) -> None:
         """Leaves the context without any moving model that something could touch."""
+        self._twins.lift_all()
         self._presence.part([body for body, awake in zip(self._kept, self._awake, strict=True) if awake], ())
 
     def _play(self) -> None:
@@ -124,13 +165,28 @@ class Sleep:
             if self._played[members[0]] != number:
                 continue
             row = min(self._tick, len(script.motions) - 1)
-            self._hold.put(self._entries_of[number], script.states[row])
             links = self._links.of_models(members)
+            self._real[self._entries_of[number]] = script.states[row]
             self._motion.put(links, script.motions[row])
             self._pace[links] = script.paces[row]
+            self._hold_still(member for member in members if not self._has_twin[member])
             if row == len(script.motions) - 1:
-                self._due[members] = not script.rests
-                self._played[members] = -1 if script.rests else number
+                self._played[members] = -1
+                self._due[members] = ~script.resting
+                self._settle(np.array(members)[script.resting])
+
+    def _settle(self, models: Integers) -> None:
+        """Makes the ground of `models` (K,), which rest from now on."""
+        for number in models:
+            if self._has_twin[number] and not self._gone[number]:
+                links = self._links.of_models([number])
+                self._twins.lay(self._kept[number], self._motion.places[links], self._motion.turns[links])
+
+    def _hold_still(self, models: Iterable[int]) -> None:
+        """Holds the bodies of `models`: away from everything, or where they are if they have no twin."""
+        for number in models:
+            entries = self._entries[number]
+            self._hold.put(entries, (self._hold.away if self._has_twin[number] else self._real)[entries])
 
     def _look(self, models: Integers, seconds: float) -> None:
         """Observes `models` (K,) in the simulation, `seconds` after the last time."""
@@ -151,25 +207,45 @@ class Sleep:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
         slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
         speed = np.maximum.reduceat(self._motion.speed, self._links.first)
-        near = self._near(speed)
-        if not (near.any() or self._awake.any() or (self._played >= 0).any()):
+        near, close = self._near(speed)
+        if not (near.any() or self._awake.any() or (self._played >= 0).any() or self._due.any()):
             return
-        now = self._situation(speed, slow, near)
-        start: Booleans = ~self._awake & (now.near | now.met | self._due)
+        now = self._situation(speed, slow, close)
+        self._stillness.look(self._motion, seconds)
+        within = self._settled & (near | now.touching[:, self._awake].any(axis=1))
+        pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
+        start: Booleans = ~self._awake & (now.close | now.met | self._due | (pressed & self._settled))
         if start.any():
-            self._wake(spread(start, now.touching | now.together) & ~self._awake & ~self._gone)
-        self._calm = np.where(self._awake & slow, self._calm + seconds, 0.0)
-        restless = self._awake & ((self._calm < CALM) | now.near | now.stirred)
-        self._lay(self._awake & ~spread(restless, now.touching))
+            # What has no twin cannot stay asleep beside what wakes.
+            joined = now.together | (now.touching & ~self._has_twin[:, None])
+            self._wake(spread(start, joined) & ~self._awake & ~self._gone)
+        rests = self._stillness.at_rest
+        restless = self._awake & (~rests | (~self._has_twin & (now.close | now.stirred)))
+        self._lay(self._awake & np.where(self._has_twin, rests, ~spread(restless, now.touching)))
+        if within.any() or start.any():
+            self._loads.note(self._settled, self._awake)
 
-    def _near(self, speed: Floats) -> Booleans:
-        """Which models could meet the robot before the tick after next; `speed` (M,) m/s."""
+    @property
+    def _settled(self) -> Booleans:
+        """Which models (M,) lie as part of the ground."""
+        return self._has_twin & self.at_rest & ~self._gone
+
+    def _near(self, speed: Floats) -> tuple[Booleans, Booleans]:
+        """Which models the robot may touch, and which it would wake before the tick after next; `speed` (M,) m/s."""
         robot = self._robot.observe(self._plant, self._context, range(len(self._robot.bodies)))
-        reach = NEAR + (speed + robot.speed.max()) * self._period
-        near: Booleans = (gaps(self._robot, robot, self._links, self._motion)[0] < reach) & ~self._gone
-        return near
+        # Its wheels turn, but do not come nearer by that.
+        margin = (speed + robot.speed[0]) * self._period
+        wanted = gaps(self._robot, robot, self._links, self._motion) < NEAR + margin
+        apart = tight_gaps(self._robot, robot, self._links, self._motion, wanted)[0]
+        place = np.concatenate([robot.places[0], (robot.turns[0] * self._robot.reach[0] / np.sqrt(2.0)).ravel()])
+        passing = np.linalg.norm(self._robot_was - place, axis=1) > PASSED
+        lies = self._settled
+        close: Booleans = (apart < np.where(lies, CLOSE, NEAR) + margin) & (passing | ~lies) & ~self._gone
+        self._robot_was[close | self._awake] = place
+        near: Booleans = (apart < TOUCH + margin) & ~self._gone
+        return near, close
 
-    def _situation(self, speed: Floats, slow: Booleans, near: Booleans) -> Situation:
+    def _situation(self, speed: Floats, slow: Booleans, close: Booleans) -> Situation:
         apart = gaps(self._links, self._motion, self._links, self._motion)
         apart[self._gone] = apart[:, self._gone] = np.inf
         np.fill_diagonal(apart, np.inf)
@@ -180,36 +256,52 @@ class Sleep:
         touching: Booleans = apart < TOUCH
         stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
         meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
-        stirred = np.asarray(stirring.any(axis=1))
-        return Situation(near, meeting.any(axis=1), stirred, touching, together)
+        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
+        met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
+        return Situation(close, met, np.asarray(stirring.any(axis=1)), touching, together)
+
+    def _struck(self, apart: Floats) -> Booleans:
+        """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
+        pace = np.maximum.reduceat(self._pace, self._links.first)
+        reach = CLOSE + pace * self._period
+        wanted = self._settled[:, None] & (self._awake & (pace > FAST)) & (apart < reach)
+        if not wanted.any():
+            return np.zeros_like(self._awake)
+        tight = tight_gaps(self._links, self._motion, self._links, self._motion, wanted)
+        struck: Booleans = np.asarray((tight < reach).any(axis=1))
+        return struck
 
     def _wake(self, models: Booleans) -> None:
         """Lets the simulator move `models` (M,), starting from where they are now."""
         if not models.any():
             return
-        state = self._hold.state()
-        for number, (script, members) in enumerate(self._scripts):
+        for index in np.flatnonzero(models):
+            self._hold.release(self._entries[index], self._real[self._entries[index]])
+            self._away[self._entries[index]] = False
+        for number, (_, members) in enumerate(self._scripts):
             if models[members].any() and self._played[members[0]] == number:
-                state[self._entries_of[number]] = script.states[self._tick]
                 # Models that the script still moves but that are not woken have fallen out of the world.
                 self._played[members] = -1
-        for index in np.flatnonzero(models):
-            self._hold.release(self._entries[index], state[self._entries[index]])
+        self._twins.lift(self._bodies(models))
         self._presence.join(self._bodies(models), self._bodies(self._awake))
         self._awake |= models
         self._due &= ~models
-        self._calm[models] = 0
+        self._stillness.restart(models, self._motion)
 
     def _lay(self, models: Booleans) -> None:
         """Holds `models` (M,), which are awake, where they are now."""
         if not models.any():
             return
-        state = self._hold.state()
-        for number in np.flatnonzero(models):
-            self._hold.put(self._entries[number], state[self._entries[number]])
+        numbers = np.flatnonzero(models)
+        entries = np.concatenate([self._entries[number] for number in numbers])
+        self._real[entries] = self._hold.state()[entries]
+        self._real[entries[entries >= self._plant.num_positions()]] = 0.0
+        self._away[entries] = True
         self._awake &= ~models
+        self._hold_still(numbers)
+        self._settle(numbers)
         self._presence.part(self._bodies(models), self._bodies(self._awake))
-        links = self._links.of_models(np.flatnonzero(models))
+        links = self._links.of_models(numbers)
         self._motion.speed[links] = self._pace[links] = 0.0
 
     def _bodies(self, models: Booleans) -> list[Body]:

@@ -14,7 +14,9 @@ import numpy as np
 from pydrake.geometry import QueryObject
 
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.rehearsal import CALM, Rehearsals, Script
+from ddenv.robot.piles.rehearsal import Rehearsals
+from ddenv.robot.piles.script import Script
+from ddenv.robot.piles.stillness import CALM
 
 # A contact carries where its normal points at least this far up (the cosine of 60 degrees): boards lean on steep edges.
 UPWARDS = 0.5
@@ -61,9 +63,9 @@ def _contacts(context: RunContext, rehearsals: Rehearsals, present: frozenset[st
     try:
         for back in np.linspace(0.0, CALM, LOOKS):
             for pile, script in settled:
+                entries = hold.entries(pile)
                 # A pile whose simulation breaks is taken as it starts.
-                if script is not None:
-                    hold.put(hold.entries(pile), script.states[_row(context, script, back)])
+                hold.put(entries, hold.start[entries] if script is None else script.states[_row(context, script, back)])
             hold.apply()
             found.update(_carried(context))
     finally:
