@@ -202,6 +202,21 @@ class Reduction:
         shown="option",
         cost="On saves the rest of a test that is stuck.",
     )
+    slice: bool = setting(
+        True,
+        "leave out what took no part in a run without a test, and make no test whose result follows from another one",
+        printed=False,
+        shown="option",
+        cost="On saves most tests; off simulates all of them.",
+    )
+    audit: int = setting(
+        20,
+        "one in so many tests whose result follows from another one is simulated all the same, and compared bit for bit",
+        least=1,
+        most=1_000_000,
+        shown="option",
+        cost="Lower is surer, and simulates more.",
+    )
     growth: Literal["paper", "steady"] = setting(
         "steady",
         "when n grows: after every round (paper), or only after a round without success (steady)",

@@ -66,6 +66,8 @@ class FakePool:
         self.supports: list[tuple[str, str]] | Broken = []
         self.ties: list[frozenset[str]] | None = None
         self.took_part: TookPart = lambda *_: None
+        # Where the robot is to the left of its way, m: runs that end alike may still differ.
+        self.aside: Callable[[frozenset[str], int], float] = lambda *_: 0.0
         self.settling = 0
         self.settled = Settled()
         self.limits: list[float | None] = []
@@ -96,6 +98,7 @@ class FakePool:
             return [(test, Broken("error", "it broke"))]
         outcome, x = ENDS[shown]
         made = result(outcome, seed, x, bool(cut))
+        made.trajectory[1, 2] = self.aside(keep, seed)
         return [(test, replace(made, took_part=self.took_part(keep, seed)))]
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:

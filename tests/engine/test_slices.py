@@ -1,17 +1,44 @@
-"""Slices: what took part in a run is recorded, and a test that it implies is not made."""
+"""Slices: a test that a finished run implies is not made, what took no part goes without one, and audits find what is wrong."""
+
+import tempfile
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.participation import MODELS, Participation, sliced_run
+from tests.engine.test_certify import _killed, _resumed
 from tests.engine.test_driver import needs
+from tests.tiers import examples
+
+NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
+TIES = st.lists(st.frozensets(st.sampled_from(MODELS), min_size=2, max_size=3), max_size=3).map(tuple)
+SIMULATORS = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES)
+FLAKY = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES, tenths=st.sampled_from([6, 9]))
 
 
 def state_of(path):
     with RunFile(path) as file:
         return fold(file.events())
+
+
+def worlds_of(path):
+    """The models in the world of each test."""
+    from ddenv.engine.journal import Journal
+
+    with RunFile(path) as file:
+        journal = Journal(file)
+        return [(test, journal.keep_of_test(test.id)) for test in journal.state.tests]
+
+
+def journey(state):
+    """The environments of a run in their order, and how it ended."""
+    return [(node.how, node.environment) for node in state.nodes], state.minimal, state.reason
 
 
 def test_who_took_part_is_recorded_with_each_test(tmp_path):
@@ -27,3 +54,68 @@ def test_an_old_run_file_has_no_slices():
     state = state_of(DATA / "format4.ddenv")
     assert state.ties is None
     assert state.tests and all(test.took_part is None for test in state.tests)
+
+
+@given(made_by=SIMULATORS, accept=st.sampled_from(["first", "kept"]), seed=st.integers(0, 9))
+@examples(1)
+def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, accept, seed):
+    with tempfile.TemporaryDirectory() as folder:
+        ends = []
+        for wanted in (True, False):
+            path, pool = sliced_run(Path(folder), slice=wanted, accept_rate=accept), made_by.pool(seed=seed)
+            state = drive(path, pool)
+            for test, keep in worlds_of(path):
+                outcome, met, _ = made_by.run(keep, test.seed)
+                assert test.outcome == outcome
+                assert test.took_part == met
+            ends.append((state.environment, state.minimal))
+            assert state.made == len(pool.made)
+            assert state.refuted is None
+            assert wanted or not (state.implied or state.audits)
+        assert ends[0] == ends[1] == (tuple(name for name in MODELS if name in made_by.needed), True)
+
+
+@given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), algorithm=st.sampled_from(["ddenv", "splitting"]))
+@examples(0.6)
+def test_workers_change_nothing(made_by, jobs, seed, algorithm):
+    with tempfile.TemporaryDirectory() as folder:
+        alone, together = (
+            drive(sliced_run(Path(folder), accept_rate="kept", algorithm=algorithm), made_by.pool(workers, seed))
+            for workers in (1, jobs)
+        )
+    assert journey(together) == journey(alone)
+
+
+@given(
+    made_by=FLAKY,
+    moments=st.lists(st.integers(1, 60), min_size=1, max_size=6),
+    jobs=st.integers(1, 3),
+    accept=st.sampled_from(["first", "kept"]),
+)
+@examples(0.6)
+def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice(made_by, moments, jobs, accept):
+    with tempfile.TemporaryDirectory() as folder:
+        undisturbed = drive(sliced_run(Path(folder), accept_rate=accept), made_by.pool())
+        path = sliced_run(Path(folder), accept_rate=accept)
+        _killed(path, made_by.pool(jobs), moments)
+        state = _resumed(path, made_by.pool(jobs))
+        assert journey(state) == journey(undisturbed)
+        finished = [(keep, test.run) for test, keep in worlds_of(path) if test.is_finished]
+        assert len(finished) == len(set(finished))
+
+
+@given(made_by=SIMULATORS, jobs=st.integers(1, 3), data=st.data())
+@examples(0.6)
+def test_a_simulator_that_does_not_say_all_is_found_out(made_by, jobs, data):
+    """Whatever it hides, the run ends as if it had never been asked."""
+    liar = Participation(made_by.salt, made_by.needed, made_by.ties, hidden=frozenset(made_by.needed))
+    with tempfile.TemporaryDirectory() as folder:
+        path = sliced_run(Path(folder), accept_rate=data.draw(st.sampled_from(["first", "kept"])), audit=1)
+        state = drive(path, liar.pool(jobs))
+        assert set(state.environment) == set(made_by.needed)
+        assert state.minimal
+        if state.refuted is not None:
+            assert not state.implied
+            assert all(
+                test.outcome == made_by.run(keep, test.seed)[0] for test, keep in worlds_of(path) if test.is_finished
+            )

@@ -120,7 +120,7 @@ def test_a_file_from_before_the_first_release_is_refused(path, version):
     with sqlite3.connect(path) as database:
         database.execute(f"PRAGMA user_version = {version}")
     with pytest.raises(
-        UserError, match=rf"before its first release \(format {version}\); this one reads formats 4 to 5"
+        UserError, match=rf"before its first release \(format {version}\); this one reads formats 4 to 6"
     ):
         RunFile(path)
 

@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from ddenv.engine.auditing import audit_is_due, compare
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.noting import give_up_if_late, note_slow
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import SharingPool
+from ddenv.engine.subjects import Asked, Keep
 from ddenv.engine.wall_limit import wall_limit
 from ddenv.engine.worker import Start
 from ddenv.errors import UserError
@@ -25,7 +27,7 @@ from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import BROKEN, Trial
-from ddenv.runfile.store import ROBOT
+from ddenv.runfile.store import ROBOT, Motions
 from ddenv.world.scenario import FailureSpec
 
 Hand = tuple[Keep, int, int]
@@ -102,20 +104,46 @@ class Bench:
         full = self._journal.is_full(phase)
         self._meanwhile = meanwhile or iter(())
         while tests := wanted():
-            self._start([test for test in tests if (*test[:2], full) not in self._started], phase, round)
-            self.tick()
+            due = [Asked(phase, keep, run, round, candidate) for keep, run, candidate in tests]
+            if self._start([one for one in due if (one.keep, one.run, full) not in self._started], full):
+                # Other tests may be wanted now.
+                self._look(0.0)
+            else:
+                self.tick()
 
-    def _start(self, tests: Wanted, phase: str, round: int | None) -> None:
+    def _start(self, tests: list[Asked], full: bool) -> bool:
+        """Starts tests on free workers. Returns whether one was implied, and so needs none."""
         # A step is one test, the next in order; nothing runs ahead.
         free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
-        full = self._journal.is_full(phase)
-        for keep, run, candidate in tests[:free]:
-            if not self._control.may_start() or self._is_spent():
-                return
-            test = self._journal.start_test(phase, keep, run, round, candidate)
-            self._started.add((keep, run, full))
-            self._submit(test, keep, full)
+        for asked in tests[:free]:
+            if not self._control.may_start():
+                return False
+            implied = self._make(asked, full)
+            if implied is None:
+                return False
             self._control.started()
+            if implied:
+                return True
+        return False
+
+    def _make(self, asked: Asked, full: bool) -> bool | None:
+        """Starts a test, or writes its result if another one implies it; returns whether that is so, None if the budget is used up.
+
+        Raises Stopped if it is used up and no test runs.
+        """
+        journal = self._journal
+        source = journal.implying(asked.keep, asked.run, full)
+        if source is not None and not audit_is_due(journal.state):
+            journal.imply(asked, source)
+            return True
+        if self._is_spent():
+            return None
+        test = journal.start_test(asked, source)
+        self._started.add((asked.keep, asked.run, full))
+        # To be compared, it ends as the other one did.
+        full = full or (source is not None and journal.is_full(journal.state.tests[source - 1].phase))
+        self._pool.submit(test, asked.keep, journal.state.tests[test - 1].seed, full, wall_limit(journal.state))
+        return False
 
     def settle(self, elements: Keep, late: Callable[[], None]) -> Start | Broken:
         """How the world settles; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
@@ -139,22 +167,15 @@ class Bench:
         if not self._journal.state.failures or not open_trials(self._journal):
             return
         full = self._journal.is_full("hand")
-        wanted = [one for one in judge_trials(self._journal) if (*one[:2], full) not in self._started]
-        for keep, run, trial in wanted[: self._pool.idle]:
-            if self._is_spent():
+        wanted = [Asked("hand", keep, run, trial=trial) for keep, run, trial in judge_trials(self._journal)]
+        for asked in [one for one in wanted if (one.keep, one.run, full) not in self._started][: self._pool.idle]:
+            if self._make(asked, full) is None:
                 return
-            test = self._journal.start_test("hand", keep, run, trial=trial)
-            self._started.add((keep, run, full))
-            self._submit(test, keep, full)
-
-    def _submit(self, test: int, keep: Keep, full: bool) -> None:
-        state = self._journal.state
-        self._pool.submit(test, keep, state.tests[test - 1].seed, full, wall_limit(state))
 
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""
         state = self._journal.state
-        if state.budget is None or state.tests_done + self._pool.busy < state.budget:
+        if state.budget is None or state.made + self._pool.busy < state.budget:
             return False
         if self._pool.busy == 0:
             raise Stopped(f"the budget of {state.budget} tests is used up")
@@ -165,16 +186,20 @@ class Bench:
 
         Does not return if the user has changed something: the old search must not use a test that ends now.
         """
-        self._look_around()
+        self._look(WAIT)
+
+    def _look(self, wait: float) -> None:
+        """As `tick`; waits at most `wait` s for a test to finish."""
+        self._look_around(wait)
         while self._control.holds:
             if self._control.may_search:
                 raise Steered
-            self._look_around()
+            self._look_around(WAIT)
 
-    def _look_around(self) -> None:
+    def _look_around(self, wait: float) -> None:
         self._control.poll()
         thinks = self._pool.busy > 0 and next(self._meanwhile, self) is not self
-        finished = self._pool.finished(0.0 if thinks else WAIT)
+        finished = self._pool.finished(0.0 if thinks else wait)
         for test, result in finished:
             self._record(test, result)
             self._give_up_if_all_break(result)
@@ -183,7 +208,7 @@ class Bench:
         if self._pool.busy == 0:
             self._control.settled()
             if not finished:
-                time.sleep(WAIT)
+                time.sleep(wait)
         if time.monotonic() >= self._next_live:
             self._next_live = time.monotonic() + LIVE_PERIOD
             self._show_live()
@@ -207,7 +232,7 @@ class Bench:
         self._live_shown = bool(live)
 
     def _record(self, test: int, result: RunResult | Broken) -> None:
-        motions = {}
+        motions: Motions = {}
         if isinstance(result, RunResult):
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
@@ -220,6 +245,9 @@ class Bench:
         if "took_part" in data:
             noticed["took_part"] = sorted(self._numbers[name] for name in data["took_part"] if name in self._numbers)
         self._journal.record("test_finished", motions, test=test, **data | noticed)
+        audits = self._journal.state.tests[test - 1].audits
+        if audits is not None and isinstance(result, RunResult):
+            compare(self._journal, test, result)
 
     def _counted(self) -> tuple[Failure, ...]:
         """f, and the other failures that the user accepted."""

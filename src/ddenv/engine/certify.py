@@ -9,7 +9,8 @@ from typing import Any
 
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Stopped
-from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.journal import Journal
+from ddenv.engine.subjects import Keep
 from ddenv.rates import wilson_interval
 from ddenv.reduction.certificate import Claim, Procedure, Terms, error_of, falls, good_enough, keeps, settle
 from ddenv.reduction.stepping_back import groups_again, last_good
@@ -96,8 +97,14 @@ class Certifier:
         return settle(procedure, lambda keep, run: self.journal.shown(keep, first + run, full=True), self.jobs)
 
     def _wanted(self) -> Wanted:
-        wanted = dict.fromkeys(test for _, claim in self._claims() for test in claim.wanted)
+        wanted = dict.fromkeys(test for _, claim in self._claims() for test in self._in_order(claim))
         return [(keep, self._certificate.first_run + run, None) for keep, run in wanted]
+
+    def _in_order(self, claim: Claim) -> Sequence[tuple[Keep, int]]:
+        """Of each pair the larger world first: its run may imply the other one."""
+        if self.journal.known.ties(self.journal.state) is None:
+            return claim.wanted
+        return sorted(claim.wanted, key=lambda test: (test[1], -len(test[0])))
 
     def _tests(self, claims: Iterable[Claim]) -> list[int]:
         """The tests that claims rest on: without those that only ran ahead of time."""

@@ -14,10 +14,12 @@ from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import CHANGED, Certifier
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.journal import Journal, Keep, other_way
+from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
+from ddenv.engine.slicing import slice_environment
+from ddenv.engine.subjects import Keep, other_way
 from ddenv.engine.wall_limit import limit_after
 from ddenv.errors import UserError
 from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
@@ -82,6 +84,7 @@ class Driver:
                 self._bench.tick()
         while True:
             try:
+                slice_environment(self._journal)
                 self._search()
                 return
             except Steered:
@@ -238,6 +241,9 @@ class Driver:
         if not self._journal.has("round_finished", number):
             self._journal.record_once("round_finished", number)
             self._control.round_finished()
+        if winner is not None and self._journal.current.number == number and slice_environment(self._journal):
+            # The search goes on in the slice.
+            raise Steered
         return None if winner is None else round.candidates[winner]
 
     def _announce(self, number: int, round: Round) -> None:

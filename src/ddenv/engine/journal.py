@@ -6,19 +6,29 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from ddenv.errors import UserError
+from ddenv.engine.known_tests import KnownTests
+from ddenv.engine.subjects import Asked, Keep, current_round, keep_of, keep_of_candidate
 from ddenv.reduction.acceptance import Acceptance, estimated_rate
 from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, Round, RunState, Test
-from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.store import ROBOT, Event, Motions, RunFile
 from ddenv.runfile.supports import stack_with
 
-Keep = frozenset[str]
 # After these events the search starts again from what the user left.
-STEERED = ("pinned", "unpinned", "adopted", "accepted_other", "went_back", "rate_lost", "left_out")
+STEERED = (
+    "pinned",
+    "unpinned",
+    "adopted",
+    "accepted_other",
+    "went_back",
+    "rate_lost",
+    "left_out",
+    "sliced",
+    "slices_refuted",
+)
 
 
 @dataclass(frozen=True)
@@ -38,14 +48,6 @@ class Leg:
     rule: Acceptance
     tests: tuple[int, ...] = ()
     again: tuple[tuple[str, ...], ...] = ()
-
-
-def other_way(round: int) -> str:
-    """The error if a resumed run would not repeat the rounds that it made before."""
-    return (
-        f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
-        "package of schemas; continue with those, or start a new run"
-    )
 
 
 class Journal:
@@ -77,6 +79,7 @@ class Journal:
         self._seen: set[tuple[str, int | None, int | None]] = set()
         self._broke: dict[tuple[Keep, int, bool], int] = {}
         self._rested_on: set[int] = set()
+        self.known = KnownTests()
         self._steps_back = 0
         self._again: tuple[tuple[str, ...], ...] = ()
         # Of thousands of models, a set that is made anew takes a while to be found in the ledger.
@@ -84,7 +87,7 @@ class Journal:
         for event in file.events():
             self._take(event)
 
-    def record(self, kind: str, motions: dict[str, bytes] | None = None, **data: Any) -> None:
+    def record(self, kind: str, motions: Motions | None = None, **data: Any) -> None:
         """Writes an event."""
         if self.command is not None:
             data["command"] = self.command
@@ -172,6 +175,11 @@ class Journal:
         """How often the search went back because what was left had lost the rate."""
         return self._steps_back
 
+    @property
+    def rested_on(self) -> tuple[int, ...]:
+        """The tests that decisions rest on, without those that only ran ahead of time."""
+        return tuple(sorted(self._rested_on))
+
     def keep_of_test(self, test: int) -> Keep:
         """The models in a test's world."""
         return self._keeps[test]
@@ -206,40 +214,23 @@ class Journal:
         """Whether tests of this phase run to the end even if the robot is stuck for good."""
         return phase not in ("round", "hand") or not self.state.scenario["reduction"].get("early_stop", False)
 
-    def start_test(
-        self,
-        phase: str,
-        keep: Keep,
-        run: int,
-        round: int | None = None,
-        candidate: int | None = None,
-        trial: int | None = None,
-    ) -> int:
-        """Writes that a test starts; returns its id. Its seed is base + run: all candidates meet the same noise.
+    def start_test(self, asked: Asked, audits: int | None = None) -> int:
+        """Writes that a test starts, although the test `audits` implies it; returns its id. Raises as `Asked.place`."""
+        return self._begin("test_started", asked, None, {} if audits is None else {"audits": audits})
 
-        Raises UserError for a test of a round that is over, so that the file stays valid.
-        """
-        if round is not None and round != self.current.number:
-            raise UserError(other_way(round))
-        test = len(self.state.tests) + 1
-        self._keeps[test] = keep
-        seed = self.state.scenario["reduction"]["seed"] + run
-        place: dict[str, Any] = {"round": round, "candidate": candidate}
-        if phase == "certify":
-            place |= self._subject(keep)
-        if phase == "hand":
-            place["trial"] = trial
-        self.record("test_started", test=test, phase=phase, **place, run=run, seed=seed)
+    def imply(self, asked: Asked, source: int) -> int:
+        """Writes the result of a test that the finished test `source` implies; returns its id. Raises as `Asked.place`."""
+        return self._begin("implied", asked, {ROBOT: source}, {"by": source})
+
+    def _begin(self, kind: str, asked: Asked, motions: Motions | None, more: dict[str, int]) -> int:
+        place, test = asked.place(self.state), len(self.state.tests) + 1
+        self._keeps[test] = asked.keep
+        self.record(kind, motions, test=test, **place, **more)
         return test
 
-    def _subject(self, keep: Keep) -> dict[str, int]:
-        """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
-        state = self.state
-        path = [node.number for node in state.path if frozenset(node.environment) == keep]
-        if path:
-            return {"node": path[-1]}
-        gone = next(name for name in state.environment if name not in keep)
-        return {"node": state.node, "without": state.elements.index(gone)}
+    def implying(self, keep: Keep, run: int, full: bool) -> int | None:
+        """The finished test that implies this one, if there is one."""
+        return self.known.implying(self.state, keep, run, full)
 
     def without(self, name: str) -> Keep:
         """The environment without a model, or without all of its stack."""
@@ -255,9 +246,7 @@ class Journal:
     @property
     def current(self) -> Round:
         """The current round. Raises UserError before the first round."""
-        if self.state.round is None:
-            raise UserError("damaged run file: there is no round yet")
-        return self.state.round
+        return current_round(self.state)
 
     def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
         """Whether an event of a round or a candidate is already written."""
@@ -296,8 +285,17 @@ class Journal:
         if again and self.state.baseline is not None:
             self.steered = True
 
-    def _certificate_finished(self, data: dict[str, Any]) -> None:
+    def _rests(self, data: dict[str, Any]) -> None:
+        """Decisions rest on these tests, whatever the number of workers."""
         self._rested_on.update(data.get("tests", ()))
+
+    def _baseline_finished(self, _: dict[str, Any]) -> None:
+        self._rested_on.update(test.id for test in self.state.tests if test.phase == "baseline")
+
+    def _slices_refuted(self, _: dict[str, Any]) -> None:
+        """What was implied is wanted again."""
+        tests = self.state.tests
+        self.ledger = {key: test for key, test in self.ledger.items() if tests[test - 1].implied_by is None}
 
     def _rate_lost(self, data: dict[str, Any]) -> None:
         """What has lost the rate, and all parts of it, are not taken again."""
@@ -308,23 +306,27 @@ class Journal:
         self.refused.lose(frozenset(self.state.nodes[data["lost"]].environment))
 
     def _test_started(self, data: dict[str, Any]) -> None:
-        self._keeps.setdefault(data["test"], self._keep_of_test(self.state.tests[-1]))
+        self._keeps.setdefault(data["test"], keep_of(self.state, self.state.tests[-1]))
 
     def _test_finished(self, data: dict[str, Any]) -> None:
         self._enter(self.state.tests[data["test"] - 1])
+
+    def _implied(self, data: dict[str, Any]) -> None:
+        self._test_started(data)
+        self._test_finished(data)
 
     def _decided(self, data: dict[str, Any]) -> None:
         round, candidate = data["round"], data["candidate"]
         self.decisions[round, candidate] = data["decision"]
         if data["decision"] == "reject":
-            self._refuse(self._keep_of(candidate), "rejected", round)
+            self._refuse(keep_of_candidate(self.state, candidate), "rejected", round)
 
     def _vetoed(self, data: dict[str, Any]) -> None:
-        self._refuse(self._keep_of(data["candidate"]), data["verdict"], data.get("round"))
+        self._refuse(keep_of_candidate(self.state, data["candidate"]), data["verdict"], data.get("round"))
 
     def _unvetoed(self, data: dict[str, Any]) -> None:
         """A refusal in an earlier round has blocked candidates since, so the search starts again."""
-        keep, round = self._keep_of(data["candidate"]), data["round"]
+        keep, round = keep_of_candidate(self.state, data["candidate"]), data["round"]
         self.refused.pop(keep, None)
         self.decisions.pop((round, data["candidate"]), None)
         # A rejected candidate was judged, and is judged again.
@@ -359,39 +361,30 @@ class Journal:
             self._broke[keep, test.run, full] = broken = self._broke.get((keep, test.run, full), 0) + 1
             if broken < 2:
                 return
-        if test.phase not in FRESH:
-            self.ledger[keep, test.run, False] = test.id
-        if not test.cut:
-            self.ledger[keep, test.run, True] = test.id
-
-    def _keep_of_test(self, test: Test) -> Keep:
-        """The models of a test that has just started."""
-        if test.phase == "baseline":
-            return frozenset(self.state.elements)
-        if test.phase in FRESH:
-            environment = self.state.nodes[test.node].environment
-            return frozenset(environment) - frozenset(stack_with(self.state, environment, test.without))
-        if test.phase == "hand":
-            return frozenset(self.state.trials[(test.trial or 0) - 1].models)
-        return self._keep_of(test.candidate or 0)
-
-    def _keep_of(self, candidate: int) -> Keep:
-        """The models of a candidate of the current round."""
-        return frozenset(self.current.candidates[candidate].models)
+        for full, holds in ((False, test.phase not in FRESH), (True, not test.cut)):
+            if holds:
+                self.ledger[keep, test.run, full] = test.id
+                self.known.enter(test, keep, full)
 
 
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "engine_started": Journal._engine_started,
-    "certificate_finished": Journal._certificate_finished,
+    "baseline_finished": Journal._baseline_finished,
+    "candidate_judged": Journal._rests,
+    "trial_judged": Journal._rests,
+    "certificate_finished": Journal._rests,
     "rate_lost": Journal._rate_lost,
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,
     "adopted": Journal._arrived,
     "left_out": Journal._arrived,
+    "sliced": Journal._arrived,
+    "slices_refuted": Journal._slices_refuted,
     "accepted_other": Journal._arrived,
     "leg_started": Journal._leg_started,
     "test_started": Journal._test_started,
     "test_finished": Journal._test_finished,
+    "implied": Journal._implied,
     "decided": Journal._decided,
     "vetoed": Journal._vetoed,
     "unvetoed": Journal._unvetoed,

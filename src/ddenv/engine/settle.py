@@ -26,6 +26,8 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     Raises UserError if stacks are to be kept and it cannot be known.
     """
     moves = any(model.links and not model.static for model in world.models)
+    if not moves and scenario.reduction.slice and journal.state.ties is None:
+        journal.record("still")
     if journal.has("supports") or not moves:
         return
     needed = scenario.reduction.keep_supports

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from ddenv import processor
-from ddenv.engine.journal import Journal, Keep
+from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.subjects import Keep
 from ddenv.engine.worker import Start
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult

@@ -10,12 +10,17 @@ The kinds of events with their data. Models are indices into the run's `elements
     supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
     supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled; ties?
                          [[models]] or null: what goes together, or not at all, without a test, null if that is unknown
+    still                nothing in the world moves by itself: there are no ties
     noted                about, words: what is wrong with the whole world; a sentence about each thing, once
     test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
-                         trial
+                         trial; audits? (the test that implies it: it is simulated to be compared)
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]], cut, took_part? [models that can have
                          changed a bit of it], taken? (the run whose result was copied); trajectories beside it
+    implied              as test_started, and by (a test): the result is that of this test, which has its trajectories
+    sliced               environment [..], tests [ids] of which what took part is left, evidence_test
+    slices_refuted       test, by, node: this audit does not repeat the test by, which implies it; slices are no longer used,
+                         implied tests are void, and the run goes back to node
     test_lost            test: it was running when the engine died
     baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
     leg_started          round (number of the next one), n_partitions: a new search starts after a decision of the user
@@ -143,7 +148,7 @@ def as_it_was(scenario: Data) -> Data:
     """A scenario of a run file, with what older versions of ddenv did without a setting for it."""
     reduction, failure = scenario.get("reduction"), scenario.get("failure")
     if isinstance(reduction, dict):
-        before = {"accept_rate": "first", "keep_rate": 0.8, "early_stop": False}
+        before = {"accept_rate": "first", "keep_rate": 0.8, "early_stop": False, "slice": False}
         if isinstance(failure, dict) and "early_stop" in failure:
             before["early_stop"] = failure["early_stop"]
             scenario = {**scenario, "failure": {key: value for key, value in failure.items() if key != "early_stop"}}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, supports
+from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
@@ -86,13 +86,15 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
         seed=int(data["seed"]),
         without=None if without is None else names(state.elements, [without])[0],
         trial=data.get("trial"),
+        audits=data.get("audits"),
         node=data.get("node", state.node),
     )
     # Raises IndexError if there is none.
     here(state, test.node)
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
-    changes = {"tests": state.tests.added(test), **counts(state, None, test)}
+    state = state.changed(audits=state.audits + (test.audits is not None))
+    changes = {"audits": state.audits, "tests": state.tests.added(test), **counts(state, None, test)}
     if test.trial is not None:
         return changes | {"trials": _with_test_of_trial(state, test)}
     if round is None:
@@ -100,7 +102,7 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
     if round != _current(state).number:
         raise ValueError(round)
     one = _tried(state, candidate)
-    changes = {"tests": state.tests.added(replace(test, tried=one)), **counts(state, None, test)}
+    changes["tests"] = state.tests.added(replace(test, tried=one))
     return changes | _with_candidate(state, replace(one, tests=(*one.tests, test.id)))
 
 
@@ -119,15 +121,29 @@ def _test_finished(state: RunState, data: Data, _: float) -> Changes:
         "took_part": None if data.get("took_part") is None else frozenset(names(state.elements, data["took_part"])),
         "taken": "taken" in data,
     }
+    return _ended_as(state, int(data["test"]), values)
+
+
+def _ended_as(state: RunState, test: int, values: Data) -> Changes:
     if values["outcome"] not in ("similar", "other"):
         # Few tests fail: the rounds of all others need not be kept.
         values["tried"] = None
-    changes = with_test(state, int(data["test"]), values)
-    return changes | fold_rates.noted(state, changes["tests"][int(data["test"]) - 1])
+    changes = with_test(state, test, values)
+    return changes | fold_rates.noted(state, changes["tests"][test - 1])
+
+
+def _implied(state: RunState, data: Data, at: float) -> Changes:
+    """A test that starts and ends at once."""
+    started = _test_started(state, data, at)
+    now = state.changed(**started)
+    ended = _ended_as(now, len(now.tests), fold_slices.result_of(now, int(data["by"])))
+    return {**started, **ended, "implied": state.implied + 1}
 
 
 def _test_lost(state: RunState, data: Data, _: float) -> Changes:
-    return with_test(state, int(data["test"]), {"outcome": "lost"})
+    changes = with_test(state, int(data["test"]), {"outcome": "lost"})
+    lost = state.tests[int(data["test"]) - 1]
+    return changes | {"audits": state.audits - (lost.audits is not None)}
 
 
 def _round_started(state: RunState, data: Data, _: float) -> Changes:
@@ -200,10 +216,6 @@ def _reduced(state: RunState, data: Data, at: float) -> Changes:
 def _round_finished(state: RunState, _: Data, __: float) -> Changes:
     round = _current(state)
     return {"round": replace(round, done=True), "rounds_done": round.number}
-
-
-def _confirm_started(_: RunState, __: Data, ___: float) -> Changes:
-    return {"confirming": True}
 
 
 def _paused(state: RunState, _: Data, __: float) -> Changes:
@@ -280,6 +292,10 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "noted": _noted,
     "test_started": _test_started,
     "test_finished": _test_finished,
+    "implied": _implied,
+    "still": lambda *_: {"ties": ()},
+    "sliced": fold_slices.sliced,
+    "slices_refuted": fold_slices.slices_refuted,
     "test_lost": _test_lost,
     "baseline_finished": fold_baseline.baseline_finished,
     "round_started": _round_started,
@@ -289,7 +305,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "decided": _decided,
     "reduced": _reduced,
     "round_finished": _round_finished,
-    "confirm_started": _confirm_started,
+    "confirm_started": lambda *_: {"confirming": True},
     "certificate_started": fold_certificates.certificate_started,
     "certificate_finished": fold_certificates.certificate_finished,
     "rate_lost": fold_certificates.rate_lost,

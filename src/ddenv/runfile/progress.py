@@ -1,8 +1,39 @@
-"""What a run has found so far, as plain frozen data: its certificates, how many tests are left, and its sizes."""
+"""What a run has found so far, as plain frozen data: its environments, certificates, how many tests are left, and its sizes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
+
+    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure,
+    too), "instead" (from here on another failure is f), "certified" (its certificate showed that one more model can go) or "sliced"
+    (what went took no part in the runs `sliced_by`); `what` names the candidate, trial or test. `tests` is the number of tests
+    finished by then, `time` is Unix time, s, `round` the round that ended in it. `evidence_test` is the run in it that guides the
+    next rounds, None before f is known. `method` is the algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was
+    taken back; `lost_rate`: fresh runs showed that f is too rare in it. `runs` are the tests of its environment that ended and did
+    not break; `shown` of them showed f. Those that chose a slice are not among them: they would show its rate as too high.
+    """
+
+    number: int
+    parent: int | None
+    how: str
+    what: str
+    environment: tuple[str, ...]
+    round: int | None = None
+    tests: int = 0
+    time: float = 0.0
+    evidence_test: int | None = None
+    method: str = ""
+    minimal: bool = False
+    rejected: bool = False
+    lost_rate: bool = False
+    runs: tuple[int, ...] = ()
+    shown: int = 0
+    sliced_by: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from ddenv.runfile.failures import Baseline, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
+from ddenv.runfile.progress import Node as Node
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Tests that ended so say nothing about f.
@@ -44,7 +45,9 @@ class RunState:
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
     `settling`; `unsettled` says why it could not be found. `ties` has groups of models that
-    go together, or not at all, without a test; None if that is unknown.
+    go together, or not at all, without a test; None if that is unknown. Of the tests, `implied` ones were not simulated, and
+    `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
+    longer used.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -83,6 +86,9 @@ class RunState:
     lower_bound: int = 0
     supports: Supports = ()
     ties: tuple[tuple[str, ...], ...] | None = None
+    implied: int = 0
+    audits: int = 0
+    refuted: tuple[int, int] | None = None
     notes: tuple[tuple[str, str], ...] = ()
     settling: bool = False
     unsettled: str = ""
@@ -190,37 +196,13 @@ class RunState:
         return counts | {"failed": self.tally["failed"]} if self.tally["failed"] else counts
 
     @property
+    def made(self) -> int:
+        """How many finished tests were simulated."""
+        return self.tests_done - self.implied
+
+    @property
     def ended(self) -> bool:
         return self.status in ("finished", "stopped", "failed")
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
-
-    `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure,
-    too), "instead" (from here on another failure is f) or "certified" (its certificate showed that one more model can go); `what`
-    names the candidate, trial or test. `tests` is the number of tests finished by then, `time` is Unix time, s, `round` the round
-    that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known. `method` is the
-    algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs showed that f
-    is too rare in it. `runs` are the tests of its environment that ended and did not break; `shown` of them showed f.
-    """
-
-    number: int
-    parent: int | None
-    how: str
-    what: str
-    environment: tuple[str, ...]
-    round: int | None = None
-    tests: int = 0
-    time: float = 0.0
-    evidence_test: int | None = None
-    method: str = ""
-    minimal: bool = False
-    rejected: bool = False
-    lost_rate: bool = False
-    runs: tuple[int, ...] = ()
-    shown: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,7 +317,8 @@ class Test:
     is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says
     how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
     sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
-    `took_part` are the models that can have changed a bit of it, None if unknown.
+    `took_part` are the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that
+    test implies it; `audits`: it was, although that test implies it.
     `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.
     """
 
@@ -355,6 +338,8 @@ class Test:
     first_touched: tuple[tuple[str, float], ...] = ()
     cut: bool = False
     took_part: frozenset[str] | None = None
+    implied_by: int | None = None
+    audits: int | None = None
     without: str | None = None
     trial: int | None = None
     taken: bool = False

@@ -25,8 +25,8 @@ from ddenv.runfile.events import moment
 from ddenv.runfile.lock import engine_lock
 
 APPLICATION_ID = 0x64644531
-# The format of the file. Formats before 4 were never released; 5 has certificates.
-SCHEMA_VERSION, OLDEST_VERSION = 5, 4
+# The format of the file. Formats before 4 were never released; 5 has certificates, 6 slices.
+SCHEMA_VERSION, OLDEST_VERSION = 6, 4
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
@@ -42,6 +42,8 @@ _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.st
 # The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
 LOGS = ("-wal", "-shm", "-journal")
 ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
+# Samples by model. In place of the robot's, an implied test has the number of the test that it follows from, which has all of its.
+Motions = dict[str, bytes | int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +186,7 @@ class RunFile:
 
     def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
-        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, model))
+        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (self._made(test), model))
         return None if row is None else _floats(row[0], self.path)
 
     def trajectory(self, test: int) -> array[float]:
@@ -196,8 +198,13 @@ class RunFile:
 
     def motions(self, test: int) -> dict[str, array[float]]:
         """Samples of every model that moved in a finished test, by name; the robot is `ROBOT`."""
-        rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (test,))
+        rows = self._all("SELECT model, samples FROM motion WHERE test = ?", (self._made(test),))
         return {model: _floats(samples, self.path) for model, samples in rows}
+
+    def _made(self, test: int) -> int:
+        """The test that has the samples of `test`: itself, or the one that implies it."""
+        row = self._one("SELECT samples FROM motion WHERE test = ? AND model = ?", (test, ROBOT))
+        return row[0] if row is not None and isinstance(row[0], int) else test
 
     def live(self) -> list[Live]:
         """The running tests, by worker slot."""
@@ -218,7 +225,7 @@ class RunFile:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
-    def append(self, kind: str, data: dict[str, Any], motions: dict[str, bytes] | None = None) -> Event:
+    def append(self, kind: str, data: dict[str, Any], motions: Motions | None = None) -> Event:
         """Records one event, with the trajectories of its test, in one transaction."""
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")

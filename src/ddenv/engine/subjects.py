@@ -1,0 +1,77 @@
+"""How events name the models of a test: as the whole world, a candidate, a try, or an environment perhaps without one model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ddenv.errors import UserError
+from ddenv.runfile.state import FRESH, Round, RunState, Test
+from ddenv.runfile.supports import stack_with
+
+Keep = frozenset[str]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A test that is wanted: run number `run` of the models `keep`, for a candidate of a round, for a try, or as `phase` says."""
+
+    phase: str
+    keep: Keep
+    run: int
+    round: int | None = None
+    candidate: int | None = None
+    trial: int | None = None
+
+    def place(self, state: RunState) -> dict[str, Any]:
+        """The data of an event with which the test begins. Raises UserError for one of a round that is over."""
+        if self.round is not None and self.round != current_round(state).number:
+            raise UserError(other_way(self.round))
+        place: dict[str, Any] = {"phase": self.phase, "round": self.round, "candidate": self.candidate}
+        if self.phase == "certify":
+            place |= _fresh(state, self.keep)
+        if self.phase == "hand":
+            place["trial"] = self.trial
+        # All candidates meet the same noise.
+        return place | {"run": self.run, "seed": state.scenario["reduction"]["seed"] + self.run}
+
+
+def other_way(round: int) -> str:
+    """The error if a resumed run would not repeat the rounds that it made before."""
+    return (
+        f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
+        "package of schemas; continue with those, or start a new run"
+    )
+
+
+def _fresh(state: RunState, keep: Keep) -> dict[str, int]:
+    """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
+    path = [node.number for node in state.path if frozenset(node.environment) == keep]
+    if path:
+        return {"node": path[-1]}
+    gone = next(name for name in state.environment if name not in keep)
+    return {"node": state.node, "without": state.elements.index(gone)}
+
+
+def keep_of(state: RunState, test: Test) -> Keep:
+    """The models of a test that has just started."""
+    if test.phase == "baseline":
+        return frozenset(state.elements)
+    if test.phase in FRESH:
+        environment = state.nodes[test.node].environment
+        return frozenset(environment) - frozenset(stack_with(state, environment, test.without))
+    if test.phase == "hand":
+        return frozenset(state.trials[(test.trial or 0) - 1].models)
+    return keep_of_candidate(state, test.candidate or 0)
+
+
+def keep_of_candidate(state: RunState, candidate: int) -> Keep:
+    """The models of a candidate of the current round."""
+    return frozenset(current_round(state).candidates[candidate].models)
+
+
+def current_round(state: RunState) -> Round:
+    """The current round. Raises UserError before the first round."""
+    if state.round is None:
+        raise UserError("damaged run file: there is no round yet")
+    return state.round

@@ -1,0 +1,74 @@
+"""A simulator in which a run looks at some models, one after another: these take part, and no others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from zlib import crc32
+
+from tests.conftest import DATA
+from tests.engine.fake import FakePool, new_run
+
+MODELS = tuple(f"box_{number}" for number in range(24))
+Keep = frozenset[str]
+
+
+def wide_world(folder: Path) -> Path:
+    """A world of `MODELS`, of which one can move: so the simulator is asked for ties."""
+    before, _ = (DATA / "wall.sdf").read_text().split('<model name="wall">')
+    inertial = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.1</izz></inertia></inertial>"
+    collision = '<collision name="c"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></collision>'
+    boxes = "".join(
+        f'<model name="{name}"><static>{str(number > 0).lower()}</static><pose>{2 + number % 6} {number // 6 - 2} 0.3 0 0 0</pose>'
+        f'<link name="link">{inertial}{collision}</link></model>'
+        for number, name in enumerate(MODELS)
+    )
+    path = folder / "wide.sdf"
+    path.write_text(f"{before}{boxes}</world></sdf>")
+    return path
+
+
+@dataclass(frozen=True)
+class Participation:
+    """f shows where all of `needed` are there, in `tenths` of ten runs. Where a tie is broken, a model falls at once.
+
+    A run also looks at `looks` other models, and what it finds decides where it looks next. Of `hidden` models it does not say that
+    they took part.
+    """
+
+    salt: int
+    needed: tuple[str, ...]
+    ties: tuple[Keep, ...] = ()
+    tenths: int = 10
+    looks: int = 3
+    hidden: Keep = frozenset()
+
+    def run(self, keep: Keep, seed: int) -> tuple[str, Keep, int]:
+        """The outcome, what took part, and all bits in one number."""
+        broken = [sorted(tie & keep) for tie in self.ties if tie & keep and tie - keep]
+        bits, met = crc32(f"{self.salt} {seed} {broken}".encode()), set[str]()
+
+        def finds(name: str) -> bool:
+            nonlocal bits
+            bits = crc32(f"{bits} {name} {name in keep}".encode())
+            met.update({name} & keep)
+            return name in keep
+
+        met.update(name for models in broken for name in models)
+        for _ in range(self.looks):
+            # Few of them are near the robot's way.
+            finds(MODELS[bits % 97 % 9])
+        outcome = "similar" if all(finds(name) for name in self.needed) and bits % 10 < self.tenths else "pass"
+        return "other" if outcome == "pass" and bits % 7 == 0 else outcome, frozenset(met), bits
+
+    def pool(self, jobs: int = 1, seed: int = 0) -> FakePool:
+        pool = FakePool(lambda keep, seed: self.run(keep, seed)[0], jobs, seed)
+        pool.took_part = lambda keep, seed: self.run(keep, seed)[1] - self.hidden
+        pool.aside = lambda keep, seed: self.run(keep, seed)[2] / 2**32
+        pool.ties = list(self.ties)
+        return pool
+
+
+def sliced_run(folder: Path, **reduction) -> Path:
+    """A run of the wide world that may use slices."""
+    return new_run(folder, **{"world": wide_world(folder), "slice": True} | reduction)
