@@ -118,7 +118,7 @@ def test_as_printed_stands_for_what_the_paper_has():
     printed = scenario(as_printed=True)
     assert printed.reduction.as_printed
     assert {name: getattr(printed.reduction, name) for name in PRINTED} == PRINTED
-    assert printed == scenario(growth="paper", skip="known", accept_rate="first", early_stop=False)
+    assert printed == scenario(growth="paper", skip="known", accept_rate="first", early_stop=False, slice=False)
     assert not scenario().reduction.as_printed
     assert Scenario.model_validate_json(printed.model_dump_json()) == printed
 

@@ -140,7 +140,7 @@ class Reduction:
     )
     budget: int | None = setting(
         None,
-        "maximum number of tests, the baseline included",
+        "maximum number of simulated tests, the baseline included",
         least=1,
         shown="basic",
         may_change=True,

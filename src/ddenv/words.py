@@ -13,6 +13,7 @@ from ddenv.claims import verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
+from ddenv.took_part import implied_words, refuted_words, slice_words
 
 SETTLING = "finding what rests on what"
 CONFIRMING = "certifying what is left with fresh runs"
@@ -73,6 +74,8 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
             return f"  {waiting.label} shows f and waits for accept or reject"
         case "reduced":
             return f"  reduced to {count(len(after.environment), 'model')} after {after.tests_done} tests"
+        case "sliced" | "slices_refuted":
+            return _slices(kind, after)
         case "certificate_started" | "certificate_finished" | "rate_lost" | "left_out":
             return _certificate(kind, after)
         case "engine_started" | "comparing" | "compared":
@@ -80,6 +83,14 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
         case "finished" | "engine_stopped" | "engine_failed":
             return f"{after.status}: {after.reason}"
     return _news_by_hand(kind, before, after)
+
+
+def _slices(kind: str, after: RunState) -> str:
+    """What went without a test, or why nothing goes so any more."""
+    if kind == "slices_refuted":
+        return refuted_words(after)
+    models = count(len(after.environment), "model")
+    return f"  reduced to {models} without a test: {slice_words(after, after.nodes[after.node])}"
 
 
 def _engine(kind: str, before: RunState, after: RunState) -> str:
@@ -138,8 +149,9 @@ def _supports(state: RunState) -> str:
 
 
 def _judged(state: RunState, one: Candidate | Trial) -> str:
-    tests = count(len(one.tests), "test")
-    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{_endings(state, one)}"
+    tests, implied = count(len(one.tests), "test"), implied_words(state, one.tests)
+    ended = f"{_endings(state, one)}{f', {implied}' if implied else ''}"
+    return f"  {one.label} ({count(one.size, 'model')}): {one.verdict} after {tests}{ended}"
 
 
 def baseline(state: RunState) -> str:

@@ -12,6 +12,7 @@ from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN, Node, RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.took_part import simulated
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12
@@ -24,6 +25,7 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
         "models_after": len(state.environment),
         "kept": list(state.environment),
         "tests": state.tests_done,
+        "simulated": simulated(state),
         "outcomes": state.outcomes(),
         "deflake_runs": state.deflake_runs,
         "ended_early": state.cut_tests,
@@ -94,12 +96,13 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     if state.status == "finished" and not state.certified:
         what = "environment, not shown to be minimal"
     tests = ", ".join(f"{number} {outcome}" for outcome, number in state.outcomes().items() if number)
-    early = f"; {state.cut_tests} ended early" if state.cut_tests else ""
+    more = f"; {state.cut_tests} ended early" if state.cut_tests else ""
+    more += f"; {state.implied} implied, not simulated" if state.implied else ""
     names = first_of(state.environment, MOST_NAMES)
     said = [
         f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names}",
         *_certificate_lines(state),
-        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{early}) in {count(state.rounds_done, 'round')}, "
+        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         *broken(state),
         f"run file: {path}",

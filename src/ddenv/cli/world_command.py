@@ -43,22 +43,36 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
+@click.option("--took-part", is_flag=True, help="FILE is a run: show what took part in its runs of the whole world.")
 def show(
-    file: Path, spawn: tuple[float, ...] | None, goal: tuple[float, float] | None, svg: Path | None, **reading: Any
+    file: Path,
+    spawn: tuple[float, ...] | None,
+    goal: tuple[float, float] | None,
+    svg: Path | None,
+    took_part: bool,
+    **reading: Any,
 ) -> int:
     """Draws the map of FILE, from above."""
     from ddenv.cli.world_show import terminal_map
     from ddenv.map.svg import svg_map
     from ddenv.world.files.access import write_file
 
+    columns, rows = shutil.get_terminal_size((100, 36))
+    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    if took_part:
+        from ddenv.cli.world_took_part import took_part_map
+        from ddenv.runs.folder import find_run
+
+        if spawn is not None or goal is not None or svg is not None:
+            raise UserError("--took-part: --spawn, --goal and --svg do not go with it")
+        print(took_part_map(find_run(str(file)), columns, rows - 1, color=color))
+        return 0
     world = _read(file, reading)
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
         print(f"wrote {svg}")
         return 0
-    columns, rows = shutil.get_terminal_size((100, 36))
-    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
     print(terminal_map(world, columns, rows - 1, color=color, spawn=start, goal=goal))
     return 0
 

@@ -49,21 +49,23 @@ def terminal_map(
     color: bool,
     spawn: Pose | None = None,
     goal: Point | None = None,
+    dim: frozenset[str] = frozenset(),
 ) -> str:
     """The world from above, without its ground: at most `rows` lines of at most `columns` characters (not less than 12 and 40).
 
     With `color` models are blocks of 24-bit colour; without, there is not one escape code, and models are areas of their letters.
-    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they should be marked; all finite.
+    `spawn` is x, y (m) and yaw (rad), `goal` x, y (m), if they should be marked; all finite. Of the models `dim` there are only
+    faint areas.
     """
     columns, rows = max(columns, LEAST_COLUMNS), max(rows, LEAST_ROWS)
     models = plan(world)
     low, high = extent([each.outline for each in models], [point[:2] for point in (spawn, goal) if point is not None])
     margin = np.maximum(0.3, 0.03 * (high - low))
     low, high = low - margin, high + margin
-    entries = _entries(models)
+    entries = [entry for entry in _entries(models) if entry[1] not in dim]
     layout = _layout(high - low, columns, rows, entries)
     view = _view(low, high, layout)
-    canvas = picture(models, view, color=color)
+    canvas = picture(models, view, color=color, dim=dim)
     _grid(canvas, view)
     _marks(canvas, view, spawn, goal, color)
     drawn = list(_framed(canvas, view, color))

@@ -78,7 +78,7 @@ class Change:
         except UserError as error:
             return str(error)
         new = self.new(now.state)
-        budget, done = new.get("budget"), now.state.tests_done
+        budget, done = new.get("budget"), now.state.made
         if isinstance(budget, int) and budget <= done:
             return f"budget: {count(done, 'test')} were made already; enter more, or leave it empty"
         return "" if new else "these are the settings already"

@@ -98,5 +98,5 @@ class StartEngine:
             return "the engine is starting already"
         if state.status == "finished":
             return FINISHED
-        spent = state.budget is not None and state.tests_done >= state.budget
+        spent = state.budget is not None and state.made >= state.budget
         return f"the budget of {state.budget} tests is used up; c raises it" if spent else ""

@@ -23,7 +23,7 @@ SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
 NO_SIGN, FLOORS = "+", ".:"
 HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
 GREY: RGB = (120, 120, 124)
-FAINT = packed(GREY)
+FAINT, DIM = packed(GREY), packed((70, 70, 74))
 # Limits of brightness (mean of red, green and blue, 0..255) for visibility on all terminals.
 DARKEST, BRIGHTEST = 60.0, 225.0
 
@@ -113,18 +113,19 @@ def signs(models: Sequence[Drawn]) -> list[str]:
     return found
 
 
-def picture(models: Sequence[Drawn], view: View, *, color: bool) -> Canvas:
-    """All models in `view`, each with its sign. `PLAIN` in the canvas is the terminal's own colour."""
+def picture(models: Sequence[Drawn], view: View, *, color: bool, dim: Collection[str] = ()) -> Canvas:
+    """All models in `view`, each with its sign; those that are `dim` have none. `PLAIN` is the terminal's own colour."""
     canvas = Canvas(view.rows, view.columns, GREY)
     canvas.fore[:], canvas.back[:] = PLAIN, PLAIN
     outlines = [each.outline for each in models]
     grid = owners(masks(outlines, view), view)
-    fills = [_fill(each, index) for index, each in enumerate(models)]
-    letters = signs(models)
+    faint = [each.model.name in dim for each in models]
+    fills = [DIM if faint[index] else _fill(each, index) for index, each in enumerate(models)]
+    letters = ["" if faint[index] else sign for index, sign in enumerate(signs(models))]
     if color:
         _blocks(canvas, grid, fills)
     else:
-        _letters(canvas, grid, models, letters)
+        _letters(canvas, grid, models, letters, faint)
     centers = view.pixels(np.array([each.outline.center for each in models]).reshape(-1, 2))
     for (row, column), sign, fill in zip(label_cells(grid, centers).tolist(), letters, fills, strict=True):
         if row >= 0 and sign:
@@ -163,8 +164,13 @@ def _blocks(canvas: Canvas, grid: np.ndarray, fills: Sequence[int]) -> None:
     canvas.chars[same], canvas.back[same] = ord(FULL), PLAIN
 
 
-def _letters(canvas: Canvas, grid: np.ndarray, models: Sequence[Drawn], letters: Sequence[str]) -> None:
+def _letters(
+    canvas: Canvas, grid: np.ndarray, models: Sequence[Drawn], letters: Sequence[str], faint: Sequence[bool]
+) -> None:
     """Every cell shows its model; of two models in one cell the one drawn later."""
-    own = [FLOORS[index % 2] if each.floor else letters[index] or NO_SIGN for index, each in enumerate(models)]
+    own = [
+        FLOORS[index % 2] if each.floor or faint[index] else letters[index] or NO_SIGN
+        for index, each in enumerate(models)
+    ]
     chars = np.array([ord(char) for char in [*own, " "]], dtype=np.uint32)
     canvas.chars[:] = chars[np.maximum(grid[0::2], grid[1::2])]

@@ -82,8 +82,13 @@ def axes(at: At, last: int, most: int) -> Iterator[str]:
 
 
 def _labels(state: RunState, at: At, last: int, most: int, bounded: bool) -> Iterator[str]:
-    """The number at the end, and the label of the lower line."""
+    """What went without a test, the number at the end, and the label of the lower line."""
     x, y = at(last, len(state.environment))
+    for node in state.nodes:
+        if node.how == "sliced":
+            place, top = at(min(node.tests, last), len(node.environment))
+            yield f'<circle class="dot" cx="{place:.1f}" cy="{top:.1f}" r="3"/>'
+            yield f'<text class="tick" x="{place + 8:.1f}" y="{top - 6:.1f}">without a test</text>'
     yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'
     words = f"{count(len(state.environment), 'model')} left"
     yield f'<text class="said" x="{x - 8:.1f}" y="{y - 10:.1f}" text-anchor="end">{words}</text>'

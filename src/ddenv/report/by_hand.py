@@ -21,6 +21,7 @@ HOW = {
     "accepted": "another failure, accepted by hand",
     "instead": "a branch to its failure",
     "certified": "by a certificate",
+    "sliced": "without a test",
 }
 
 
@@ -64,7 +65,7 @@ def _tree(state: RunState) -> list[Block]:
     nodes = state.nodes
     if len(nodes) < 2:
         return []
-    straight = all(node.parent == node.number - 1 and node.how == "reduced" for node in nodes[1:])
+    straight = all(node.parent == node.number - 1 and node.how in ("reduced", "sliced") for node in nodes[1:])
     if straight and state.node == len(nodes) - 1 and not any(node.rejected or node.lost_rate for node in nodes):
         return [say(f"From environment to environment, without branches: {_steps(nodes)}.")]
     order = list(_drawn(state))

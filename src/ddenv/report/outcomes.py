@@ -4,13 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, percent, plain, say, section, thousands
+from ddenv.page.blocks import (
+    Block,
+    Cell,
+    Name,
+    Picture,
+    Section,
+    Strong,
+    Table,
+    percent,
+    plain,
+    say,
+    section,
+    thousands,
+)
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.words import count, failed_in
 
+# The maximum number of models with a row each.
+MOST_ROWS = 200
 WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
 
 
@@ -122,14 +138,32 @@ def _tests(state: RunState) -> list[Block]:
     )
     head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
     table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
+    slices = _slices(state)
     if not state.deflake_runs and not state.cut_tests and not state.tally["lost"]:
-        return [table]
+        return [table, *slices]
     words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates whose first test did not show f."
     if state.cut_tests:
         words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
     if lost := state.tally["lost"]:
         words += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
-    return [table, say(words)]
+    return [table, say(words), *slices]
+
+
+def _slices(state: RunState) -> list[Block]:
+    """What was known, and what went, without a test."""
+    blocks: list[Block] = []
+    if state.implied:
+        audits = f"; {thousands(state.audits)} more were simulated all the same, to be compared" if state.audits else ""
+        known = f"{thousands(state.implied)} of the tests were not simulated: finished runs imply them{audits}."
+        blocks.append(say(f"{known} {TEACHING}"))
+    for node in state.nodes:
+        if node.how == "sliced":
+            rows = tuple((Name(name), why) for name, why in why_sliced(state, node).items())
+            blocks.append(say(f"Environment {node.number}: {slice_words(state, node)}."))
+            blocks.append(Table(("model", "which"), rows[:MOST_ROWS]))
+    if words := refuted_words(state):
+        blocks.append(say(Strong("Slices were wrong."), f" {plain(words)}.", notice=True))
+    return blocks
 
 
 def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) -> tuple[Cell, ...]:

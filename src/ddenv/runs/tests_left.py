@@ -55,7 +55,7 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
     if expected is None:
         return None
     running = len(state.running_tests) if at_work else 0
-    most = math.inf if state.budget is None else max(0, state.budget - state.tests_done)
+    most = math.inf if state.budget is None else max(0, state.budget - state.made)
     low, likely, high = (int(min(most, max(running, each))) for each in expected)
     each = _seconds_of_a_test(state) if at_work else None
     return Remaining((low, likely, high), None if each is None else (low * each, likely * each, high * each))

@@ -13,6 +13,7 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
+from ddenv.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
@@ -129,7 +130,7 @@ class MapDrawing:
         )
 
         def gather() -> Kept:
-            who = kept(state, candidate)
+            who, met = kept(state, candidate), in_last(state) if "took part" in layers else None
             if not who.elements:
                 who = Kept(place.elements, place.elements)
             return replace(
@@ -138,6 +139,7 @@ class MapDrawing:
                 pinned=who.pinned if "pinned" in layers else frozenset(),
                 selected=shown.selection,
                 sensed=sensed_order(state) if "sensed" in layers else {},
+                shown=who.shown if met is None else met,
             )
 
         return self._kept.get((*made_of, shown.selection, layers, place.elements), gather)

@@ -13,6 +13,7 @@ from ddenv.map.names import shortened
 from ddenv.runfile.events import Names
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import drops
+from ddenv.took_part import in_last
 from ddenv.workbench.map.place import Shown
 from ddenv.workbench.wording import DROPS, count, dropping
 
@@ -44,6 +45,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
         ("+", "pinned"): bool(state.pinned) and "pinned" in layers,
         (DROPS, "drops"): shown.candidate is not None and bool(drops(state, shown.candidate)),
         ("1 2", "order sensed"): "sensed" in layers and state.evidence_test is not None,
+        ("a b", "took no part"): "took part" in layers and in_last(state) is not None,
         ("⠒ ⠒", "path of f"): "original" in layers and not same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 # The layers of the map, which can be hidden.
-LAYERS = ("partitions", "removed", "pinned", "sensed", "path", "original", "failure")
+LAYERS = ("partitions", "removed", "pinned", "sensed", "took part", "path", "original", "failure")
 Point = tuple[float, float]
 # How long to retry a run file that another program has locked, s.
 PATIENCE = 10.0
@@ -46,7 +46,7 @@ class Shown:
     place: Place = field(default_factory=Place)
     snapshot: Snapshot = field(default_factory=Snapshot)
     candidate: Candidate | Trial | None = None
-    layers: frozenset[str] = frozenset(LAYERS) - {"sensed"}
+    layers: frozenset[str] = frozenset(LAYERS) - {"sensed", "took part"}
     selection: frozenset[str] = frozenset()
 
     @property

@@ -13,6 +13,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.took_part import implied_words
 from ddenv.workbench.run import certificate_rows
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs
@@ -182,7 +183,8 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if isinstance(item, Candidate) and state.waiting_candidate == item.index:
         return "? a or x"
     if item.verdict:
-        return VERDICT.get(item.verdict, plain(item.verdict))
+        implied = implied_words(state, item.tests)
+        return f"{VERDICT.get(item.verdict, plain(item.verdict))}{f', {implied}' if implied else ''}"
     running = [test for test in tests if test.outcome == "running"]
     if not running or snapshot.engine != "alive":
         return ""

@@ -21,6 +21,7 @@ from ddenv.workbench.run.explain_decisions import (
     rarer,
     to_adopt,
 )
+from ddenv.workbench.run.explain_slices import implied, refuted, sliced
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import count, metres, percent, plain
@@ -51,7 +52,8 @@ def explain(snapshot: Snapshot) -> Explanation:
     shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
     if not snapshot.error:
-        sentences = (*older_engine(snapshot), *rarer(state), *to_adopt(state), *sentences, *by_hand(state))
+        first = (*older_engine(snapshot), *refuted(state), *rarer(state), *to_adopt(state))
+        sentences = (*first, *sentences, *implied(state), *by_hand(state))
     line = None if step is None else shown.line(step, state.round)
     return Explanation(line, sentences, shown.lines)
 
@@ -169,6 +171,8 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     state = snapshot.state
     number = 1 if state.round is None else state.round.number + 1
     first = f"Round {number}: {beginning(options, len(state.environment))}"
+    if free := sliced(state):
+        return (*free, first)
     arrived = arrival(state)
     if arrived:
         return (arrived, first)

@@ -92,7 +92,7 @@ def _capital(words: str) -> str:
 def out_of_budget(state: RunState) -> tuple[str, ...]:
     """What to do when all tests of the budget were made."""
     budget = state.budget
-    if budget is None or state.tests_done < budget:
+    if budget is None or state.made < budget:
         return ()
     return (f"The budget of {count(budget, 'test')} is used up: c raises it, and the run goes on.",)
 

@@ -17,18 +17,21 @@ from ddenv.workbench.widgets.lines import changed_lines
 from ddenv.workbench.wording import count
 
 LEVELS = " ▁▂▃▄▅▆▇█"
-NEEDED, DECIDED = "╌", "▲"
+NEEDED, DECIDED, FREE = "╌", "▲", "▽"
 PLAIN, DIM = Style.null(), Style(dim=True)
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What the chart shows: the size of the environment over `tests`, and after how many tests the user `decided` something."""
+    """What the chart shows: the size of the environment over `tests`; after how many tests the user `decided` something; and when
+    models went `free`, without a test.
+    """
 
     points: Sequence[Point] = ()
     tests: int = 0
     needed: int = 0
     decided: Sequence[int] = ()
+    free: Sequence[int] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +56,12 @@ class Chart(Widget):
         """Shows the run as it is now."""
         state = snapshot.state
         # Unless something was added these are the same objects, which compare fast.
-        shown = (state.history, state.tests_done, state.lower_bound, state.decisions)
+        shown = (state.history, state.tests_done, state.lower_bound, state.decisions, len(state.nodes))
         if shown != self._shown:
             self._shown = shown
             decided = tuple(decision.tests for decision in state.decisions)
-            self._course = Course(state.history, state.tests_done, state.lower_bound, decided)
+            free = tuple(node.tests for node in state.nodes if node.how == "sliced")
+            self._course = Course(state.history, state.tests_done, state.lower_bound, decided, free)
             before, self._text = self._text, self._drawn()
             if regions := changed_lines(before, self._text, self.size.width):
                 self.refresh(*regions)
@@ -84,7 +88,7 @@ def steps(course: Course, width: int, height: int, look: Look | None = None) -> 
     last = max(1, course.tests, course.points[-1].tests)
     margin = len(str(most)) + 1
     columns = width - margin - 1
-    ruled = height >= 6 or (height >= 4 and bool(course.decided))
+    ruled = height >= 6 or (height >= 4 and bool(course.decided or course.free))
     rows = height - 1 - ruled
     at = [_at(course, last * column / max(1, columns - 1)) for column in range(columns)]
     marks = _marks(most, rows)
@@ -164,15 +168,18 @@ def _legend(course: Course, width: int) -> list[str]:
         words.append(f"{NEEDED} at least {course.needed} needed")
     if course.decided:
         words.append(f"{DECIDED} you decided")
+    if course.free:
+        words.append(f"{FREE} without a test")
     longest = max(map(len, words)) + 1
     return [f" {each:<{longest}}" for each in words] if width >= 2 * longest and len(words) > 1 else []
 
 
 def _rule(course: Course, margin: int, columns: int, last: int, look: Look) -> Text:
-    places = {round(min(tests, last) * (columns - 1) / last) for tests in course.decided}
+    marks = ((DECIDED, course.decided), (FREE, course.free))
+    places = {round(min(tests, last) * (columns - 1) / last): sign for sign, when in marks for tests in when}
     text = Text(f"{'':>{margin - 1}}└", "dim", no_wrap=True)
     for column in range(columns):
-        text.append(DECIDED if column in places else "─", look.needed if column in places else DIM)
+        text.append(places.get(column, "─"), look.needed if column in places else DIM)
     return text.append("\n")
 
 
