@@ -49,7 +49,7 @@ def slice_words(state: RunState, node: Node) -> str:
     gone = count(before - len(node.environment), "model")
     return (
         f"{gone} took part in none of {count(len(met), 'run')}, so {'it goes' if gone == '1 model' else 'they go'} without a test; "
-        f"the chance that a fresh run meets a model that no run met is about {percent(fresh_chance(met))}"
+        f"the chance that a fresh run meets a model that no run met is at most about {percent(fresh_chance(met))}"
     )
 
 

@@ -62,7 +62,13 @@ class Participation:
         return "other" if outcome == "pass" and bits % 7 == 0 else outcome, frozenset(met), bits
 
     def pool(self, jobs: int = 1, seed: int = 0) -> FakePool:
-        pool = FakePool(lambda keep, seed: self.run(keep, seed)[0], jobs, seed)
+        return self.told(FakePool(self.outcome, jobs, seed))
+
+    def outcome(self, keep: Keep, seed: int) -> str:
+        return self.run(keep, seed)[0]
+
+    def told(self, pool: FakePool) -> FakePool:
+        """A pool that knows who took part."""
         pool.took_part = lambda keep, seed: self.run(keep, seed)[1] - self.hidden
         pool.aside = lambda keep, seed: self.run(keep, seed)[2] / 2**32
         pool.ties = list(self.ties)

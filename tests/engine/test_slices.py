@@ -13,13 +13,21 @@ from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.test_certify import _killed, _resumed
-from tests.engine.test_driver import needs
+from tests.engine.test_driver import Killed, needs
+from tests.engine.test_steering import Guided, until
 from tests.tiers import examples
 
 NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
 TIES = st.lists(st.frozensets(st.sampled_from(MODELS), min_size=2, max_size=3), max_size=3).map(tuple)
 SIMULATORS = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES)
 FLAKY = st.builds(Participation, salt=st.integers(0, 99), needed=NEEDED, ties=TIES, tenths=st.sampled_from([6, 9]))
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Nobody waits for the user to come to rest."""
+    monkeypatch.setattr("ddenv.engine.control.SETTLE", 0.0)
+    monkeypatch.setattr("ddenv.engine.bench.WAIT", 0.0)
 
 
 def state_of(path):
@@ -119,3 +127,103 @@ def test_a_simulator_that_does_not_say_all_is_found_out(made_by, jobs, data):
             assert all(
                 test.outcome == made_by.run(keep, test.seed)[0] for test, keep in worlds_of(path) if test.is_finished
             )
+
+
+LIAR = Participation(1, ("box_1", "box_7"), hidden=frozenset({"box_7"}))
+
+
+def test_an_engine_that_is_killed_before_it_compares_does_so_when_it_resumes(tmp_path):
+    path = sliced_run(tmp_path, accept_rate="first", audit=1)
+
+    def stop_at_once(file):
+        append = file.append
+
+        def limited(kind, *values):
+            if kind == "slices_refuted":
+                raise Killed
+            return append(kind, *values)
+
+        file.append = limited
+
+    with pytest.raises(Killed):
+        drive(path, LIAR.pool(), prepare=stop_at_once)
+    assert state_of(path).refuted is None
+    state = drive(path, LIAR.pool())
+    assert state.refuted is not None
+    assert (set(state.environment), state.minimal) == ({"box_1", "box_7"}, True)
+
+
+def test_what_rested_on_slices_is_open_again(tmp_path):
+    path = sliced_run(tmp_path, accept_rate="first", audit=1)
+    state = drive(path, LIAR.pool())
+    with RunFile(path) as file:
+        event = next(event for event in file.events() if event.kind == "slices_refuted")
+        before, after = (fold(file.events()[: event.id - 1 + step]) for step in (0, 1))
+    assert before.here.how == "sliced"
+    assert after.environment == state.elements
+    assert after.implied == 0
+    assert not any(test.implied_by for test in after.tests if test.is_finished)
+    assert state.made == sum(test.is_finished for test in state.tests)
+
+
+HONEST = Participation(2, ("box_1", "box_7"), ties=(frozenset({"box_1", "box_20"}),))
+
+
+def guided(path, guide):
+    return drive(path, HONEST.told(Guided(path, HONEST.outcome, guide)))
+
+
+@pytest.mark.usefixtures("at_once")
+def test_a_slice_that_is_taken_back_is_not_taken_again(tmp_path):
+    def guide():
+        yield from until(lambda state: state.here is not None and state.here.how == "sliced")
+        yield "undo", {}
+
+    state = guided(sliced_run(tmp_path, accept_rate="kept"), guide())
+    assert [(node.how, node.rejected) for node in state.nodes[:2]] == [("start", False), ("sliced", True)]
+    assert all(set(node.environment) != set(state.nodes[1].environment) for node in state.nodes[2:])
+    assert set(state.environment) == set(HONEST.needed)
+
+
+@pytest.mark.usefixtures("at_once")
+def test_a_pinned_model_is_in_every_slice_with_what_it_is_tied_to(tmp_path):
+    def guide():
+        yield from until(lambda state: len(state.tests) == 1)
+        yield "pin", {"models": [1 + MODELS.index("box_23")]}
+
+    path = sliced_run(tmp_path, accept_rate="first")
+    state = guided(path, guide())
+    assert state.nodes[1].how == "sliced"
+    assert {"box_1", "box_20", "box_23"} <= set(state.nodes[1].environment)
+    assert set(state.environment) == {*HONEST.needed, "box_23"}
+
+
+@pytest.mark.usefixtures("at_once")
+def test_where_each_reduction_waits_for_the_user_none_is_made_without_a_test(tmp_path):
+    def guide():
+        while True:
+            state = yield from until(lambda state: state.waiting_candidate is not None or state.ended)
+            yield "accept", {"round": state.round.number, "candidate": state.waiting_candidate}
+
+    path = sliced_run(tmp_path, accept_rate="first")
+    pool = HONEST.told(Guided(path, HONEST.outcome, guide()))
+    state = drive(path, pool, accept_mode="ask")
+    assert {node.how for node in state.nodes[1:]} == {"reduced"}
+    assert state.implied
+
+
+def test_what_went_without_a_test_is_no_evidence_of_its_rate(tmp_path):
+    state = drive(sliced_run(tmp_path, accept_rate="kept"), HONEST.pool())
+    sliced = next(node for node in state.nodes if node.how == "sliced")
+    chose = set(sliced.sliced_by)
+    assert chose
+    assert not chose & set(sliced.runs)
+
+
+def test_implied_tests_do_not_count_for_the_budget(tmp_path):
+    path = sliced_run(tmp_path, accept_rate="kept", budget=30)
+    with pytest.raises(Exception, match="the budget of 30 tests is used up"):
+        drive(path, HONEST.pool())
+    state = state_of(path)
+    assert state.made == 30
+    assert state.tests_done == 30 + state.implied > 30

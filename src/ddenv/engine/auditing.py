@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterable
+from itertools import takewhile
 
 from ddenv.engine.journal import Journal
-from ddenv.robot.result import RunResult
 from ddenv.runfile.fold_slices import rests_on_slices
 from ddenv.runfile.state import RunState, Test
-from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
+from ddenv.runfile.store import RunFile
 from ddenv.settings import SETTINGS, read
 
 
@@ -18,27 +18,25 @@ def audit_is_due(state: RunState) -> bool:
     return isinstance(every, int) and state.audits * every <= state.implied + state.audits
 
 
-def compare(journal: Journal, test: int, result: RunResult) -> None:
-    """Ends the use of slices if a finished audit differs from the run that implies it."""
+def compare(journal: Journal, audits: Iterable[Test]) -> None:
+    """Ends the use of slices if one of the finished `audits` differs from the run that implies it."""
     state = journal.state
-    source = state.tests[test - 1].audits
-    if source is None or state.refuted is not None or repeats(journal.file, state.tests[source - 1], result):
+    wrong = next((test for test in audits if not repeats(journal.file, state, test)), None)
+    if wrong is None or state.refuted is not None:
         return
-    sound = state.path[0]
-    for node in state.path:
-        if rests_on_slices(state, node):
-            break
-        sound = node
-    journal.record("slices_refuted", test=test, by=source, node=sound.number)
+    sound = takewhile(lambda node: not rests_on_slices(state, node), state.path)
+    journal.record("slices_refuted", test=wrong.id, by=wrong.audits, node=[node.number for node in sound][-1])
 
 
-def repeats(file: RunFile, source: Test, result: RunResult) -> bool:
-    """Whether a run has the bits of the finished test `source`."""
-    rows = {name: np.array(samples).reshape(-1, COLUMNS) for name, samples in file.motions(source.id).items()}
-    again = {ROBOT: result.trajectory, **result.motions}
-    ends = (source.outcome == "pass", source.failure, source.cut)
-    return (
-        ends == (result.outcome == "pass", result.failure, result.cut)
-        and rows.keys() == again.keys()
-        and all(np.array_equal(rows[name], again[name]) for name in rows)
-    )
+def repeats(file: RunFile, state: RunState, audit: Test) -> bool:
+    """Whether a finished audit has the bits of the run that implies it; True for one that has none, since its worker died."""
+    if audit.audits is None or not (again := file.motions(audit.id)):
+        return True
+    source = state.tests[audit.audits - 1]
+    first = file.motions(source.id)
+    same_end = _end(source) == _end(audit) and first.keys() == again.keys()
+    return same_end and all(first[name].tobytes() == again[name].tobytes() for name in first)
+
+
+def _end(test: Test) -> tuple[bool, str, bool]:
+    return test.outcome == "pass", test.failure, test.cut

@@ -245,9 +245,7 @@ class Bench:
         if "took_part" in data:
             noticed["took_part"] = sorted(self._numbers[name] for name in data["took_part"] if name in self._numbers)
         self._journal.record("test_finished", motions, test=test, **data | noticed)
-        audits = self._journal.state.tests[test - 1].audits
-        if audits is not None and isinstance(result, RunResult):
-            compare(self._journal, test, result)
+        compare(self._journal, [self._journal.state.tests[test - 1]])
 
     def _counted(self) -> tuple[Failure, ...]:
         """f, and the other failures that the user accepted."""

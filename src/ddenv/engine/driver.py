@@ -10,6 +10,7 @@ from itertools import islice
 from typing import Any
 
 from ddenv.claims import current, is_minimal, verdict_on
+from ddenv.engine.auditing import compare
 from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import CHANGED, Certifier
@@ -78,6 +79,8 @@ class Driver:
             self._end(False, reason)
             return
         self._control.search_begins()
+        # An engine that was killed may not have compared its last one.
+        compare(self._journal, self._journal.state.finished_tests)
         # The user may have gone back before this engine started; then it pauses there.
         with suppress(Steered):
             while self._journal.steered:

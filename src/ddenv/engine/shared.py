@@ -81,7 +81,8 @@ def _tests_of(other: RunFile) -> Iterator[tuple[Key, Place]]:
     journal = Journal(other)
     for (keep, _, full), number in journal.ledger.items():
         test = journal.state.tests[number - 1]
-        if test.outcome in ("pass", "similar", "other", "failed"):
+        # Another run implies for itself.
+        if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None:
             yield (keep, test.seed, full), Place(other.path, test)
 
 

@@ -154,7 +154,7 @@ def _all_broke(state: RunState) -> bool:
 
 def tests_made(state: RunState) -> int:
     """How many tests were made in a run, and not reused from another one."""
-    return state.tests_done - sum(test.taken for test in state.tests)
+    return state.made - sum(test.taken for test in state.tests)
 
 
 def _stop(running: Sequence[Work]) -> None:

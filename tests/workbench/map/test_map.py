@@ -205,7 +205,8 @@ async def test_a_place_is_picked_by_enter_or_click(busy):
         assert world.selection == frozenset()
 
 
-SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3"}
+SIGNS = {"removed": "·", "pinned": "+", "path": "⠒", "failure": "×", "sensed": "A3", "took part": "b"}
+HIDDEN = ("sensed", "took part")
 
 
 @pytest.mark.parametrize("layer", SIGNS)
@@ -226,12 +227,12 @@ async def test_layers_are_shown_or_not(run, layer):
             text = text_of(world)
             seen.append(SIGNS[layer] in text or (layer == "path" and any("⠀" < char <= "⣿" for char in text)))
             world.toggle_layer(layer)
-        assert seen == [layer != "sensed", layer == "sensed"]
+        assert seen == [layer not in HIDDEN, layer in HIDDEN]
         assert layer in LAYERS
 
 
 def fake_sensed(test, sensed):
-    return replace(test, first_sensed=sensed)
+    return replace(test, first_sensed=sensed, took_part=frozenset(name for name, _ in sensed))
 
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):
