@@ -79,7 +79,7 @@ def test_methods_that_differ_only_in_what_is_not_looked_at_are_one(tmp_path):
 
 def test_what_makes_fewer_tests_is_asked_for_where_nobody_says_otherwise(tmp_path):
     plain = crates(tmp_path)
-    said = crates(tmp_path, "said", growth="paper", skip="known", accept_rate="first", early_stop=False)
+    said = crates(tmp_path, "said", growth="paper", skip="known", accept_rate="first", early_stop=False, slice=False)
 
     def asked(file, **options):
         reduction = plan_of(file, **options).cells[0].scenario.reduction
