@@ -10,9 +10,10 @@ from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
-from ddenv.runfile.fold import fold
+from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
+from ddenv.runfile.tested import purpose
 from ddenv.runs.creation import read_parts
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -20,13 +21,14 @@ from ddenv.world.scenario import Scenario
 
 @dataclass(frozen=True)
 class Subject:
-    """What to run. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
+    """What to run; of a run, `position` finds its earlier states. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
 
     scenario: Scenario
     world: World
     robot: Model
     state: RunState | None = None
     failures: tuple[Failure, ...] = ()
+    position: Position | None = None
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -45,9 +47,10 @@ class Trial:
 def subject_of_run(file: RunFile) -> Subject:
     """The world of a run, with its f if the baseline is done."""
     scenario, world, robot = read_parts(file)
-    state = fold(file.events())
-    failures = failures_of(file, state, scenario.failure)
-    return Subject(scenario, world, robot, state, failures)
+    position = Position(file.events)
+    position.catch_up()
+    failures = failures_of(file, position.end, scenario.failure)
+    return Subject(scenario, world, robot, position.end, failures, position)
 
 
 def plan(
@@ -59,9 +62,14 @@ def plan(
     leave_each_out: bool = False,
     seed: int | None = None,
     repeat: int = 1,
+    test: int | None = None,
 ) -> list[Trial]:
     """The runs asked for. Seeds are `seed`, `seed + 1`, ... (the scenario's own by default). Raises UserError."""
     models = _models(subject, keep, minimal)
+    if test is not None:
+        if minimal or keep is not None or seed is not None:
+            raise UserError("--test: has models and a seed of its own; leave out --keep, --minimal and --seed")
+        models, seed = _of_test(subject, test)
     for name in leave_out or []:
         if name not in models:
             raise UserError(f"--leave-out: '{name}' is not one of the {len(models)} models in this world")
@@ -84,6 +92,17 @@ def _models(subject: Subject, keep: list[str] | None, minimal: bool) -> tuple[st
                 raise UserError(f"--keep: the world has no removable model '{name}'")
         return tuple(keep)
     return subject.state.environment if minimal and subject.state else subject.elements
+
+
+def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
+    """The models and the seed of a test of the run."""
+    if subject.position is None:
+        raise UserError("--test: needs a run; a scenario has no tests yet")
+    start = subject.position.start_of(number)
+    if start is None:
+        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(subject.position.end.tests)}")
+    test = start.after.tests[number - 1]
+    return purpose(start.after, test).models or (), test.seed
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:

@@ -8,6 +8,7 @@ from typing import Literal
 
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
+from ddenv.runfile.tested import made_for
 from ddenv.words import first_of
 
 EngineIs = Literal["alive", "starting", "absent"]
@@ -56,13 +57,9 @@ class Words:
 
 def row_of(state: RunState, test: Test) -> Row | None:
     """The candidate of the current round, or the try, that a test was made for or counts for."""
-    if test.trial is not None:
-        return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
-    current = state.round
-    if current is None:
-        return None
-    if test.round == current.number and test.candidate is not None:
-        return current.candidates[test.candidate]
+    made, current = made_for(state, test), state.round
+    if made is not None or test.trial is not None or current is None:
+        return made
     # The verdict may rest on tests of earlier rounds.
     return next((each for each in current.candidates if each.known and test.id in each.tests), None)
 

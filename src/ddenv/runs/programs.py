@@ -67,10 +67,11 @@ def last_words(run: Path) -> str:
 def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
     """Starts the scene program on a run; its first line of output is the URL it serves on 127.0.0.1.
 
-    It ends with its parent. An empty first line means that it could not start; its log says why.
+    It shows what its standard input asks for (`ddenv.runs.wanted`), and ends with its parent. An empty first line means that it
+    could not start; its log says why.
     """
-    words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port)]
+    words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port), "--pointed"]
     with run.with_name(f"{run.name}.scene.log").open("ab") as log:
         return subprocess.Popen(
-            words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
         )

@@ -1,4 +1,4 @@
-"""`python -m ddenv.scene RUN [--port N]`: serves the 3-D scene of a run until it is stopped or its parent exits.
+"""`python -m ddenv.scene RUN [--port N] [--pointed]`: serves the 3-D scene of a run until it is stopped or its parent exits.
 
 The first line of output is the URL. User errors are one line on standard error, with exit code 2.
 """
@@ -19,13 +19,14 @@ from ddenv.runfile.store import RunFile
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server
 from ddenv.scene.stage import Stage
+from ddenv.runs.wanted import read
 
 PERIOD = 0.05  # time between two updates of the scene, s
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise UserError(f"{message}; usage: python -m ddenv.scene RUN [--port N]")
+        raise UserError(f"{message}; usage: python -m ddenv.scene RUN [--port N] [--pointed]")
 
 
 def main() -> int:
@@ -33,7 +34,7 @@ def main() -> int:
     try:
         arguments = _arguments()
         with RunFile(arguments.run) as run:
-            asyncio.run(_serve(run, arguments.port, parent))
+            asyncio.run(_serve(run, arguments.port, parent, arguments.pointed))
     except UserError as error:
         print(f"ddenv.scene: {error}", file=sys.stderr)
         return 2
@@ -44,10 +45,11 @@ def _arguments() -> argparse.Namespace:
     parser = _Parser(prog="python -m ddenv.scene", description="Serves the 3-D scene of a run on this machine.")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run file")
     parser.add_argument("--port", type=int, default=0, help="port on 127.0.0.1; 0 takes a free one from 7000 up")
+    parser.add_argument("--pointed", action="store_true", help="read from standard input what to show")
     return parser.parse_args()
 
 
-async def _serve(run: RunFile, port: int, parent: int) -> None:
+async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -58,11 +60,25 @@ async def _serve(run: RunFile, port: int, parent: int) -> None:
     player = Player(run, stage, server.say)
     player.tick(time.monotonic())
     print(server.listen(port), flush=True)
+    if pointed:
+        os.set_blocking(sys.stdin.fileno(), False)
+        loop.add_reader(sys.stdin.fileno(), _point, player, loop)
     while not ended.is_set() and os.getppid() == parent:
         if server.viewers:
             player.tick(time.monotonic())
         await asyncio.sleep(PERIOD)
     await server.close()
+
+
+def _point(player: Player, loop: asyncio.AbstractEventLoop) -> None:
+    """Shows what the last line of standard input asks for: a viewer writes each line at once."""
+    said = os.read(sys.stdin.fileno(), 1 << 16)
+    if not said:
+        loop.remove_reader(sys.stdin.fileno())
+        return
+    wanted = read(said.decode(errors="replace").splitlines()[-1])
+    if wanted is not None:
+        player.show(wanted)
 
 
 if __name__ == "__main__":

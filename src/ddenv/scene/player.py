@@ -8,16 +8,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
 from ddenv.runs.creation import read_parts
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import Scenery, circle, flag, mark
-from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot
+from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot, shot_of
 from ddenv.scene.stage import Stage
+from ddenv.runs.wanted import Wanted, row_of
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Goal, Spawn
 
@@ -32,7 +33,8 @@ class Player:
         self._run, self._stage, self._say = run, stage, say
         scenario, world, robot = read_parts(run)
         self._name = scenario.name
-        self._state = RunState()
+        self._position = Position(run.events)
+        self._wanted = Wanted()
         self._elements = world.elements(frozenset(scenario.protected))
         self._scenery = Scenery(stage, world, robot, self._elements)
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
@@ -54,6 +56,16 @@ class Player:
         flag(self._stage, "goal", end, goal.tolerance, colors.GOAL)
         self._scenery.place_robot(self._start)
 
+    @property
+    def _state(self) -> RunState:
+        """The run at the moment that is shown."""
+        return self._position.now
+
+    def show(self, wanted: Wanted) -> None:
+        """Shows another moment of the run, or another row of its table, from the next tick on."""
+        self._wanted, self._read_at = wanted, -math.inf
+        self._position.go(wanted.at)
+
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
         if now - self._read_at >= READ_EVERY:
@@ -66,15 +78,19 @@ class Player:
             self._looked_at = now
             self._engine = engine_is_alive(self._run.path)
         # A killed engine leaves its rows behind. Read rows before events, so that their tests are known.
-        self._live = self._run.live() if self._engine else []
-        self._state = fold(self._run.events(self._state.revision), self._state)
-        following = shot(self._state, self._live, self._shot, now - self._ran_at)
+        self._live = self._run.live() if self._engine and self._wanted.at is None else []
+        self._position.catch_up()
+        row = row_of(self._state, self._wanted)
+        following = shot_of(self._state, row, self._live) if row else self._usual(now)
         if any(row.test == following.test for row in self._live):
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
             self._show_evidence()
         if following != self._shot:
             self._cut(following, now)
+
+    def _usual(self, now: float) -> Shot:
+        return shot(self._state, self._live, self._shot, now - self._ran_at)
 
     def _cut(self, following: Shot, now: float) -> None:
         before, self._shot = self._shot, following

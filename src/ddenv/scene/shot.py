@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.store import Live
-from ddenv.runfile.supports import stack_with
-from ddenv.words import first_of
+from ddenv.runfile.tested import Purpose, purpose
 from ddenv.world.pose import Pose
 
 SPEED = 4.0  # of a replay, relative to real time
@@ -50,6 +49,19 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
     return _of_test(state, "replay", test)
 
 
+def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Shot:
+    """What to show of a candidate or a try: the test that runs, or the last one that showed f, or the last one that ended."""
+    tests = [state.tests[id - 1] for id in row.tests if 0 < id <= len(state.tests)]
+    # At an earlier moment of the run, what ran then has ended by now.
+    running = [test for test in tests if test.outcome == "running"]
+    similar = [test for test in tests if test.outcome == "similar"]
+    found = (running[:1] or similar[-1:] or tests[-1:])[:1]
+    if not found:
+        return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
+    kind = "live" if any(each.test == found[0].id for each in live) and running else "replay"
+    return _of_test(state, kind, found[0], Purpose(row.label, row.models))
+
+
 def _is_running(state: RunState, test: int) -> bool:
     return 0 < test <= len(state.tests) and state.tests[test - 1].outcome == "running"
 
@@ -65,22 +77,12 @@ def _to_replay(state: RunState) -> Test | None:
     return next((test for test in reversed(state.tests) if test.is_finished), None)
 
 
-def _of_test(state: RunState, kind: str, test: Test) -> Shot:
-    name, models = "baseline", frozenset(state.elements)
-    if test.id == state.evidence_test and kind == "replay":
+def _of_test(state: RunState, kind: str, test: Test, made: Purpose | None = None) -> Shot:
+    made, chosen = made or purpose(state, test), made is not None
+    name, models = made.words, frozenset(state.environment if made.models is None else made.models)
+    if test.id == state.evidence_test and kind == "replay" and not chosen:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)
-    elif test.candidate is not None and state.round is not None and test.round == state.round.number:
-        candidate = state.round.candidates[test.candidate]
-        name, models = f"round {test.round} · {candidate.label}", frozenset(candidate.models)
-    elif test.phase == "round":
-        name, models = f"round {test.round}", frozenset(state.environment)
-    elif test.phase in FRESH:
-        environment = state.nodes[test.node].environment
-        gone = stack_with(state, environment, test.without)
-        whole = "the whole world" if len(environment) == len(state.elements) else "what is left"
-        name = f"{whole} without {first_of(gone, 1)}" if gone else f"{whole}, in full"
-        models = frozenset(environment) - frozenset(gone)
     words = [name, f"test {test.id}"]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -33,6 +33,8 @@ class Entry:
 class KeyFooter(Widget):
     """Shows bindings by id. `shown` is their order on the screen, `first` their priority if not all fit.
 
+    Where `instead` returns ids, these are shown in their place, in this order: a pane with the focus has keys of its own.
+
     A click on a key presses it. It is one widget, since the focus moves often and the keys change with it.
     """
 
@@ -50,8 +52,11 @@ class KeyFooter(Widget):
     }
     """
 
-    def __init__(self, shown: Sequence[str], first: Sequence[str]) -> None:
+    def __init__(
+        self, shown: Sequence[str], first: Sequence[str], instead: Callable[[], Sequence[str]] = tuple
+    ) -> None:
         super().__init__()
+        self._instead = instead
         self._order, self._first = tuple(shown), tuple(first)
         self._words: dict[str, str] = {}
         self.entries: tuple[Entry, ...] = ()
@@ -63,6 +68,10 @@ class KeyFooter(Widget):
         if self._words.get(id) != words:
             self._words[id] = words
             self._renew()
+
+    def renew(self) -> None:
+        """Shows the keys that `instead` returns now."""
+        self._renew()
 
     def on_mount(self) -> None:
         self.screen.bindings_updated_signal.subscribe(self, self._bindings_changed)
@@ -87,7 +96,8 @@ class KeyFooter(Widget):
         active = {each.binding.id: each for each in offered(self.screen)}
         room = self.screen.size.width
         found: dict[str, Entry] = {}
-        for id in self._first:
+        instead = self._instead()
+        for id in instead or self._first:
             if id not in active:
                 continue
             binding = active[id].binding
@@ -96,7 +106,7 @@ class KeyFooter(Widget):
             if words and entry.width <= room:
                 found[id] = entry
                 room -= entry.width
-        return tuple(found[id] for id in self._order if id in found)
+        return tuple(found[id] for id in instead or self._order if id in found)
 
     def render(self) -> Text:
         key, words = (self.get_component_rich_style(f"key-footer--{part}", partial=True) for part in ("key", "words"))

@@ -30,6 +30,16 @@ LEGEND = (
     ("↗", "robot"),
     ("#", "protected"),
 )
+# These are shown only where they are on the map.
+PARTS, SELECTED, PINNED, FALLING, SENSED, NO_PART, FIRST_PATH = MORE_SIGNS = (
+    ("A B", "parts"),
+    ("*", "selected"),
+    ("+", "pinned"),
+    (DROPS, "drops"),
+    ("1 2", "order sensed"),
+    ("a b", "took no part"),
+    ("⠒ ⠒", "path of f"),
+)
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
@@ -40,13 +50,13 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
     """
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
-        ("A B", "parts"): bool(state.elements),
-        ("*", "selected"): bool(shown.selection),
-        ("+", "pinned"): bool(state.pinned) and "pinned" in layers,
-        (DROPS, "drops"): shown.candidate is not None and bool(drops(state, shown.candidate)),
-        ("1 2", "order sensed"): "sensed" in layers and state.evidence_test is not None,
-        ("a b", "took no part"): "took part" in layers and in_last(state) is not None,
-        ("⠒ ⠒", "path of f"): "original" in layers and not same_paths,
+        PARTS: bool(state.elements),
+        SELECTED: bool(shown.selection),
+        PINNED: bool(state.pinned) and "pinned" in layers,
+        FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),
+        SENSED: "sensed" in layers and state.evidence_test is not None,
+        NO_PART: "took part" in layers and in_last(state) is not None,
+        FIRST_PATH: "original" in layers and not same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]
     text = Text(no_wrap=True, overflow="ellipsis")

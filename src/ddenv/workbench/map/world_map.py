@@ -49,7 +49,9 @@ class WorldMap(Widget, can_focus=True):
         Binding("shift+down", "pan(0, -1)", "pan", show=False, id="map.pan_down", tooltip="move the map down"),
         Binding("enter", "pick", "select", id="map.pick", tooltip="select or unselect the model under the crosshair"),
         Binding("left_square_bracket", "neighbour(-1)", show=False, id="map.previous", tooltip="to the previous model"),
-        Binding("right_square_bracket", "neighbour(1)", show=False, id="map.next", tooltip="to the next model"),
+        Binding(
+            "right_square_bracket", "neighbour(1)", "next model", show=False, id="map.next", tooltip="to the next model"
+        ),
     ]
 
     @dataclass

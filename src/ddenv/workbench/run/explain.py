@@ -51,7 +51,9 @@ def explain(snapshot: Snapshot) -> Explanation:
     options = settings(state)
     shown = listing(options.algorithm, options.growth)
     step, sentences = _happening(snapshot)
-    if not snapshot.error:
+    if snapshot.past:
+        sentences = (snapshot.happened, *sentences)
+    elif not snapshot.error:
         first = (*older_engine(snapshot), *refuted(state), *rarer(state), *to_adopt(state))
         sentences = (*first, *sentences, *implied(state), *by_hand(state))
     line = None if step is None else shown.line(step, state.round)

@@ -9,6 +9,7 @@ from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.browsing import NOT_NOW, Browsing
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll
@@ -25,12 +26,15 @@ TITLES = {
 class KeyOffers:
     """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in `table` and `world`."""
 
-    def __init__(self, poll: Poll, table: Candidates, world: WorldMap, asking: Asking, opening: Opening) -> None:
+    def __init__(
+        self, browsing: Browsing, poll: Poll, table: Candidates, world: WorldMap, asking: Asking, opening: Opening
+    ) -> None:
+        self._browsing = browsing
         self._poll, self._table, self._world, self._asking, self._opening = poll, table, world, asking, opening
 
     def offer(self, name: str) -> Offer:
         """What a key does now."""
-        return offer(name, self._asking.situation, self.pointed)
+        return Offer(why_not=NOT_NOW) if self._browsing.is_past else offer(name, self._asking.situation, self.pointed)
 
     @property
     def pointed(self) -> Pointed:
@@ -61,6 +65,9 @@ class KeyOffers:
 
     def use(self, name: str) -> None:
         """Does what a key means now; it asks for models if none are selected but some are needed."""
+        if self._browsing.is_past:
+            self._asking.refuse(NOT_NOW)
+            return
         command = self.offer(name).command
         if command is not None:
             self._asking.ask(command)

@@ -12,6 +12,8 @@ from textual.screen import Screen
 from ddenv.guiding.course import GoBack
 from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
+from ddenv.guiding.situation import Row
+from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
 from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
@@ -66,6 +68,32 @@ class Opening:
                 self._asking.ask(AcceptOther(test, instead=True), sure=True)
 
         self._screen.app.push_screen(FailuresMet(lambda: self._asking.situation), chosen)
+
+    def rounds(self, position: Position, then: Callable[[int], None]) -> None:
+        """Lists the rounds so far; `then` takes the event that ends the chosen one."""
+        from ddenv.workbench.run.rounds_dialog import Rounds
+
+        dialog = Rounds(tuple(position.chapters), position.at)
+        self._screen.app.push_screen(dialog, lambda chapter: then(chapter.last) if chapter else None)
+
+    def facts(self, position: Position, row: Row | None) -> None:
+        """Shows the raw facts of the last test of a row that showed f, or of its last one, or of the last one of all."""
+        from ddenv.workbench.run.facts_dialog import FactsDialog
+
+        tests = position.now.tests
+        if not tests:
+            self._asking.refuse("there are no tests yet")
+            return
+        mine = [id for id in row.tests if 0 < id <= len(tests)] if row is not None else []
+        similar = [id for id in mine if tests[id - 1].outcome == "similar"]
+        test = (similar or mine or [len(tests)])[-1]
+        self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path)))
+
+    def signs(self) -> None:
+        """Shows what the signs mean."""
+        from ddenv.workbench.help.signs import SignsDialog
+
+        self._screen.app.push_screen(SignsDialog())
 
     def layers(self, then: Callable[[], None]) -> None:
         """Asks what the map shows; `then` is called when that is chosen."""

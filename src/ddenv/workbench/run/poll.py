@@ -40,7 +40,8 @@ class Snapshot:
     `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path
     in f itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the
     run file cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
-    `behind` says that not all of it was read yet.
+    `behind` says that not all of it was read yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that
+    moment, and `happened` says what happened there.
     """
 
     state: RunState = field(default_factory=RunState)
@@ -52,6 +53,9 @@ class Snapshot:
     original: array[float] | None = None
     gone: bool = False
     behind: bool = False
+    past: bool = False
+    pointed: Candidate | None = None
+    happened: str = ""
 
     @property
     def older_engine(self) -> str:
@@ -64,20 +68,22 @@ class Snapshot:
         """The state's status, or "starting" or "lost" if the engine's lock says so."""
         if self.engine == "starting":
             return "starting"
-        if self.state.ended or self.behind or self.engine == "alive" or self.state.status == "created":
+        if self.state.ended or self.behind or self.past or self.engine == "alive" or self.state.status == "created":
             return self.state.status
         return "lost"
 
     @property
     def running(self) -> tuple[Test, ...]:
         """The tests that run now, in the order they were started; none when no engine is there to run them."""
-        if self.engine != "alive":
+        if self.engine != "alive" and not self.past:
             return ()
         return self.state.running_tests
 
     @property
     def focus(self) -> Candidate | None:
         """The current candidate: the one that waits, or else the first one that is being tested."""
+        if self.past:
+            return self.pointed
         current = self.state.round
         if current is None or current.done or self.status in ("finished", "lost"):
             return None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
 from ddenv.errors import UserError
+from ddenv.runs.wanted import Wanted, written
 from ddenv.workbench.wording import plain
 
 # Exit codes of an engine that has finished or was stopped.
@@ -65,6 +68,7 @@ class Scene:
         self.url = ""
         self.trouble = ""
         self._process: subprocess.Popen[str] | None = None
+        self._wanted = Wanted()
 
     @property
     def on(self) -> bool:
@@ -77,8 +81,23 @@ class Scene:
         self.url = self.trouble = ""
         try:
             self._process = start_scene(self.run)
+            self._ask()
         except OSError as error:
             self.trouble = f"the scene cannot be started: {error.strerror}"
+
+    def show(self, wanted: Wanted) -> None:
+        """What it shows from now on, once it is on."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self._ask()
+
+    def _ask(self) -> None:
+        if self._process is None or self._process.stdin is None:
+            return
+        # A scene that hangs must not stop the screen, and one that has ended needs nothing.
+        with suppress(OSError):
+            os.set_blocking(self._process.stdin.fileno(), False)
+            os.write(self._process.stdin.fileno(), written(self._wanted).encode())
 
     def wait(self) -> None:
         """Blocks until the program has printed its URL or has ended: not for the screen's thread."""
@@ -117,8 +136,9 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def _close(process: subprocess.Popen[str]) -> None:
-    if process.stdout is not None:
-        process.stdout.close()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            pipe.close()
 
 
 def last_line(log: Path) -> str:

@@ -110,10 +110,31 @@ _KEYS = [
     _hidden("4", "pane('now')", "what is happening", "run.now", "what is happening, in words"),
     _hidden("5,L", "pane('log')", "log", "run.log", "the log: what happened so far, with the time of day"),
     _hidden("g", "next_pane", "next pane", "run.next_pane", "the next pane"),
-    _hidden("escape", "follow", "follow", "run.follow", "select nothing; cursor and map follow the run again"),
+    _hidden("escape", "follow", "follow", "run.follow", "back to now; select nothing; cursor and map follow the run again"),
     _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
     _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
     _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
+    _hidden("comma", "browse('moment', -1)", "back", "run.back", "back in the run: to the moment before this one", ","),
+    _hidden("full_stop", "browse('moment', 1)", "on", "run.on", "on to the next moment; after the last one comes now", "."),
+    _hidden(
+        "less_than_sign", "browse('round', -1)", "round before", "run.round_before", "to the end of the round before", "<"
+    ),
+    _hidden(
+        "greater_than_sign", "browse('round', 1)", "next round", "run.next_round", "to the end of this or the next round", ">"
+    ),
+    _hidden(
+        "left_parenthesis", "browse('decision', -1)", "", "run.decision_before", "to the verdict or decision before", "("
+    ),
+    _hidden(
+        "right_parenthesis", "browse('decision', 1)", "", "run.next_decision", "to the next verdict or decision", ")"
+    ),
+    _hidden(
+        "left_curly_bracket", "browse('reduction', -1)", "", "run.reduction_before", "to the reduction before", "{"
+    ),
+    _hidden("right_curly_bracket", "browse('reduction', 1)", "", "run.next_reduction", "to the next reduction", "}"),
+    _hidden("b", "rounds", "rounds", "run.rounds", "the list of all rounds so far: go to the end of any"),
+    _hidden("i", "facts", "facts", "run.facts", "the raw facts of a test, and the command that makes it again"),
+    _hidden("k", "signs", "signs", "run.signs", "what the signs and letters on this screen mean"),
     _hidden("r", "guide('resume')", "resume", "run.resume", "start the engine again"),
     _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
     _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
@@ -123,7 +144,7 @@ KEYS: list[BindingType] = [*_KEYS]
 GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
 GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
 # The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = ("run.find", "run.layers", "run.copy", "run.scene", "run.runs")
+MORE = ("run.signs", "run.facts", "run.rounds", "run.find", "run.layers", "run.copy", "run.scene", "run.runs")
 SHOWN = tuple(
     id
     for binding in _KEYS
@@ -147,5 +168,17 @@ FIRST = (
     "run.only",
     *MORE,
 )
+# While an earlier moment is shown, and while the map has the focus.
+BROWSING = (
+    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
+    *("run.quit", "run.signs"),
+)
+ON_MAP = (
+    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
+    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
+)
 # The footer of a screen that only watches.
-LOOKING = ("run.history", "run.export", "run.find", "run.copy", "run.layers", "run.help", "run.quit")
+LOOKING = (
+    *("run.history", "run.rounds", "run.facts", "run.export", "run.find", "run.copy", "run.layers", "run.signs", "run.help"),
+    "run.quit",
+)

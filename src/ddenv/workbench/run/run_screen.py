@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,13 +16,17 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.errors import UserError
+from ddenv.runfile.position import Step
+from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
+from ddenv.runs.wanted import Wanted
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
@@ -33,7 +38,7 @@ from ddenv.workbench.run.models_left import ModelsLeft
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine, Scene
-from ddenv.workbench.run.run_keys import FIRST, GUIDES, KEYS, LOOKING, SHOWN
+from ddenv.workbench.run.run_keys import BROWSING, FIRST, GUIDES, KEYS, LOOKING, ON_MAP, SHOWN
 from ddenv.workbench.run.status import Header, Status
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
@@ -67,20 +72,21 @@ class RunScreen(Screen[None]):
         super().__init__()
         self.run = run
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
-        self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._log.add)
+        self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
+        self.browsing = Browsing(self.poll)
         self._table, self._map, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
-        self._footer = KeyFooter(LOOKING, LOOKING) if watch else KeyFooter(SHOWN, FIRST)
+        self._footer = KeyFooter(*((LOOKING, LOOKING) if watch else (SHOWN, FIRST)), self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
         self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
-        self._keys = KeyOffers(self.poll, self._table, self._map, self.asking, self._opening)
+        self._keys = KeyOffers(self.browsing, self.poll, self._table, self._map, self.asking, self._opening)
         self._pane = "map"
         self._title: tuple[str, str] = ("", "")
 
     @property
     def snapshot(self) -> Snapshot:
-        """The run as it was seen last."""
-        return self.poll.snapshot
+        """The run as it was seen last, or at the earlier moment that is shown."""
+        return self.browsing.snapshot
 
     def compose(self) -> ComposeResult:
         yield Header(id="header")
@@ -157,7 +163,7 @@ class RunScreen(Screen[None]):
     # From the run file to the screen.
 
     def _seen(self, before: Snapshot, live: bool) -> None:
-        if self.snapshot.engine == "alive":
+        if self.poll.snapshot.engine == "alive":
             self.engine.seen_at_work()
         self.asking.show_refusal(before)
         if live:
@@ -168,7 +174,8 @@ class RunScreen(Screen[None]):
             self._show_run()
             self.asking.go_on()
         snapshot = self.snapshot
-        self.query_one(Happening).show(snapshot, "" if snapshot.engine == "alive" else self.engine.trouble)
+        well = snapshot.past or snapshot.engine == "alive"
+        self.query_one(Happening).show(snapshot, "" if well else self.engine.trouble)
         self._show_asked()
 
     def _show_run(self) -> None:
@@ -193,12 +200,27 @@ class RunScreen(Screen[None]):
         self.app.title = f"ddenv {shorten(plain(snapshot.state.scenario.get('name', '')), 60)}"
 
     def _show_asked(self) -> None:
-        self.query_one(Status).show(self.snapshot, self.scene.url if self.scene.on else "", self.asking.waiting_for())
+        place = self.browsing.position.place if self.browsing.is_past else None
+        scene = self.scene.url if self.scene.on else ""
+        self.query_one(Status).show(self.snapshot, scene, self.asking.waiting_for(), place)
         self._show_keys()
 
     def _show_map(self) -> None:
-        self._map.show(self.snapshot, self._table.chosen or self.following.candidate)
+        snapshot = self.snapshot
+        focus = snapshot.focus if snapshot.past else self.following.candidate
+        self._map.show(snapshot, self._table.chosen or focus)
         self._show_legend()
+        self._show_scene(self._table.chosen or (focus if snapshot.past else None))
+
+    def _show_scene(self, row: Candidate | Trial | None) -> None:
+        """The scene shows the same moment and the row that the user chose."""
+        at, round = self.browsing.position.at, self.snapshot.state.round
+        if isinstance(row, Trial):
+            self.scene.show(Wanted(at, trial=row.number))
+        elif row is not None and round is not None:
+            self.scene.show(Wanted(at, round.number, row.index))
+        else:
+            self.scene.show(Wanted(at))
 
     def _show_legend(self) -> None:
         selection, candidate, state = self._map.selection, self._map.candidate, self._map.snapshot.state
@@ -229,7 +251,45 @@ class RunScreen(Screen[None]):
         if not self.poll.watch and self._footer.is_attached:
             self._keys.show(self._footer)
 
+    def _keys_here(self) -> tuple[str, ...]:
+        """The keys of what has the focus, if the footer shows them in place of the screen's."""
+        if self.browsing.is_past:
+            return BROWSING
+        return ON_MAP if self._map.has_focus else ()
+
+    # Earlier moments of the run.
+
+    def _note(self, kind: str, before: RunState, after: RunState) -> None:
+        self._log.add(kind, before, after)
+        self.browsing.position.note(kind, before, after)
+
+    def action_browse(self, what: Step, by: int) -> None:
+        self._browse(lambda: self.browsing.step(what, by))
+
+    def action_rounds(self) -> None:
+        self._opening.rounds(self.browsing.position, lambda id: self._browse(lambda: self.browsing.go(id) or ""))
+
+    def _browse(self, move: Callable[[], str]) -> None:
+        """Shows another moment, or why there is none."""
+        try:
+            if why := move():
+                self.asking.refuse(why)
+                return
+            self.browsing.snapshot  # noqa: B018  (it is read here, where an error has somewhere to go)
+        except UserError as error:
+            self.browsing.go(None)
+            self.asking.refuse(str(error))
+        self._table.follow()
+        self._show(True)
+        self._footer.renew()
+
     # Dialogs and other screens.
+
+    def action_facts(self) -> None:
+        self._opening.facts(self.browsing.position, self._table.under_cursor)
+
+    def action_signs(self) -> None:
+        self._opening.signs()
 
     def action_history(self) -> None:
         self._opening.history()
@@ -308,6 +368,9 @@ class RunScreen(Screen[None]):
         self._show_pane(names[(names.index(self._pane) + 1) % len(names)])
 
     def action_follow(self) -> None:
+        if self.browsing.is_past:
+            self._browse(lambda: self.browsing.go(None) or "")
+            return
         self._map.clear_selection()
         self._table.follow()
         self._table.show(self.snapshot)

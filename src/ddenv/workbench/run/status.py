@@ -79,18 +79,22 @@ class Status(Widget):
         super().__init__(id=id)
         self._facts: tuple[Fact, ...] = ()
         self._snapshot: Snapshot | None = None
-        self._besides = ("", "")
+        self._besides: tuple[str, str, tuple[int, int] | None] = ("", "", None)
         self._tests: PersistentTuple[Test] = PersistentTuple()
         self._cut = 0
 
-    def show(self, snapshot: Snapshot, scene: str = "", asked: str = "") -> None:
-        """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer."""
-        if (scene, asked) == self._besides and snapshot is self._snapshot:
+    def show(self, snapshot: Snapshot, scene: str = "", asked: str = "", place: tuple[int, int] | None = None) -> None:
+        """`scene` is the URL of the 3-D scene while it is on, `asked` the command that waits for its answer.
+
+        At an earlier moment of the run, `place` is its number, and the number of moments.
+        """
+        if (scene, asked, place) == self._besides and snapshot is self._snapshot:
             return
         tests = snapshot.state.tests
-        self._cut = cut_tests(tests, self._tests, self._cut)
-        self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked)
-        now = facts(snapshot, scene, asked, self._cut)
+        if not snapshot.past:
+            self._cut = cut_tests(tests, self._tests, self._cut)
+        self._tests, self._snapshot, self._besides = tests, snapshot, (scene, asked, place)
+        now = facts(snapshot, scene, asked, self._cut) if place is None else facts_of_past(snapshot, scene, *place)
         if now != self._facts:
             self._facts = now
             self.refresh()
@@ -104,7 +108,8 @@ class Status(Widget):
     def _style(self, name: str) -> Style:
         if name == "state":
             colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
-            variable = colors.get(self._snapshot.status if self._snapshot else "", "text-success")
+            status = self._snapshot.status if self._snapshot else ""
+            variable = "text-warning" if self._besides[2] else colors.get(status, "text-success")
             return ink(self.app.theme_variables, variable, bold=True)
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
@@ -174,6 +179,18 @@ def facts(
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
     )
     return tuple(fact for fact in said if fact.forms[0])
+
+
+def facts_of_past(snapshot: Snapshot, scene: str, moment: int, moments: int) -> tuple[Fact, ...]:
+    """What the status line says at an earlier moment of the run."""
+    scene_said = ("scene shows it", "") if scene else ("", "")
+    return (
+        Fact("state", (f"◂ moment {moment} of {moments}",)),
+        Fact("mode", ("escape: now",)),
+        Fact("tests", tests_said(snapshot.state)),
+        Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
+        Fact("left", scene_said),
+    )
 
 
 def fitted(said: Sequence[Fact], width: int) -> list[tuple[str, str]]:

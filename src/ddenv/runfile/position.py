@@ -1,0 +1,187 @@
+"""A position in the events of a run: at its end, or at any earlier moment. Views, playback and lessons move it alike."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from ddenv.runfile.fold import apply
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import Event
+
+# What a step goes to: the next event that a viewer sees; the end of the next chapter; the next reduction; the next verdict or
+# decision of the user.
+Step = Literal["moment", "round", "reduction", "decision"]
+# A state is kept for so many events, and at most so many are kept: after that the gaps between them double.
+GAP, KEPT = 64, 512
+# These change nothing that a viewer sees.
+_UNSEEN = ("command_handled", "command_refused", "forecast", "round_finished", "leg_started", "comparing", "confirm_started")
+_VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
+
+
+@dataclass(frozen=True, slots=True)
+class Chapter:
+    """The baseline, a round or a certificate: `kind` with its `number`. It has events from `first` to `last`.
+
+    It begins with `models` and ends with `left` of them. `tests` were finished when it began.
+    """
+
+    kind: Literal["baseline", "round", "certificate"]
+    number: int
+    first: int
+    last: int
+    models: int
+    left: int
+    tests: int
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """An event, with the states before and after it."""
+
+    event: Event
+    before: RunState
+    after: RunState
+
+
+class Position:
+    """Finds the state at any event quickly, from states that it keeps of some of them.
+
+    `read(after, most)` returns events with an id above `after`, as `RunFile.events` does. Each event is noted once, in order:
+    by the one who folds them, or by `catch_up`. Event ids stand for positions; `at` is None at the end, also while it grows.
+    """
+
+    def __init__(self, read: Callable[[int, int], list[Event]]) -> None:
+        self._read = read
+        self.at: int | None = None
+        self.end = RunState()
+        self.chapters: list[Chapter] = []
+        self._gap = GAP
+        self._kept: list[RunState] = [self.end]
+        self._ids = array("q", [0])
+        # The events that started the tests, by the tests' ids less one.
+        self._starts = array("q")
+        self._stops: dict[Step, array[int]] = {step: array("q") for step in get_args(Step) if step != "round"}
+        # The moments between two kept states that were visited last.
+        self._near: list[Moment] = []
+
+    # As the run grows.
+
+    def note(self, kind: str, before: RunState, after: RunState) -> None:
+        """Notes an event of this kind between two states. One that was noted already is ignored."""
+        id = after.revision
+        if id <= self._ids[-1]:
+            return
+        self.end = after
+        self._ids.append(id)
+        if (len(self._ids) - 1) % self._gap == 0:
+            self._kept.append(after)
+            if len(self._kept) > KEPT:
+                del self._kept[1::2]
+                self._gap *= 2
+        if len(after.tests) > len(before.tests):
+            self._starts.append(id)
+        if kind not in _UNSEEN:
+            self._stops["moment"].append(id)
+        if kind in _VERDICTS or len(after.decisions) > len(before.decisions):
+            self._stops["decision"].append(id)
+        if len(after.environment) < len(before.environment) and len(after.nodes) > len(before.nodes):
+            self._stops["reduction"].append(id)
+        self._add_to_chapter(kind, before, after)
+
+    def catch_up(self) -> None:
+        """Reads and notes all new events. Raises UserError for an invalid one."""
+        for event in self._read(self.end.revision, -1):
+            before = self.end
+            self.note(event.kind, before, apply(before, event))
+
+    def _add_to_chapter(self, kind: str, before: RunState, after: RunState) -> None:
+        id, models, last = after.revision, len(after.environment), self.chapters[-1] if self.chapters else None
+        if kind == "round_started" and after.round is not None:
+            self.chapters.append(Chapter("round", after.round.number, id, id, models, models, after.tests_done))
+        elif kind == "certificate_started":
+            number = after.certificates[-1].number
+            self.chapters.append(Chapter("certificate", number, id, id, models, models, after.tests_done))
+        elif last is None:
+            self.chapters.append(Chapter("baseline", 0, id, id, models, models, 0))
+        elif kind not in _UNSEEN and _goes_on(last, after):
+            self.chapters[-1] = replace(last, last=id, left=models)
+
+    # Where it is.
+
+    @property
+    def now(self) -> RunState:
+        """The state at the position."""
+        return self.end if self.at is None else self.state(self.at)
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """The number of the position's moment, and of how many."""
+        moments = self._stops["moment"]
+        return (len(moments) if self.at is None else bisect_right(moments, self.at)), len(moments)
+
+    def state(self, id: int) -> RunState:
+        """The state after the last event up to `id`."""
+        found = self.moment(id)
+        return self._kept[0] if found is None else found.after
+
+    def moment(self, id: int) -> Moment | None:
+        """The last event up to `id`; None if there is none."""
+        place = bisect_right(self._ids, id) - 1
+        if place <= 0:
+            return None
+        wanted = self._ids[place]
+        if not (self._near and self._near[0].event.id <= wanted <= self._near[-1].event.id):
+            self._load((place - 1) // self._gap)
+        near = [each.event.id for each in self._near]
+        return self._near[bisect_right(near, wanted) - 1]
+
+    def start_of(self, test: int) -> Moment | None:
+        """The moment in which a test started; None if there is no such test."""
+        return self.moment(self._starts[test - 1]) if 0 < test <= len(self._starts) else None
+
+    def _load(self, number: int) -> None:
+        """Folds the events that follow a kept state."""
+        state, near = self._kept[number], []
+        for event in self._read(state.revision, self._gap):
+            if event.id > self._ids[-1]:
+                break
+            before, state = state, apply(state, event)
+            near.append(Moment(event, before, state))
+        self._near = near
+
+    # Moves.
+
+    def go(self, id: int | None) -> None:
+        """Goes to the last event up to `id`, or to the end."""
+        place = 0 if id is None else bisect_right(self._ids, id) - 1
+        self.at = None if id is None or id >= self._ids[-1] else self._ids[max(1, place)]
+
+    def step(self, what: Step, by: int) -> bool:
+        """Goes to the next of these (`by` 1) or to the one before (-1); False if there is none. After the last comes the end."""
+        stops = array("q", (each.last for each in self.chapters)) if what == "round" else self._stops[what]
+        here = self._ids[-1] if self.at is None else self.at
+        if by < 0:
+            place = bisect_left(stops, here) - 1
+            if self.at is None and what == "round":
+                # From the end, which is in the last chapter, one goes to the chapter before it.
+                place = min(place, len(stops) - 2)
+            if place < 0:
+                return False
+            self.at = stops[place]
+            return True
+        if self.at is None:
+            return False
+        place = bisect_right(stops, here)
+        self.go(stops[place] if place < len(stops) else None)
+        return True
+
+
+def _goes_on(chapter: Chapter, state: RunState) -> bool:
+    """Whether the run is still in its last chapter: what a chapter showed is gone once the run goes elsewhere."""
+    if chapter.kind == "round":
+        return state.round is not None and not state.round.done and state.round.number == chapter.number
+    return chapter.kind == "baseline" or state.certificate is not None

@@ -1,0 +1,45 @@
+"""What a test was made for, and which models were in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ddenv.amounts import first_of
+from ddenv.runfile.state import FRESH, Candidate, RunState, Test, Trial
+from ddenv.runfile.supports import stack_with
+
+
+@dataclass(frozen=True, slots=True)
+class Purpose:
+    """`words` say what a test was made for. `models` were in it; None if that is known no more: its round is over."""
+
+    words: str
+    models: tuple[str, ...] | None
+
+
+def purpose(state: RunState, test: Test) -> Purpose:
+    """What `test` was made for, as far as `state` knows: all of it in the state in which the test started."""
+    row = made_for(state, test)
+    if row is not None:
+        where = f"round {test.round} · " if isinstance(row, Candidate) else ""
+        return Purpose(f"{where}{row.label}", row.models)
+    if test.phase == "round":
+        return Purpose(f"round {test.round}", None)
+    if test.phase in FRESH:
+        environment = state.nodes[test.node].environment
+        gone = stack_with(state, environment, test.without)
+        whole = "the whole world" if len(environment) == len(state.elements) else "what is left"
+        words = f"{whole} without {first_of(gone, 1)}" if gone else f"{whole}, in full"
+        left_out = frozenset(gone)
+        return Purpose(words, tuple(name for name in environment if name not in left_out))
+    return Purpose("baseline", state.elements)
+
+
+def made_for(state: RunState, test: Test) -> Candidate | Trial | None:
+    """The candidate of the current round, or the try, that a test was made for."""
+    if test.trial is not None:
+        return state.trials[test.trial - 1] if 0 < test.trial <= len(state.trials) else None
+    current = state.round
+    if current is None or test.round != current.number or test.candidate is None:
+        return None
+    return current.candidates[test.candidate] if 0 <= test.candidate < len(current.candidates) else None

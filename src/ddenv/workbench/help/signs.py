@@ -1,0 +1,78 @@
+"""What every sign and letter on the run's screens means, in one list: one key away from each of them."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical, VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from ddenv.workbench.history import branches
+from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
+from ddenv.workbench.wording import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
+
+Signs = tuple[tuple[str, str], ...]
+
+
+def signs() -> dict[str, Signs]:
+    """(sign, meaning) by where they stand."""
+    return {
+        "On the map": (*((sign, words) for sign, words in MORE_SIGNS), *LEGEND),
+        "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
+        "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
+        "Verdicts of a certificate": _joined(CLAIM),
+        "States of a run": tuple((sign, words) for sign, words in STATUS.values()),
+        "In the history": (
+            (branches.HERE, "where the run is"),
+            (branches.MINIMAL, "a minimal environment"),
+            (branches.REJECTED, "taken back, or f is too rare in it"),
+            (branches.OTHER, "another environment that the run reached"),
+        ),
+        "In the status line": (("◂", "an earlier moment of the run is shown"), ("▼", "f is rarer than it should be")),
+    }
+
+
+def _split(words: dict[str, str]) -> Signs:
+    """Of words that begin with their sign."""
+    return tuple((each[0], each[2:]) for each in words.values())
+
+
+def _joined(meanings: dict[str, str]) -> Signs:
+    """Meanings of one sign together."""
+    found: dict[str, list[str]] = {}
+    for words, sign in meanings.items():
+        found.setdefault(sign, []).append(words)
+    return tuple((sign, " or ".join(words)) for sign, words in found.items())
+
+
+class SignsDialog(ModalScreen[None]):
+    """All signs with their meanings."""
+
+    BINDINGS: ClassVar = [
+        Binding("escape,k,q,enter", "dismiss", "close", id="signs.close", tooltip="close this dialog"),
+    ]
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog reading") as dialog:
+            dialog.border_title = "Signs"
+            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
+            with VerticalScroll():
+                yield Static(_table(), markup=False)
+
+
+def _table() -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(justify="right", style="bold", min_width=4)
+    table.add_column(overflow="fold")
+    for title, group in signs().items():
+        if table.row_count:
+            table.add_row()
+        table.add_row("", Text(title, "bold underline"))
+        for sign, words in group:
+            table.add_row(sign, words)
+    return table

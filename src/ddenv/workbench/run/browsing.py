@@ -1,0 +1,125 @@
+"""Earlier moments of a run, as the run screen shows them."""
+
+from __future__ import annotations
+
+import time
+from array import array
+
+from ddenv.errors import UserError
+from ddenv.runfile.position import Moment, Position, Step
+from ddenv.runfile.state import Candidate, RunState, Test
+from ddenv.runfile.tested import made_for, purpose
+from ddenv.words import news
+from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.wording import count, outcome, plain
+
+# Why no key guides the run meanwhile.
+NOT_NOW = "this is an earlier moment of the run: escape comes back to now"
+NO_MORE = {
+    "moment": "the run begins here",
+    "round": "there is no round before this one",
+    "reduction": "there is no reduction before this moment",
+    "decision": "there is no verdict before this moment",
+}
+# Paths of tests that are kept.
+PATHS = 16
+
+
+class Browsing:
+    """Where in the run the screen is: at its end, where it follows the run, or at an earlier moment."""
+
+    def __init__(self, poll: Poll) -> None:
+        self._poll = poll
+        self.position = Position(poll.file.events)
+        self._paths: dict[int, array[float] | None] = {}
+        self._shown: tuple[int | None, Snapshot] = (None, Snapshot())
+
+    @property
+    def is_past(self) -> bool:
+        """Whether an earlier moment is shown."""
+        return self.position.at is not None
+
+    def step(self, what: Step, by: int) -> str:
+        """Goes on or back. Returns why that is not possible, or "". Raises UserError for a damaged file."""
+        if self.position.step(what, by):
+            return ""
+        return NO_MORE[what] if by < 0 else "this is now already"
+
+    def go(self, id: int | None) -> None:
+        """Goes to the moment of an event, or to the end."""
+        self.position.go(id)
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What the screen shows. Raises UserError if the file cannot be read any more."""
+        at = self.position.at
+        if at is None:
+            return self._poll.snapshot
+        if self._shown[0] != at:
+            moment = self.position.moment(at)
+            self._shown = at, Snapshot() if moment is None else self._of(moment)
+        return self._shown[1]
+
+    def _of(self, moment: Moment) -> Snapshot:
+        state = moment.after
+        first = state.f_test.id if state.f_test is not None else None
+        return Snapshot(
+            state,
+            evidence=self._path(state.evidence_test),
+            spent=_spent(state),
+            original=self._path(first),
+            past=True,
+            pointed=_pointed(moment),
+            happened=happened(moment),
+        )
+
+    def _path(self, test: int | None) -> array[float] | None:
+        if test is None:
+            return None
+        if test not in self._paths:
+            while len(self._paths) >= PATHS:
+                del self._paths[next(iter(self._paths))]
+            try:
+                self._paths[test] = self._poll.file.motion(test)
+            except UserError:
+                # The map is good for much without it.
+                return None
+        return self._paths[test]
+
+
+def _spent(state: RunState) -> int:
+    """Time that engines had worked by then, s."""
+    since = 0.0 if state.started_at is None else max(0.0, state.updated_at - state.started_at)
+    return int(state.working_seconds + since)
+
+
+def _pointed(moment: Moment) -> Candidate | None:
+    """The candidate that a moment is about."""
+    state, data = moment.after, moment.event.data
+    if state.round is None:
+        return None
+    if moment.event.kind in ("test_started", "test_finished", "test_lost"):
+        row = made_for(state, state.tests[data["test"] - 1])
+        return row if isinstance(row, Candidate) else None
+    index = data.get("candidate")
+    return state.round.candidates[index] if type(index) is int else None
+
+
+def happened(moment: Moment) -> str:
+    """What happened in a moment, with its time of day."""
+    at = time.strftime("%H:%M:%S", time.localtime(moment.event.time))
+    return f"{at}, after {count(moment.after.tests_done, 'test')}: {_words(moment)}."
+
+
+def _words(moment: Moment) -> str:
+    kind, state = moment.event.kind, moment.after
+    if kind in ("test_started", "test_finished", "test_lost"):
+        return _of_test(state, state.tests[moment.event.data["test"] - 1])
+    if kind == "created":
+        return "the run was made"
+    return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace("_", " ")
+
+
+def _of_test(state: RunState, test: Test) -> str:
+    what = f"test {test.id} ({purpose(state, test).words}, seed {test.seed})"
+    return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"

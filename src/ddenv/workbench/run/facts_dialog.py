@@ -1,0 +1,75 @@
+"""The dialog with the raw facts of a test: its log, its contacts, its end, its seed, and the command that makes it again."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical, VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from ddenv.errors import UserError
+from ddenv.runfile.position import Position
+from ddenv.workbench.run.facts import Facts, facts
+
+WIDTH = 11
+
+
+class FactsDialog(ModalScreen[None]):
+    """Starts at a test; the arrows go to the tests before and after it."""
+
+    CSS_PATH = "run_dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("left,comma", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
+        Binding("right,full_stop", "step(1)", "next test", id="facts.next", tooltip="the next test"),
+        Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
+        Binding("escape,i,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
+    ]
+
+    def __init__(self, position: Position, test: int, run: str) -> None:
+        """`run` is what a shell calls the run."""
+        super().__init__()
+        self._position, self._test, self._run = position, test, run
+        self._facts: Facts | None = None
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog reading") as dialog:
+            dialog.border_subtitle = "← → other tests   c copies the command   escape closes"
+            with VerticalScroll():
+                yield Static("", id="facts", markup=False)
+
+    def on_mount(self) -> None:
+        self._show(self._test)
+
+    def _show(self, test: int) -> None:
+        try:
+            found = facts(self._position, test, self._run)
+        except UserError as error:
+            self.notify(str(error), severity="warning", markup=False)
+            return
+        if found is not None:
+            self._test, self._facts = test, found
+            self.query_one(".dialog").border_title = Text(found.title)
+            self.query_one("#facts", Static).update(_text(found))
+            self.query_one(VerticalScroll).scroll_home(animate=False)
+
+    def action_step(self, by: int) -> None:
+        self._show(self._test + by)
+
+    def action_copy(self) -> None:
+        if self._facts is not None:
+            self.app.copy_to_clipboard(self._facts.command)
+            self.notify("command copied, if the terminal allows it", timeout=3)
+
+
+def _text(found: Facts) -> Text:
+    text = Text()
+    for name, words in found.facts:
+        text.append(f"{name:<{WIDTH}}", "dim").append(f"{words}\n")
+    text.append("\nlog\n", "bold")
+    for at, words in found.log:
+        text.append(f"{at:>8.1f} s  ", "dim").append(f"{words}\n")
+    return text.append("\nto make it again\n", "bold").append(f"  {found.command}")
