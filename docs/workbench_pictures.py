@@ -90,6 +90,10 @@ PICTURES = {
     "change": Picture("Change", "Changing the settings during a run"),
     "history": Picture("History", "The history, with a branch"),
     "compare": Picture("Compare", "Two environments side by side"),
+    "past": Picture("RunScreen", "An earlier moment of a run"),
+    "rounds": Picture("Rounds", "The rounds of a run"),
+    "facts": Picture("FactsDialog", "The raw facts of a test"),
+    "signs": Picture("SignsDialog", "What the signs mean"),
     "export": Picture("ExportScreen", "Writing what is left"),
     "runs": Picture("RunsScreen", "The list of runs"),
 }
@@ -128,6 +132,7 @@ async def make_all() -> None:
     async with opened(run) as pilot:
         await begin(pilot, run)
         await guide(pilot)
+        await look_back(pilot)
         await export(pilot, run)
         await branch(pilot)
     await list_runs()
@@ -201,6 +206,17 @@ async def guide(pilot: Pilot[int]) -> None:
     await press(pilot, "space")
     await until(pilot, lambda: state(pilot).status == "finished")
     await take(pilot, "finished")
+
+
+async def look_back(pilot: Pilot[int]) -> None:
+    """An earlier round, the list of rounds, a test of that round, and the signs."""
+    await press(pilot, "less_than_sign", "less_than_sign", "comma", "comma")
+    await take(pilot, "past")
+    for name, key in (("rounds", "b"), ("facts", "i"), ("signs", "k")):
+        await press(pilot, key)
+        await take(pilot, name)
+        await press(pilot, "escape")
+    await press(pilot, "escape")
 
 
 async def export(pilot: Pilot[int], run: Path) -> None:

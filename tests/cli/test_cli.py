@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import SCHEMA_VERSION, RunFile
@@ -57,6 +58,16 @@ def test_the_minimal_world_fails_as_the_run_did_and_without_its_model_it_does_no
     assert _outcomes(ddenv("test", run, "--minimal", "--leave-each-out", "--json")) == ["similar", "pass", "pass"]
     assert _outcomes(ddenv("test", run, "--keep", "beam,post", "--seed", 7, "--json")) == ["pass"]
     assert _outcomes(ddenv("test", WALL, "--world", folder / "minimal.sdf", "--json")) == ["failed"]
+
+
+@pytest.mark.programs
+def test_a_test_of_a_run_is_made_again_by_its_number(reduced):
+    run = reduced[1]["run_file"]
+    with RunFile(Path(run)) as file:
+        tests = fold(file.events()).tests
+    test = next(test for test in tests if test.phase == "round" and test.outcome == "pass")
+    (again,) = json.loads(ddenv("test", run, "--test", test.id, "--json").stdout)["runs"]
+    assert (again["outcome"], again["seed"], tuple(again["end_pose"])) == ("pass", test.seed, test.end_pose)
 
 
 def _outcomes(done):
@@ -232,6 +243,7 @@ MISTAKES = {
     "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),
+    "test": (["test", WALL, "--test", 1], "--test: needs a run"),
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
     "world twice": (
         ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],

@@ -12,6 +12,7 @@ from ddenv.scene.draw import Scenery, outline, paint, path_on_ground, safe_name
 from ddenv.scene.mesh import box, merge, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.shot import shot
+from ddenv.runs.wanted import Wanted
 from ddenv.scene.stage import Stage
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual
@@ -163,6 +164,25 @@ def test_a_late_browser_gets_the_same(writer, screen):
     assert words["title"].startswith("the failure in what is left · test 2 · similar")
     assert words["models"] == "2 of 4 models"
     assert screen.poses["/world/models/003 board"][:3, 3] != pytest.approx((0, 0, 0))
+
+
+def test_an_earlier_moment_and_a_row_of_it_are_shown_until_the_present_is_wanted_again(writer, screen):
+    writer.baseline()
+    writer.round()
+    begun = writer.run.events()[-1].id
+    writer.reduce()
+    words = {}
+    player = Player(writer.run, Stage(screen.take), lambda **given: words.update(given))
+    player.tick(10)
+    player.show(Wanted(begun, 1, 1))
+    player.tick(20)
+    assert (words["title"], words["models"]) == ("part B · not tested yet", "2 of 4 models")
+    player.show(Wanted(begun))
+    player.tick(30)
+    assert words["title"].startswith("the failure f · test 1")
+    player.show(Wanted())
+    player.tick(40)
+    assert words["title"].startswith("the failure in what is left · test 2")
 
 
 def test_the_stage_does_not_grow(writer, screen):

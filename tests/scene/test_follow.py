@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
-from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot
+from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot, shot_of
 
 
 def live(test: int, slot: int = 0) -> Live:
@@ -53,6 +53,31 @@ def test_a_running_candidate_shows_its_own_environment(writer):
     assert found.left_out == {"left wall", "tile/é <b>1</b>"}
     assert not found.removed
     assert found.title == "round 1 · part B · test 2 · re-run 1 · runs now"
+
+
+def test_a_chosen_row_is_shown_by_its_test_or_else_by_its_models(writer):
+    writer.baseline()
+    writer.round()
+    chosen = lambda *rows: shot_of(state_of(writer), state_of(writer).round.candidates[1], rows)  # noqa: E731
+    assert (chosen().kind, chosen().models, chosen().title) == ("start", {"board", "asphalt"}, "part B · not tested yet")
+    writer.start_test(2, candidate=1)
+    assert (chosen(live(2)).kind, chosen(live(2)).test) == ("live", 2)
+    writer.finish_test(2, "similar")
+    writer.start_test(3, candidate=1, run=1)
+    writer.finish_test(3, "pass")
+    assert (chosen().kind, chosen().test) == ("replay", 2)
+    assert chosen().title == "part B · test 2 · similar · replay at 4×"
+
+
+def test_a_try_has_its_own_models(writer):
+    writer.baseline()
+    writer.run.append("trial_started", {"trial": 1, "models": [0, 2]})
+    writer.run.append(
+        "test_started",
+        {"test": 2, "phase": "hand", "round": None, "candidate": None, "trial": 1, "run": 0, "seed": 0},
+    )
+    found = shot(state_of(writer), [live(2)])
+    assert (found.models, found.title) == ({"left wall", "board"}, "try 1 · test 2 · runs now")
 
 
 @pytest.mark.parametrize("together", [False, True])

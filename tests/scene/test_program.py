@@ -22,6 +22,8 @@ from tornado.websocket import websocket_connect
 
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import Live
+from ddenv.runs import programs
+from ddenv.runs.wanted import Wanted, written
 from tests.tiers import slow
 from tests.waiting import PATIENCE, wait_until
 
@@ -122,6 +124,26 @@ async def test_a_running_test_is_followed(writer, start_scene):
         writer.finish_test(2, "similar")
     # The engine is gone without an event: the scene goes back to the failure.
     await messages(url, titled("the failure f"))
+
+
+@pytest.mark.programs
+async def test_a_viewer_says_what_is_shown(writer):
+    writer.baseline()
+    writer.round()
+    begun = writer.run.events()[-1].id
+    writer.reduce()
+    process = programs.start_scene(writer.path)
+    try:
+        url = url_of(process)
+        process.stdin.write("nonsense\n" + written(Wanted(begun, 1, 1)))
+        process.stdin.flush()
+        await messages(url, titled("part B · not tested yet"))
+        process.stdin.write(written(Wanted()))
+        process.stdin.close()
+        await messages(url, titled("the failure in what is left"))
+    finally:
+        process.kill()
+        process.wait()
 
 
 @pytest.mark.programs

@@ -244,7 +244,7 @@ async def test_the_footer_offers_what_can_be_done_now(run, make, shown):
         assert footer - {"pin", "history", "settings", "export", "help", "quit", *MORE} == shown
 
 
-MORE = {"find", "layers", "copy", "scene", "runs"}
+MORE = {"signs", "facts", "rounds", "find", "layers", "copy", "scene", "runs"}
 
 
 async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):

@@ -10,7 +10,7 @@ from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
-from ddenv.runfile.position import Position
+from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose
@@ -47,8 +47,7 @@ class Trial:
 def subject_of_run(file: RunFile) -> Subject:
     """The world of a run, with its f if the baseline is done."""
     scenario, world, robot = read_parts(file)
-    position = Position(file.events)
-    position.catch_up()
+    position = position_in(file.events())
     failures = failures_of(file, position.end, scenario.failure)
     return Subject(scenario, world, robot, position.end, failures, position)
 

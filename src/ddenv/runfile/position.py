@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -178,6 +178,18 @@ class Position:
         place = bisect_right(stops, here)
         self.go(stops[place] if place < len(stops) else None)
         return True
+
+
+def position_in(events: Sequence[Event]) -> Position:
+    """A position at the end of all these events. Raises UserError for an invalid one."""
+
+    def read(after: int, most: int) -> list[Event]:
+        begin = bisect_right(events, after, key=lambda event: event.id)
+        return list(events[begin : None if most < 0 else begin + most])
+
+    position = Position(read)
+    position.catch_up()
+    return position
 
 
 def _goes_on(chapter: Chapter, state: RunState) -> bool:

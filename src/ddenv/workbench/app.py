@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.messages import ShowRun, ShowSetup
+from ddenv.workbench.messages import Attention, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 from ddenv.workbench.wording import plain
@@ -25,10 +26,14 @@ from ddenv.workbench.wording import plain
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """The user's own settings: `theme` is "" if the terminal decides, `keys` are Textual's names of keys by action ids."""
+    """The user's own settings: `theme` is "" if the terminal decides, `keys` are Textual's names of keys by action ids.
+
+    `notify`: the terminal rings and shows a notification when a run needs a look.
+    """
 
     theme: str = ""
     keys: Mapping[str, str] = field(default_factory=dict)
+    notify: bool = True
 
 
 def _commands() -> type[Provider]:
@@ -102,7 +107,7 @@ class Workbench(App[int]):
             self.register_theme(theme)
         config = config or Config()
         self.theme = config.theme or DARK.name
-        self._own_keys = config.keys
+        self._own_keys, self._notifies = config.keys, config.notify
         self._first = ShowSetup() if run is None else ShowRun(run, watch)
         if run is not None:
             from ddenv.workbench.run.observed import Observed
@@ -203,6 +208,13 @@ class Workbench(App[int]):
     def watch_title(self, title: str) -> None:
         """The terminal's title; saved before and restored after."""
         self._write(f"\x1b]2;{plain(title)}\x07")
+
+    @on(Attention)
+    def _get_attention(self, asked: Attention) -> None:
+        if self._notifies:
+            from ddenv.workbench.terminal.attention import attention
+
+            self._write(attention(f"ddenv {asked.run}", asked.why, os.environ))
 
     def _write(self, sequence: str) -> None:
         driver = self._driver

@@ -1,4 +1,4 @@
-"""Messages from a screen to the app: show another screen in its place."""
+"""Messages from a screen to the app: show another screen in its place, or get the user's attention."""
 
 from __future__ import annotations
 
@@ -26,3 +26,11 @@ class ShowSetup(Message):
     """The setup screen, with the settings of the run `like` filled in."""
 
     like: Path | None = None
+
+
+@dataclass
+class Attention(Message):
+    """The user should look at `run`: `why`."""
+
+    run: str
+    why: str

@@ -41,8 +41,8 @@ def test_without_a_file_all_is_as_it_comes(tmp_path, monkeypatch):
 
 
 def test_a_file_sets_theme_and_keys(config):
-    config("theme: textual-ansi\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}")
-    assert read_config() == Config(ANSI, {"run.pause": "f8", "map.left": "h,ctrl+k", "run.step": "7"})
+    config("theme: textual-ansi\nnotify: no\nkeys: {run.pause: f8, map.left: 'h, ctrl+k', run.step: 7}")
+    assert read_config() == Config(ANSI, {"run.pause": "f8", "map.left": "h,ctrl+k", "run.step": "7"}, False)
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "keys:\n  # run.pause: p\n", "theme:\n"])
@@ -63,10 +63,11 @@ def test_a_file_may_say_nothing(config, text):
         ("keys: {run.pause: [p]}", "run.pause: expected a key"),
         ("keys: {run.pause: true}", "run.pause: expected a key"),
         ("keys: {run.pause: s}", "run.pause: 's' is the key of run.step already"),
-        ("keys: {run.pause: k, run.step: k}", "'k' is the key of run.step already"),
+        ("keys: {run.pause: z, run.step: z}", "'z' is the key of run.step already"),
         ("keys: {run.pause: ctrl+q}", "'ctrl+q' is the key of app.leave already"),
         ("keys: [run.pause]", "keys: expected lines such as"),
         ("keys: {run.pause: ?}", "line 1: is no YAML"),
+        ("notify: maybe", "notify: expected yes or no"),
         ("- theme", "expected lines such as 'theme: ddenv-light'"),
     ],
 )

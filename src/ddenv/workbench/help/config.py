@@ -1,4 +1,4 @@
-"""The user's own theme and keys, from a file in the folder for settings; and the lines of `ddenv config`."""
+"""The user's own theme, keys and notifications, from a file in the folder for settings; and the lines of `ddenv config`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddenv.workbench.help.catalogue import Action, actions, checked
 from ddenv.workbench.help.key_names import written
 from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
 
-KNOWN = ("theme", "keys")
+KNOWN = ("theme", "notify", "keys")
 
 
 def config_path() -> Path:
@@ -36,13 +36,17 @@ def read_config() -> Config:
     for key in data:
         if key not in KNOWN:
             raise UserError(
-                f"{path}: '{key}' is not known here{nearest(str(key), KNOWN)}; known are {' and '.join(KNOWN)}"
+                f"{path}: '{key}' is not known here{nearest(str(key), KNOWN)}; known are {', '.join(KNOWN)}"
             )
     theme, keys = data.get("theme"), data.get("keys")
     if theme is not None and not isinstance(theme, str):
         raise UserError(f"{path}: theme: expected a name, such as ddenv-light; found {theme!r}")
+    notify = data.get("notify", True)
+    if not isinstance(notify, bool):
+        raise UserError(f"{path}: notify: expected yes or no; found {notify!r}")
     wanted = _wanted(keys, path)
-    return Config(theme_called(theme, f"{path}: theme") if theme else "", checked(wanted, str(path)) if wanted else {})
+    chosen = theme_called(theme, f"{path}: theme") if theme else ""
+    return Config(chosen, checked(wanted, str(path)) if wanted else {}, notify)
 
 
 def _load(path: Path) -> dict[Any, Any]:
@@ -91,18 +95,22 @@ INTRODUCTION = """# Settings of the ddenv workbench: {path}
 # {themes}
 # theme: {theme}
 
+# Whether the terminal rings and shows a notification when a run ends, or waits for you.
+# notify: yes
+
 # The key of each action. Several keys are separated by commas.
 keys:"""
 
 
 def lines() -> list[str]:
-    """The file, the theme, and every action with its keys. Raises UserError for an invalid file."""
+    """The file, the theme, whether the terminal rings, and every action with its keys. Raises UserError for an invalid file."""
     config, path = read_config(), config_path()
     chosen = config.theme or f"{DARK.name}, or ansi-dark where the terminal has 16 colours"
     found = [
         f"file    {path}{'' if path.exists() else ' (does not exist; ddenv config --example prints one)'}",
         f"theme   {chosen}",
         f"themes  {', '.join(theme_names())}",
+        f"notify  {'yes' if config.notify else 'no'}",
     ]
     width = max(len(id) for id in actions())
     keys = {id: _written(config.keys.get(id, ",".join(action.keys))) for id, action in actions().items()}

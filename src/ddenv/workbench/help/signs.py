@@ -22,7 +22,7 @@ Signs = tuple[tuple[str, str], ...]
 def signs() -> dict[str, Signs]:
     """(sign, meaning) by where they stand."""
     return {
-        "On the map": (*((sign, words) for sign, words in MORE_SIGNS), *LEGEND),
+        "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate that is shown"), *MORE_SIGNS[1:], *LEGEND),
         "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),

@@ -202,7 +202,9 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     state = snapshot.state
     if current.winner is not None:
         return _reduced(state, current.candidates[current.winner], options)
-    candidate = snapshot.focus or next((each for each in current.candidates if not each.verdict), None)
+    candidate = snapshot.focus
+    if candidate is None or candidate.verdict:
+        candidate = next((each for each in current.candidates if not each.verdict), None)
     if candidate is None:
         return "nothing", _nothing_found(state, current, options)
     running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]

@@ -9,7 +9,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
 from ddenv.words import first_of
-from ddenv.workbench.wording import count, metres, outcome, plain
+from ddenv.workbench.wording import OUTCOME, count, metres, plain
 
 # The maximum number of models to name, and of lines of a test's log.
 NAMED, LOGGED = 12, 400
@@ -67,9 +67,9 @@ def log(test: Test) -> tuple[tuple[float, str], ...]:
 def _end(test: Test) -> str:
     if test.outcome == "running":
         return "▶ it runs"
-    why = f": {plain(test.failure)}" if test.failure and plain(test.failure) not in outcome(test) else ""
+    why = f": {plain(test.failure)}" if test.failure else ""
     early = ", ended early: it was stuck for good" if test.cut else ""
-    return f"{outcome(test) or test.outcome}{why}{early}"
+    return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
 
 
 def _place(test: Test) -> str:

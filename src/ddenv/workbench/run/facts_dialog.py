@@ -23,8 +23,8 @@ class FactsDialog(ModalScreen[None]):
 
     CSS_PATH = "run_dialogs.tcss"
     BINDINGS: ClassVar = [
-        Binding("left,comma", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
-        Binding("right,full_stop", "step(1)", "next test", id="facts.next", tooltip="the next test"),
+        Binding("left", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
+        Binding("right", "step(1)", "next test", id="facts.next", tooltip="the next test"),
         Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
         Binding("escape,i,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
     ]

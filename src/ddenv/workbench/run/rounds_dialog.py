@@ -14,8 +14,9 @@ from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.runfile.position import Chapter
+from ddenv.workbench.wording import count
 
-NAME, MODELS, LEFT, TESTS = 16, 8, 12, 8
+NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
 
 
 class Rounds(ModalScreen[Chapter | None]):
@@ -36,7 +37,7 @@ class Rounds(ModalScreen[Chapter | None]):
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = "Rounds so far"
             dialog.border_subtitle = "enter goes to its end   escape closes"
-            yield Static(_line("", "models", "left", "tests"), id="head", markup=False)
+            yield Static(_line("", "models", "left", "after"), id="head", markup=False)
             yield OptionList(*map(_option, self._chapters), id="rounds", compact=True, markup=False)
 
     def on_mount(self) -> None:
@@ -51,7 +52,7 @@ class Rounds(ModalScreen[Chapter | None]):
 def _option(chapter: Chapter) -> Option:
     less = chapter.left != chapter.models
     left = f"{'●' if less else '○'} {chapter.left}" if chapter.kind == "round" else ""
-    return Option(_line(title(chapter), str(chapter.models), left, f"from {chapter.tests}"))
+    return Option(_line(title(chapter), str(chapter.models), left, count(chapter.tests, "test")))
 
 
 def title(chapter: Chapter) -> str:
@@ -60,4 +61,4 @@ def title(chapter: Chapter) -> str:
 
 
 def _line(name: str, models: str, left: str, tests: str) -> Text:
-    return Text(f"{name:<{NAME}}{models:>{MODELS}}{left:>{LEFT}}{tests:>{TESTS + 4}}", no_wrap=True)
+    return Text(f"{name:<{NAME}}{models:>{MODELS}}{left:>{LEFT}}{tests:>{TESTS}}", no_wrap=True)

@@ -25,6 +25,7 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.messages import Attention
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
@@ -35,6 +36,7 @@ from ddenv.workbench.run.key_offers import KeyOffers
 from ddenv.workbench.run.log import NOTHING_DECIDED, Log, decision_line
 from ddenv.workbench.run.models_chart import Chart
 from ddenv.workbench.run.models_left import ModelsLeft
+from ddenv.workbench.run.noteworthy import title, worth_a_look
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine, Scene
@@ -42,7 +44,7 @@ from ddenv.workbench.run.run_keys import BROWSING, FIRST, GUIDES, KEYS, LOOKING,
 from ddenv.workbench.run.status import Header, Status
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.wording import plain
 
 # The time until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004
@@ -168,6 +170,8 @@ class RunScreen(Screen[None]):
         self.asking.show_refusal(before)
         if live:
             self.asking.show_verdicts(before)
+            if why := worth_a_look(before, self.poll.snapshot):
+                self.post_message(Attention(plain(self.run.stem), why))
 
     def _show(self, changed: bool) -> None:
         if changed:
@@ -187,17 +191,17 @@ class RunScreen(Screen[None]):
         self._show_models()
         # Its rows are wider than those of candidates.
         self.set_class(snapshot.state.certificate is not None, "-certificate")
-        title = round_title(snapshot.state)
+        above = round_title(snapshot.state)
         # Even the same words would have the panel drawn again, with all that is in it.
-        if title != self._title:
+        if above != self._title:
             panel = self.query_one("#round")
-            self._title = panel.border_title, panel.border_subtitle = title
+            self._title = panel.border_title, panel.border_subtitle = above
         if self._log.changed():
             self.query_one("#log", Lines).show(self._log.entries)
         decisions = self.query_one("#decisions", Lines)
         if decisions.items != snapshot.state.decisions:
             decisions.show(snapshot.state.decisions)
-        self.app.title = f"ddenv {shorten(plain(snapshot.state.scenario.get('name', '')), 60)}"
+        self.app.title = title(self.poll.snapshot)
 
     def _show_asked(self) -> None:
         place = self.browsing.position.place if self.browsing.is_past else None
@@ -281,6 +285,7 @@ class RunScreen(Screen[None]):
             self.asking.refuse(str(error))
         self._table.follow()
         self._show(True)
+        self._footer.say("run.follow", "now" if self.browsing.is_past else "follow")
         self._footer.renew()
 
     # Dialogs and other screens.

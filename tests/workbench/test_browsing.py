@@ -1,0 +1,149 @@
+"""Earlier moments of a run on the screen, the facts of its tests, and what its signs mean."""
+
+import subprocess
+import sys
+
+import fake_run
+import pytest
+from attached import Attached
+from textual.widgets import OptionList
+
+from ddenv.runs.wanted import Wanted, read
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.signs import SignsDialog, signs
+from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.facts_dialog import FactsDialog
+from ddenv.workbench.wording import CLAIM, OUTCOME, STATUS, VERDICT
+from tests.waiting import eventually
+
+
+@pytest.mark.parametrize("watch", [False, True])
+async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run, watch):
+    fake_run.finished(run)
+    async with Attached(run, watch=watch) as session:
+        table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
+        await session.press("less_than_sign", "less_than_sign")
+        assert "round 2" in session.text("#header")
+        assert table.get_cell("0", "verdict").plain == "● similar"
+        assert world.candidate.label == "part A"
+        assert world.snapshot.state.environment == tuple(run.elements[:2])
+        assert "reduced to 2 models after 6 tests" in session.text("#happening")
+        assert "◂ moment 22 of 182" in session.text("#status")
+        await session.press("comma", "comma", "comma")
+        assert len(world.snapshot.state.environment) == 6
+        assert "test 6 (round 2 · part A, seed 0) starts" in session.text("#happening")
+        assert table.get_cell("0", "verdict").plain == ""
+        await session.press("space", "v", "u")
+        assert session.commands() == []
+        assert "this is an earlier moment" in session.said() or watch
+        await session.press("escape")
+        assert "finished" in session.text("#status")
+        assert session.screen.snapshot is session.screen.poll.snapshot
+
+
+async def test_the_moment_stays_while_the_run_goes_on_and_the_last_step_comes_back_to_it(run):
+    fake_run.mid_round(run).hold()
+    async with Attached(run) as session:
+        await session.press("left_parenthesis")
+        assert "part A (2 models): dissimilar" in session.text("#happening")
+        shown = session.screen.snapshot
+        run.finish(11, "pass")
+        run.start(3)
+        await session.look()
+        assert session.screen.snapshot is shown
+        assert "of 33" in session.text("#status")
+        await session.press("right_parenthesis")
+        assert session.screen.snapshot.state.revision == session.screen.poll.snapshot.state.revision
+        await session.press("greater_than_sign")
+        assert "this is now already" in session.said()
+        await session.press("left_curly_bracket", "left_curly_bracket")
+        assert "there is no reduction before this moment" in session.said()
+
+
+async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
+    fake_run.finished(run)
+    async with Attached(run, size=(80, 24)) as session:
+        await session.press("b")
+        options = session.app.screen.query_one(OptionList)
+        rows = [str(options.get_option_at_index(row).prompt).split() for row in range(options.option_count)]
+        assert [row[:3] for row in rows[:3]] == [["baseline", "11", "0"], ["round", "1", "11"], ["round", "2", "6"]]
+        assert [row[-4:] for row in rows[1:4]] == [
+            ["●", "6", "4", "tests"],
+            ["●", "2", "5", "tests"],
+            ["○", "2", "6", "tests"],
+        ]
+        await session.press("home", "down", "enter")
+        assert "round 1" in session.text("#header")
+
+
+async def test_i_shows_the_facts_of_a_test_of_a_round_that_is_over(run):
+    fake_run.finished(run)
+    async with Attached(run) as session:
+        await session.press("less_than_sign", "less_than_sign", "i")
+        dialog = session.app.screen
+        assert isinstance(dialog, FactsDialog)
+        words = session.dialog()
+        for said in ("● similar: stuck", "0.12 m from the end of f", "2 of 11 models: crate_00, crate_01", "45.0 s  ●"):
+            assert said in words
+        assert "part A of round 2: similar, tests 6" in words
+        await session.press("c")
+        assert session.app.clipboard == "ddenv test crates-1 --test 6"
+        await session.press("left", "left")
+        assert "11 of 11 models" in session.dialog()
+        await session.press(*["left"] * 9)
+        assert "Test 1 of 83" in str(dialog.query_one(".dialog").border_title)
+
+
+async def test_every_sign_has_its_meaning_one_key_away(run):
+    shown = {sign for group in signs().values() for sign, _ in group}
+    for words in (*OUTCOME.values(), *VERDICT.values(), *CLAIM.values()):
+        assert words[0] in shown
+    assert shown >= {sign for sign, _ in (*LEGEND, *MORE_SIGNS, *STATUS.values())}
+    fake_run.finished(run)
+    async with Attached(run, size=(80, 24)) as session:
+        await session.press("k")
+        assert isinstance(session.app.screen, SignsDialog)
+
+
+async def test_the_footer_has_the_keys_of_what_has_the_focus(run):
+    fake_run.guided(run).hold()
+    async with Attached(run) as session:
+        footer = session.screen.query_one(KeyFooter)
+        shown = lambda: [entry.words for entry in footer.entries]  # noqa: E731
+        assert "pause" in shown()
+        assert "next model" not in shown()
+        await session.press("1")
+        await eventually(lambda: "next model" in shown())
+        await session.press("comma")
+        await eventually(lambda: "round before" in shown())
+        await session.press("escape", "2")
+        await eventually(lambda: "history" in shown())
+
+
+async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch, tmp_path):
+    told = tmp_path / "told"
+    code = f"import sys; print('http://127.0.0.1:7000/', flush=True)\n"
+    code += f"for line in sys.stdin: open({str(told)!r}, 'a').write(line)"
+    pipe = subprocess.PIPE
+    words = [sys.executable, "-u", "-c", code]
+    monkeypatch.setattr(
+        "ddenv.runs.programs.start_scene", lambda _: subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True)
+    )
+    fake_run.mid_round(run).hold()
+    async with Attached(run) as session:
+        last = lambda: read(told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
+        await session.press("m")
+        await session.app.workers.wait_for_complete()
+        await session.press("escape", "down", "down")
+        at = session.screen.query_one(Candidates).under_cursor.index
+        await eventually(lambda: last() == Wanted(None, 2, at))
+        await session.press("escape", "left_curly_bracket")
+        moment = session.screen.browsing.position.at
+        await eventually(lambda: last() == Wanted(moment, 1, 0))
+
+
+def test_lines_that_are_no_wish_are_no_wish():
+    for line in ("", "nonsense", "[1]", '{"at": "x"}', '{"at": true}', '{"other": 1}'):
+        assert read(line) is None
