@@ -7,12 +7,12 @@ import pytest
 import umsgpack
 
 from ddenv.runfile.fold import fold
+from ddenv.runs.wanted import Wanted
 from ddenv.scene.camera import view
 from ddenv.scene.draw import Scenery, outline, paint, path_on_ground, safe_name
 from ddenv.scene.mesh import box, merge, sphere
 from ddenv.scene.player import Player
 from ddenv.scene.shot import shot
-from ddenv.runs.wanted import Wanted
 from ddenv.scene.stage import Stage
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual

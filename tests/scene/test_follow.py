@@ -59,7 +59,11 @@ def test_a_chosen_row_is_shown_by_its_test_or_else_by_its_models(writer):
     writer.baseline()
     writer.round()
     chosen = lambda *rows: shot_of(state_of(writer), state_of(writer).round.candidates[1], rows)  # noqa: E731
-    assert (chosen().kind, chosen().models, chosen().title) == ("start", {"board", "asphalt"}, "part B · not tested yet")
+    assert (chosen().kind, chosen().models, chosen().title) == (
+        "start",
+        {"board", "asphalt"},
+        "part B · not tested yet",
+    )
     writer.start_test(2, candidate=1)
     assert (chosen(live(2)).kind, chosen(live(2)).test) == ("live", 2)
     writer.finish_test(2, "similar")

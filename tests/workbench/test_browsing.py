@@ -124,7 +124,7 @@ async def test_the_footer_has_the_keys_of_what_has_the_focus(run):
 
 async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch, tmp_path):
     told = tmp_path / "told"
-    code = f"import sys; print('http://127.0.0.1:7000/', flush=True)\n"
+    code = "import sys; print('http://127.0.0.1:7000/', flush=True)\n"
     code += f"for line in sys.stdin: open({str(told)!r}, 'a').write(line)"
     pipe = subprocess.PIPE
     words = [sys.executable, "-u", "-c", code]

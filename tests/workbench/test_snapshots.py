@@ -124,6 +124,10 @@ OPENED = {
     "log": ["L"],
     "quit": ["q"],
     "runs": ["R"],
+    "past": ["less_than_sign"],
+    "rounds": ["b"],
+    "facts": ["i"],
+    "signs": ["k"],
 }
 
 

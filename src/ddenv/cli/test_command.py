@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 @reading_options
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
-@click.option("--test", type=click.IntRange(1), metavar="NUMBER", help="The models and the seed of this test of the run.")
+@click.option(
+    "--test", type=click.IntRange(1), metavar="NUMBER", help="The models and the seed of this test of the run."
+)
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up.")

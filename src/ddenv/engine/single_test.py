@@ -21,7 +21,10 @@ from ddenv.world.scenario import Scenario
 
 @dataclass(frozen=True)
 class Subject:
-    """What to run; of a run, `position` finds its earlier states. `failures` count as f in a run whose baseline is done; without them a failed run is just "failed"."""
+    """What to run; in a run, `position` finds earlier states.
+
+    `failures` count as f in a run whose baseline is done; without them a failed run is just "failed".
+    """
 
     scenario: Scenario
     world: World

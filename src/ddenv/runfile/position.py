@@ -18,7 +18,15 @@ Step = Literal["moment", "round", "reduction", "decision"]
 # A state is kept for so many events, and at most so many are kept: after that the gaps between them double.
 GAP, KEPT = 64, 512
 # These change nothing that a viewer sees.
-_UNSEEN = ("command_handled", "command_refused", "forecast", "round_finished", "leg_started", "comparing", "confirm_started")
+_UNSEEN = (
+    "command_handled",
+    "command_refused",
+    "forecast",
+    "round_finished",
+    "leg_started",
+    "comparing",
+    "confirm_started",
+)
 _VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
 
 

@@ -16,10 +16,10 @@ from typing import NoReturn
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
+from ddenv.runs.wanted import read
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server
 from ddenv.scene.stage import Stage
-from ddenv.runs.wanted import read
 
 PERIOD = 0.05  # time between two updates of the scene, s
 

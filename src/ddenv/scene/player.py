@@ -13,12 +13,12 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
 from ddenv.runs.creation import read_parts
+from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import Scenery, circle, flag, mark
 from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot, shot_of
 from ddenv.scene.stage import Stage
-from ddenv.runs.wanted import Wanted, row_of
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Goal, Spawn
 

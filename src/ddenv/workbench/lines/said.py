@@ -30,7 +30,9 @@ def status(snapshot: Snapshot) -> Iterator[str]:
     if left is not None:
         time = f", about {about(*left.seconds)}" if left.seconds else ""
         yield f"about {left.tests[1]} tests left{time}"
-    yield {"alive": "an engine is at work", "starting": "the engine starts"}.get(snapshot.engine, "no engine is running")
+    yield {"alive": "an engine is at work", "starting": "the engine starts"}.get(
+        snapshot.engine, "no engine is running"
+    )
 
 
 def why(snapshot: Snapshot) -> Iterator[str]:
@@ -77,7 +79,11 @@ def decisions(snapshot: Snapshot) -> Iterator[str]:
 def baseline(snapshot: Snapshot) -> Iterator[str]:
     """How often the whole world fails."""
     base = snapshot.state.baseline
-    yield "the baseline is not finished" if base is None else f"f in {base.failures} of {base.runs} runs, {percent(base.rate)}"
+    yield (
+        "the baseline is not finished"
+        if base is None
+        else f"f in {base.failures} of {base.runs} runs, {percent(base.rate)}"
+    )
 
 
 QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {

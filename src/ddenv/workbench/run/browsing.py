@@ -45,9 +45,10 @@ class Browsing:
             return ""
         return NO_MORE[what] if by < 0 else "this is now already"
 
-    def go(self, id: int | None) -> None:
-        """Goes to the moment of an event, or to the end."""
+    def go(self, id: int | None) -> str:
+        """Goes to the moment of an event, or to the end, as `step` does."""
         self.position.go(id)
+        return ""
 
     @property
     def snapshot(self) -> Snapshot:

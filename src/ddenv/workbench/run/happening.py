@@ -78,7 +78,16 @@ def _urgent(snapshot: Snapshot) -> tuple[object, ...]:
     """What is shown at once when it changes."""
     state = snapshot.state
     number = None if state.round is None else (state.round.number, state.round.done)
-    return snapshot.happened, snapshot.status, snapshot.error, state.paused, state.waiting_candidate, state.confirming, state.node, number
+    return (
+        snapshot.happened,
+        snapshot.status,
+        snapshot.error,
+        state.paused,
+        state.waiting_candidate,
+        state.confirming,
+        state.node,
+        number,
+    )
 
 
 def _shown(explanation: Explanation, room: int) -> int:

@@ -110,20 +110,39 @@ _KEYS = [
     _hidden("4", "pane('now')", "what is happening", "run.now", "what is happening, in words"),
     _hidden("5,L", "pane('log')", "log", "run.log", "the log: what happened so far, with the time of day"),
     _hidden("g", "next_pane", "next pane", "run.next_pane", "the next pane"),
-    _hidden("escape", "follow", "follow", "run.follow", "back to now; select nothing; cursor and map follow the run again"),
+    _hidden(
+        "escape", "follow", "follow", "run.follow", "back to now; select nothing; cursor and map follow the run again"
+    ),
     _hidden("plus,equals_sign", "zoom(1.25)", "closer", "run.closer", "map: closer", "+"),
     _hidden("minus", "zoom(0.8)", "farther", "run.farther", "map: farther away", "-"),
     _hidden("0", "fit", "fit", "run.fit", "map: show all that matters"),
     _hidden("comma", "browse('moment', -1)", "back", "run.back", "back in the run: to the moment before this one", ","),
-    _hidden("full_stop", "browse('moment', 1)", "on", "run.on", "on to the next moment; after the last one comes now", "."),
     _hidden(
-        "less_than_sign", "browse('round', -1)", "round before", "run.round_before", "to the end of the round before", "<"
+        "full_stop", "browse('moment', 1)", "on", "run.on", "on to the next moment; after the last one comes now", "."
     ),
     _hidden(
-        "greater_than_sign", "browse('round', 1)", "next round", "run.next_round", "to the end of this or the next round", ">"
+        "less_than_sign",
+        "browse('round', -1)",
+        "round before",
+        "run.round_before",
+        "to the end of the round before",
+        "<",
     ),
     _hidden(
-        "left_parenthesis", "browse('decision', -1)", "", "run.decision_before", "to the verdict or decision before", "("
+        "greater_than_sign",
+        "browse('round', 1)",
+        "next round",
+        "run.next_round",
+        "to the end of this or the next round",
+        ">",
+    ),
+    _hidden(
+        "left_parenthesis",
+        "browse('decision', -1)",
+        "",
+        "run.decision_before",
+        "to the verdict or decision before",
+        "(",
     ),
     _hidden(
         "right_parenthesis", "browse('decision', 1)", "", "run.next_decision", "to the next verdict or decision", ")"
@@ -179,6 +198,16 @@ ON_MAP = (
 )
 # The footer of a screen that only watches.
 LOOKING = (
-    *("run.history", "run.rounds", "run.facts", "run.export", "run.find", "run.copy", "run.layers", "run.signs", "run.help"),
+    *(
+        "run.history",
+        "run.rounds",
+        "run.facts",
+        "run.export",
+        "run.find",
+        "run.copy",
+        "run.layers",
+        "run.signs",
+        "run.help",
+    ),
     "run.quit",
 )

@@ -77,7 +77,8 @@ class RunScreen(Screen[None]):
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
         self.browsing = Browsing(self.poll)
         self._table, self._map, self._legend = Candidates(id="candidates"), WorldMap(id="map"), MapLines(id="map-lines")
-        self._footer = KeyFooter(*((LOOKING, LOOKING) if watch else (SHOWN, FIRST)), self._keys_here)
+        shown, first = (LOOKING, LOOKING) if watch else (SHOWN, FIRST)
+        self._footer = KeyFooter(shown, first, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
         self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
@@ -271,7 +272,7 @@ class RunScreen(Screen[None]):
         self._browse(lambda: self.browsing.step(what, by))
 
     def action_rounds(self) -> None:
-        self._opening.rounds(self.browsing.position, lambda id: self._browse(lambda: self.browsing.go(id) or ""))
+        self._opening.rounds(self.browsing.position, lambda id: self._browse(lambda: self.browsing.go(id)))
 
     def _browse(self, move: Callable[[], str]) -> None:
         """Shows another moment, or why there is none."""
@@ -374,7 +375,7 @@ class RunScreen(Screen[None]):
 
     def action_follow(self) -> None:
         if self.browsing.is_past:
-            self._browse(lambda: self.browsing.go(None) or "")
+            self._browse(lambda: self.browsing.go(None))
             return
         self._map.clear_selection()
         self._table.follow()
