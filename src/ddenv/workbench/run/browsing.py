@@ -21,6 +21,7 @@ NO_MORE = {
     "reduction": "there is no reduction before this moment",
     "decision": "there is no verdict before this moment",
 }
+OF_TESTS = ("test_started", "test_finished", "test_lost", "implied")
 # Paths of tests that are kept.
 PATHS = 16
 
@@ -99,7 +100,7 @@ def _pointed(moment: Moment) -> Candidate | None:
     state, data = moment.after, moment.event.data
     if state.round is None:
         return None
-    if moment.event.kind in ("test_started", "test_finished", "test_lost"):
+    if moment.event.kind in OF_TESTS:
         row = made_for(state, state.tests[data["test"] - 1])
         return row if isinstance(row, Candidate) else None
     index = data.get("candidate")
@@ -114,7 +115,7 @@ def happened(moment: Moment) -> str:
 
 def _words(moment: Moment) -> str:
     kind, state = moment.event.kind, moment.after
-    if kind in ("test_started", "test_finished", "test_lost"):
+    if kind in OF_TESTS:
         return _of_test(state, state.tests[moment.event.data["test"] - 1])
     if kind == "created":
         return "the run was made"
@@ -123,4 +124,6 @@ def _words(moment: Moment) -> str:
 
 def _of_test(state: RunState, test: Test) -> str:
     what = f"test {test.id} ({purpose(state, test).words}, seed {test.seed})"
+    if test.implied_by is not None:
+        return f"{what} follows from test {test.implied_by}: {outcome(test)}"
     return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"

@@ -83,6 +83,8 @@ def _place(test: Test) -> str:
 def _took(test: Test) -> str:
     if not test.is_finished:
         return ""
+    if test.implied_by is not None:
+        return f"not simulated: it follows from test {test.implied_by}, in which nothing that it lacks took part"
     computed = "its result was copied from another run" if test.taken else f"{test.wall_seconds:.1f} s of computing"
     return f"{test.simulated_seconds:.1f} s simulated, {computed}"
 
