@@ -12,7 +12,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.took_part import why_sliced
 from ddenv.words import news
-from ddenv.workbench.run.candidate_rows import listed, words
+from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.models_chart import FREE, Course, steps
 from ddenv.workbench.run.poll import Snapshot
@@ -83,8 +83,10 @@ def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
     )
     shown = Snapshot(judged, (), "alive")
     listing = listed(shown)
-    verdicts = [words(shown, listing, row)["verdict"] for row in range(len(listing))]
+    rows = [words(shown, listing, row) for row in range(len(listing))]
+    verdicts = [row["verdict"] for row in rows]
     assert any(each.startswith(f"○ dissimilar, implied by tests {event.data['by']}, ") for each in verdicts)
+    assert any(row.get(IN_SHORT, "").startswith(f"○ by tests {event.data['by']}, ") for row in rows)
 
 
 def test_the_chart_marks_what_went_without_a_test(moments):

@@ -86,6 +86,8 @@ class FakeRun:
         self.trials = 0
         self.certificates = 0
         self.fresh = self.first_fresh = FIRST_FRESH_RUN
+        # What takes part in each run from now on.
+        self.met: list[str] | None = None
         self._stack = ExitStack()
 
     def engine(self):
@@ -139,6 +141,8 @@ class FakeRun:
             "first_touched": [],
             "cut": False,
         }
+        if self.met is not None:
+            event["took_part"] = self.numbers(self.met)
         self.file.append("test_finished", event, {ROBOT: path_samples().tobytes()})
 
     def test(
@@ -147,6 +151,13 @@ class FakeRun:
         number = self.start(candidate, run)
         self.finish(number, outcome, distance, failure=failure)
         return number
+
+    def imply(self, candidate: int, by: int) -> int:
+        """The first test of a candidate follows from the test `by`."""
+        self.tests += 1
+        place = {"phase": "round", "round": self.round, "candidate": candidate, "run": 0, "seed": 0}
+        self.file.append("implied", {"test": self.tests, "by": by, **place}, {ROBOT: by})
+        return self.tests
 
     def start_certificate(self) -> None:
         self.certificates += 1
@@ -326,6 +337,22 @@ def mid_round(run: FakeRun) -> FakeRun:
     first = run.start(1, 1)
     second = run.start(2, 0)
     run.live((first, 0.6), (second, 0.25))
+    return run
+
+
+def sliced(run: FakeRun) -> FakeRun:
+    """In the first round of a slice the test of the third candidate is implied by that of the second; the next one runs."""
+    run.created().write("still")
+    run.met = [f"crate_{number:02}" for number in (2, 3, 4, 6, 7)]
+    run.baseline()
+    run.write("sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1)
+    run.write("leg_started", round=1, n_partitions=None)
+    run.start_round(3, run.met)
+    run.dissimilar(0)
+    without = run.test(1, "pass")
+    run.judge(1, "dissimilar", [without])
+    run.judge(2, "dissimilar", [run.imply(2, without)])
+    run.live((run.start(3), 0.5))
     return run
 
 

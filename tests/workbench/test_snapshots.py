@@ -68,6 +68,7 @@ def baseline(run):
 MOMENTS = [
     baseline,
     fake_run.mid_round,
+    fake_run.sliced,
     fake_run.waiting,
     fake_run.rarer,
     fake_run.certifying,

@@ -22,6 +22,8 @@ from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, out
 NAME = 8
 # The latest judged tries that stay in the table.
 TRIALS = 3
+# The verdict where there is little room for it; it is there if it differs.
+IN_SHORT = "in short"
 
 Item = Trial | Candidate | Test | FreshRuns
 Words = Mapping[str, str]
@@ -173,6 +175,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         "to f": metres(min(distances)) if distances else "",
         "time": brief(seconds) if done else "",
         "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
+        **_in_short(snapshot.state, item),
     }
 
 
@@ -189,6 +192,12 @@ def _verdict(snapshot: Snapshot, item: Trial | Candidate, tests: Sequence[Test])
     if not running or snapshot.engine != "alive":
         return ""
     return "▶" * min(3, len(running)) + _seconds(snapshot, running[0])
+
+
+def _in_short(state: RunState, item: Trial | Candidate) -> Words:
+    """The verdict by its sign, with the run that implies it."""
+    implied = implied_words(state, item.tests) if item.verdict in VERDICT else ""
+    return {IN_SHORT: f"{VERDICT[item.verdict][0]} {implied.removeprefix('implied ')}"} if implied else {}
 
 
 def _fallen(models: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from textual.strip import Strip
 
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
-from ddenv.workbench.run.candidate_rows import Column, Listed, Words, fitting, listed, words
+from ddenv.workbench.run.candidate_rows import IN_SHORT, Column, Listed, Words, fitting, listed, words
 from ddenv.workbench.run.poll import Snapshot
 
 STRONG, WEAK = Style(bold=True), Style(dim=True)
@@ -225,7 +225,10 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
     def _strip(self, cells: Words, style: Style) -> Strip:
         *others, last = self.columns
         row = "".join(_aligned(column, cells.get(column.name, "")) for column in others)
-        verdict = _aligned(last, f"  {cells.get(last.name, '')}")
+        said = cells.get(last.name, "")
+        if cell_len(said) > last.width - 2:
+            said = cells.get(IN_SHORT, said)
+        verdict = _aligned(last, f"  {said}")
         segments = [Segment(row, style), Segment(verdict, style + _emphasis(verdict.strip()))]
         return Strip(segments).adjust_cell_length(self.size.width, style)
 

@@ -133,7 +133,7 @@ MEANINGS = {
     "removed": "where removed models stood",
     "pinned": "which models are pinned",
     "sensed": "the order in which the robot sensed the models",
-    "took part": "bright what can have changed a bit of the last similar run, dim the rest",
+    "took part": "bright what took part in the last similar run",
     "path": "the robot's path on the last similar run",
     "original": "the robot's path in f itself",
     "failure": "where the robot ended in f",

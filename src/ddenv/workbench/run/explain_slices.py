@@ -17,8 +17,8 @@ def sliced(state: RunState) -> tuple[str, ...]:
 
 
 def implied(state: RunState) -> tuple[str, ...]:
-    """That the last test of the round was not simulated."""
-    last = state.tests[-1] if state.tests else None
+    """That the last test that ended was not simulated."""
+    last = next((test for test in reversed(state.tests) if test.is_finished), None)
     if last is None or last.implied_by is None or state.ended:
         return ()
     return (f"Test {last.id} is implied by test {last.implied_by}: nothing that it lacks took part there.",)
