@@ -96,6 +96,7 @@ PICTURES = {
     "signs": Picture("SignsDialog", "What the signs mean"),
     "export": Picture("ExportScreen", "Writing what is left"),
     "runs": Picture("RunsScreen", "The list of runs"),
+    "runs-compared": Picture("CompareRuns", "Two runs side by side"),
 }
 
 
@@ -270,6 +271,8 @@ async def list_runs() -> None:
         await press(pilot, "R")
         await pilot.pause(1.5)
         await take(pilot, "runs")
+        await press(pilot, "m", "down", "c")
+        await take(pilot, "runs-compared")
     await asyncio.to_thread(stop, works)
 
 

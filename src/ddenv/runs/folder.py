@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import shlex
+from contextlib import suppress
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import platformdirs
 
@@ -26,6 +29,21 @@ def find_run(name: str) -> Path:
     if path.is_file() or len(path.parts) > 1:
         return path
     return runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
+
+
+def dropped_run(text: str) -> Path | None:
+    """The run file whose name a terminal pastes when the file is dropped on it: plain, quoted, escaped, or as a file:// URL."""
+    try:
+        words = shlex.split(text.strip())
+    except ValueError:
+        words = []
+    for word in (text.strip(), *words[:1]):
+        path = Path(unquote(urlsplit(word).path) if word.startswith("file://") else word)
+        # Pasted text can be of any length and kind.
+        with suppress(OSError, ValueError):
+            if path.suffix == SUFFIX and path.is_file():
+                return path
+    return None
 
 
 def free_run_path(scenario_name: str) -> Path:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
-from textual import on
+from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
@@ -165,6 +165,14 @@ class Workbench(App[int]):
         while len(self.screen_stack) > 2:
             self.pop_screen()
         self.switch_screen(screen)
+
+    def on_paste(self, event: events.Paste) -> None:
+        """A run file that is dropped on the terminal is opened: the terminal pastes its name."""
+        from ddenv.runs.folder import dropped_run
+
+        path = dropped_run(event.text)
+        if path is not None:
+            self.post_message(ShowRun(path))
 
     def action_help(self) -> None:
         """The keys of the focused pane, of the screen, and of the app."""

@@ -2,16 +2,18 @@
 
 import fake_run
 import pytest
+from textual import events
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
-from ddenv.workbench.runs.recent_runs import RunsFolder, delete_run
+from ddenv.workbench.runs.compare_runs import CompareRuns, differences, lines
+from ddenv.workbench.runs.deleted_runs import FOLDER, KEPT, bring_back, delete_run
+from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_screen import RunsScreen
 from ddenv.workbench.runs.runs_table import RunTable
 from ddenv.workbench.setup.setup_screen import SetupScreen
-from ddenv.workbench.widgets.question import Question
 
 
 @pytest.fixture
@@ -128,10 +130,10 @@ async def test_enter_opens_a_run_and_w_watches_it(several):
 
 
 @pytest.mark.screens
-async def test_c_opens_the_setup_screen_with_its_settings(several, scenarios):
+async def test_n_opens_the_setup_screen_with_its_settings(several, scenarios):
     async with Listed(several) as listed:
         await listed.choose("done")
-        await listed.press("c")
+        await listed.press("n")
         assert isinstance(listed.app.screen, SetupScreen)
         await listed.app.workers.wait_for_complete()
 
@@ -140,7 +142,7 @@ async def test_c_opens_the_setup_screen_with_its_settings(several, scenarios):
 async def test_what_cannot_be_done_says_why(several):
     async with Listed(several) as listed:
         await listed.choose("broken")
-        for key in ("enter", "w", "c"):
+        for key in ("enter", "w", "n"):
             await listed.press(key)
             assert isinstance(listed.app.screen, RunsScreen)
         assert "is not a ddenv run file" in listed.notices()[-1]
@@ -154,27 +156,108 @@ async def test_what_cannot_be_done_says_why(several):
 
 
 @pytest.mark.screens
-async def test_d_deletes_after_a_question(several, runs):
-    (runs / "done.ddenv.log").touch()
+async def test_d_deletes_and_u_brings_back(several, runs):
+    (runs / "done.ddenv.log").write_text("its log")
+    content = (runs / "done.ddenv").read_bytes()
     async with Listed(several) as listed:
         await listed.choose("done")
-        await listed.press("d")
-        assert isinstance(listed.app.screen, Question)
-        await listed.press("n")
-        assert (runs / "done.ddenv").exists()
         # What SQLite leaves after a kill would come back in the next run of this name.
         (runs / "done.ddenv-journal").touch()
         await listed.press("d")
-        await listed.press("y")
         assert not list(runs.glob("done.ddenv*"))
         assert "done" not in listed.rows()
+        await listed.press("u")
+        assert "done" in listed.rows()
+        assert (runs / "done.ddenv").read_bytes() == content
+        assert (runs / "done.ddenv.log").read_text() == "its log"
+        await listed.press("u")
+        assert "no deleted run" in listed.notices()[-1]
+
+
+def test_a_deleted_run_is_kept_for_a_week_and_replaces_none(several, runs, monkeypatch):
+    delete_run(runs / "done.ddenv")
+    fake_run.FakeRun(runs / "done.ddenv").close()
+    with pytest.raises(UserError, match="there is a new run of this name"):
+        bring_back(runs)
+    delete_run(runs / "new.ddenv")
+    assert bring_back(runs) == runs / "new.ddenv"
+    (place,) = (runs / FOLDER).iterdir()
+    place.rename(place.with_name(str(int(place.name) - int((KEPT + 60) * 1e9))))
+    delete_run(runs / "done.ddenv")
+    assert len(list((runs / FOLDER).iterdir())) == 1
+
+
+async def test_the_list_is_sorted_by_any_column_and_filtered_by_state(several):
+    async with Listed(several, (200, 60)) as listed:
+        while listed.app.screen._order != "tests":
+            await listed.press("s")
+        assert next(iter(listed.rows())) == "done"
+        assert "▾tests" in str(listed.table.ordered_columns[3].label)
+        assert listed.rows()["done"][4] == "166 s"
+        await listed.press("slash", *"gone")
+        assert set(listed.rows()) == {"gone [b]x"}
+
+
+async def test_two_runs_are_compared(several, runs):
+    data = fake_run.as_printed()
+    data["reduction"]["iterations"] = 7
+    fake_run.guided(fake_run.FakeRun(runs / "other.ddenv", data)).close()
+    async with Listed(several) as listed:
+        await listed.press("c")
+        assert "mark a run first" in listed.notices()[-1]
+        await listed.choose("done")
+        await listed.press("m", "c")
+        assert "this is the marked run" in listed.notices()[-1]
+        marked = listed.table.chosen
+        await listed.choose("other")
+        await listed.press("c")
+        assert isinstance(listed.app.screen, CompareRuns)
+        other = next(run for run in RunsFolder(runs).look() if run.path.stem == "other")
+    said = {name: values for name, *values in lines(marked, other)}
+    assert said["models left"] == ["2 of 11 models", "5 of 11 models"]
+    assert said["in both"][0] == "2: crate_00, crate_01"
+    assert said["only in this one"] == ["none", "3: crate_02, crate_03, crate_04"]
+    assert said["reduction.iterations"] == ["3", "7"]
+
+
+def test_settings_that_one_run_lacks_differ():
+    assert list(differences({"a": {"b": 1}, "name": "x"}, {"a": {"b": 1, "c": [2]}, "name": "y"})) == [
+        ("a.c", "none", "[2]")
+    ]
+
+
+@pytest.mark.parametrize("how", ["typed", "pasted", "quoted", "url"])
+async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
+    folder = tmp_path / "from a robot"
+    folder.mkdir()
+    path = folder / "far.ddenv"
+    fake_run.finished(fake_run.FakeRun(path)).close()
+    text = {"quoted": f"'{path}' ", "url": path.as_uri()}.get(how, str(path))
+    async with Listed(run) as listed:
+        if how == "typed":
+            await listed.press("o")
+            listed.app.screen.query_one("#path", Input).value = text
+            await listed.press("enter")
+        else:
+            listed.app.post_message(events.Paste("no run at all"))
+            listed.app.post_message(events.Paste(text))
+            await listed.look()
+        assert isinstance(listed.app.screen, RunScreen) and listed.app.screen.run == path
+
+
+async def test_a_path_that_is_no_run_says_so(run):
+    async with Listed(run) as listed:
+        await listed.press("o", *"nowhere", "enter")
+        assert "nowhere.ddenv: no such run file" in listed.notices()[-1]
+        await listed.press("escape")
+        assert listed.app.focused is listed.table
 
 
 @pytest.mark.screens
 async def test_slash_filters_and_escape_goes_back(several):
     async with Listed(several) as listed:
-        await listed.press("slash", *"NE")
-        assert set(listed.rows()) == {"done", "gone [b]x", "new"}
+        await listed.press("slash", *"ONE")
+        assert set(listed.rows()) == {"done", "gone [b]x"}
         await listed.press("enter")
         assert listed.app.focused is listed.table
         await listed.press("escape")

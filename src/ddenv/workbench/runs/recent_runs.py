@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply
-from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import LOGS
 from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.wording import STATUS
 
@@ -22,15 +22,14 @@ SHOWN = 40
 LOCKED = "database is locked"
 # The number of events read at a time, before other threads get their turn.
 BATCH = 500
-# The endings of files beside a run file that are deleted with it.
-BESIDE = (*LOGS, ".lock", ".log", ".scene.log")
 
 
 @dataclass(frozen=True, slots=True)
 class Recent:
     """One run. `status` is the state's, "lost" if its engine has died, or "" if it is not read yet.
 
-    `started` and `changed` are Unix times, s; `size` in bytes. `trouble` says why it cannot be opened.
+    `started` and `changed` are Unix times, s; `size` in bytes. `computed` is the time that its own simulations took, s. `chosen`
+    is its scenario as it is now. `trouble` says why it cannot be opened.
     """
 
     path: Path
@@ -48,6 +47,8 @@ class Recent:
     minimal: bool = False
     reason: str = ""
     trouble: str = ""
+    computed: float = 0.0
+    chosen: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def sign(self) -> str:
@@ -125,16 +126,6 @@ def recent_runs(folder: Path) -> list[Recent]:
     return RunsFolder(folder).look(most=SHOWN)
 
 
-def delete_run(path: Path) -> None:
-    """Deletes a run file and its files beside it. Raises UserError while an engine works on it, or if it cannot be deleted."""
-    with engine_lock(path):
-        for each in (path, *(path.with_name(f"{path.name}{ending}") for ending in BESIDE)):
-            try:
-                each.unlink(missing_ok=True)
-            except OSError as error:
-                raise UserError(f"{each}: cannot be deleted: {error.strerror}") from None
-
-
 def _stamps(folder: Path) -> dict[Path, tuple[int, ...]]:
     """When each run file and its log were changed, in ns, and how large they are: it is read again if one of these differs."""
     try:
@@ -185,6 +176,8 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
         first[0].time if first else 0.0,
         state.minimal,
         state.reason,
+        computed=computed(state),
+        chosen=state.scenario,
     )
     return _Read(stamp, recent, None if state.ended else state)
 
@@ -204,7 +197,16 @@ def _caught_up(file: Observed, state: RunState) -> RunState:
             return state
 
 
+def computed(state: RunState) -> float:
+    """How long the simulations of a run took, s; results that were copied or implied cost nothing."""
+    return sum(test.wall_seconds for test in state.tests if not test.taken and test.implied_by is None)
+
+
 def named(runs: Iterable[Recent], part: str) -> list[Recent]:
-    """Those whose names, or whose scenarios' names, hold `part`."""
+    """Those whose name, scenario, method or state holds `part`."""
     wanted = part.strip().casefold()
-    return [run for run in runs if wanted in run.path.stem.casefold() or wanted in run.scenario.casefold()]
+    return [run for run in runs if any(wanted in words.casefold() for words in _said(run))]
+
+
+def _said(run: Recent) -> tuple[str, ...]:
+    return run.path.stem, run.scenario, run.pair, run.algorithm, run.state_words

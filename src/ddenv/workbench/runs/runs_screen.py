@@ -11,18 +11,28 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import Screen
-from textual.widgets import DataTable, Footer, Input, Static
+from textual.widgets import DataTable, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open, is_open
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.messages import ShowRun, ShowSetup
-from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, delete_run, named
-from ddenv.workbench.runs.runs_table import RunTable, about
-from ddenv.workbench.widgets.question import Question
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.runs.deleted_runs import bring_back, delete_run
+from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
+from ddenv.workbench.wording import count, plain, shorten
 
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
+# The footer's keys in the order of the screen, then by priority.
+SHOWN = (
+    *("runs.open", "runs.watch", "runs.like", "runs.filter", "runs.sort", "runs.mark", "runs.compare", "runs.delete"),
+    *("runs.undo", "runs.path", "runs.help", "runs.back"),
+)
+FIRST = (
+    *("runs.help", "runs.back", "runs.open", "runs.sort", "runs.filter", "runs.delete", "runs.undo", "runs.mark"),
+    *("runs.compare", "runs.path", "runs.watch", "runs.like"),
+)
 
 
 class RunsScreen(Screen[None]):
@@ -33,9 +43,22 @@ class RunsScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (30, "-tall")]
     BINDINGS: ClassVar = [
         Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it without changing anything"),
-        Binding("c", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
-        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it (asks first)"),
-        Binding("slash", "filter", "filter", id="runs.filter", tooltip="filter by letters of the name"),
+        Binding("n", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
+        Binding("slash", "filter", "filter", id="runs.filter", tooltip="filter by name, scenario, method or state"),
+        Binding(
+            "s", "sort", "sort", id="runs.sort", tooltip="sort by the next column; a click on a column does so, too"
+        ),
+        Binding("m", "mark", "mark", id="runs.mark", tooltip="mark this run, to compare another with it"),
+        Binding("c", "compare", "compare", id="runs.compare", tooltip="compare the marked run with this one"),
+        Binding("d", "delete", "delete", id="runs.delete", tooltip="delete it; u brings it back for a week"),
+        Binding("u", "undo", "undo", id="runs.undo", tooltip="bring back the run that was deleted last"),
+        Binding(
+            "o",
+            "path",
+            "open a file",
+            id="runs.path",
+            tooltip="open a run by its path; or drop the file on the terminal",
+        ),
         Binding("question_mark,f1", "app.help", "help", id="runs.help", tooltip="show every key", key_display="?"),
         Binding("escape,q,R", "back", "back", id="runs.back", tooltip="back to the previous screen", key_display="esc"),
     ]
@@ -45,6 +68,8 @@ class RunsScreen(Screen[None]):
         self._folder: RunsFolder | None = None
         self._runs: list[Recent] = []
         self._reading = False
+        self._order = next(iter(ORDERS))
+        self._marked: Path | None = None
 
     def compose(self) -> ComposeResult:
         with Horizontal(id="body"):
@@ -52,11 +77,12 @@ class RunsScreen(Screen[None]):
                 panel.border_title = "Runs"
                 yield RunTable(id="table")
                 yield Static("reading ...", id="empty", markup=False)
-                yield Input(placeholder="letters of a name; escape shows all", id="filter", compact=True)
+                yield Input(placeholder="a part of name, scenario, method or state", id="filter", compact=True)
+                yield Input(placeholder="path of a run file (.ddenv)", id="path", compact=True)
             with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
                 panel.border_title = "This run"
                 yield Static("", id="about", markup=False)
-        yield Footer(compact=True, show_command_palette=False)
+        yield KeyFooter(SHOWN, FIRST)
         yield Static("Please make the terminal larger: at least 64 x 12.", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -90,9 +116,9 @@ class RunsScreen(Screen[None]):
     def _list(self) -> None:
         """Shows the runs that pass the filter."""
         part = self.query_one("#filter", Input).value
-        shown = named(self._runs, part)
+        shown = sorted(named(self._runs, part), key=ORDERS[self._order])
         table = self.query_one(RunTable)
-        table.show(shown)
+        table.show(shown, self._order)
         table.display = bool(shown)
         empty = self.query_one("#empty", Static)
         empty.display = not shown
@@ -100,14 +126,17 @@ class RunsScreen(Screen[None]):
         works = sum(run.is_worked_on for run in self._runs)
         panel = self.query_one("#list")
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
-        panel.border_subtitle = Text(f"{count(works, 'engine')} at work" if works else "")
+        said = [f"{count(works, 'engine')} at work"] if works else []
+        if self._marked is not None:
+            said.append(f"marked: {shorten(plain(self._marked.stem), 20)}")
+        panel.border_subtitle = Text(" · ".join(said))
         self._show_title()
 
     def _nothing(self, part: str) -> str:
         from ddenv.runs.folder import runs_folder
 
         if self._runs:
-            return f"No run has '{plain(part)}' in its name; escape shows all."
+            return f"No run has '{plain(part)}' in its name, scenario, method or state; escape shows all."
         return f"No runs yet in {runs_folder()}.\n\nescape goes back to make one, or type: ddenv run ditch"
 
     @on(DataTable.RowHighlighted)
@@ -155,12 +184,7 @@ class RunsScreen(Screen[None]):
         elif run.is_worked_on:
             self._complain("its engine is at work: open the run and stop it first")
         else:
-            words = f"Delete {plain(run.path.stem)} for good?\n\n{_about(run)} Its log is deleted, too."
-            self.app.push_screen(Question(words, final=True), lambda yes: self._answered(bool(yes), run.path))
-
-    def _answered(self, yes: bool, path: Path) -> None:
-        if yes:
-            self._delete(path)
+            self._delete(run.path)
 
     @work(thread=True, group="delete")
     def _delete(self, path: Path) -> None:
@@ -172,15 +196,77 @@ class RunsScreen(Screen[None]):
         self.app.call_from_thread(self._deleted, path)
 
     def _deleted(self, path: Path) -> None:
-        self.notify(f"{plain(path.stem)} is deleted", timeout=3, markup=False)
+        self.notify(f"{plain(path.stem)} is deleted; u brings it back, for a week", timeout=4, markup=False)
         self._runs = [run for run in self._runs if run.path != path]
         if is_open(self):
             self._list()
 
+    @work(thread=True, group="delete")
+    def action_undo(self) -> None:
+        from ddenv.runs.folder import runs_folder
+
+        try:
+            path = bring_back(runs_folder())
+        except UserError as error:
+            self.app.call_from_thread(self._complain, str(error))
+            return
+        self.app.call_from_thread(self._is_back, path)
+
+    def _is_back(self, path: Path) -> None:
+        self.notify(f"{plain(path.stem)} is back", timeout=3, markup=False)
+        if is_open(self):
+            self._look()
+
     def _complain(self, why: str) -> None:
         self.notify(why, severity="warning", timeout=4, markup=False)
 
-    # The filter, and the way back.
+    # The order, and two runs side by side.
+
+    def action_sort(self) -> None:
+        names = list(ORDERS)
+        self._sort(names[(names.index(self._order) + 1) % len(names)])
+
+    @on(DataTable.HeaderSelected)
+    def _header_clicked(self, event: DataTable.HeaderSelected) -> None:
+        self._sort(str(event.column_key.value))
+
+    def _sort(self, order: str) -> None:
+        self._order = order
+        self._list()
+
+    def action_mark(self) -> None:
+        run = self._chosen
+        self._marked = None if run is None or run.path == self._marked else run.path
+        self._list()
+
+    def action_compare(self) -> None:
+        marked = next((run for run in self._runs if run.path == self._marked), None)
+        if marked is None:
+            self._complain("mark a run first (m), then go to another one and press c")
+        elif (run := self._readable()) is not None:
+            if run.path == marked.path:
+                self._complain("this is the marked run: go to another one")
+            else:
+                from ddenv.workbench.runs.compare_runs import CompareRuns
+
+                self.app.push_screen(CompareRuns(marked, run))
+
+    # A run elsewhere, the filter, and the way back.
+
+    def action_path(self) -> None:
+        self.add_class("-opening")
+        self.query_one("#path").focus()
+
+    @on(Input.Submitted, "#path")
+    def _path_entered(self, event: Input.Submitted) -> None:
+        from ddenv.runs.folder import dropped_run, find_run
+
+        words = event.value.strip()
+        path = dropped_run(words) or find_run(words)
+        if words and path.is_file():
+            self.post_message(ShowRun(path))
+        elif words:
+            self._complain(f"{plain(path)}: no such run file")
 
     def action_filter(self) -> None:
         self.add_class("-filtering")
@@ -195,18 +281,13 @@ class RunsScreen(Screen[None]):
         self.query_one(RunTable).focus()
 
     def action_back(self) -> None:
-        """Closes first the filter, then the screen."""
-        if not self.has_class("-filtering"):
+        """Closes first what was opened at the foot, then the screen."""
+        if self.has_class("-opening"):
+            self.remove_class("-opening")
+        elif self.has_class("-filtering"):
+            self.remove_class("-filtering")
+            self.query_one("#filter", Input).value = ""
+        else:
             self.dismiss()
             return
-        self.remove_class("-filtering")
-        self.query_one("#filter", Input).value = ""
         self.query_one(RunTable).focus()
-
-
-def _about(run: Recent) -> str:
-    """A run's state, in a line."""
-    if not run.total:
-        return f"{run.state_words}."
-    left = f"{len(run.kept)} of {count(run.total, 'model')} left"
-    return f"{run.state_words}: {left} after {count(run.tests, 'test')}."

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from datetime import datetime
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rich.text import Text
 from textual import events, work
@@ -16,7 +17,7 @@ from ddenv.map.names import shortened
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.wording import brief, count, plain
 
 # The maximum number of models to name.
 MOST_NAMES = 40
@@ -66,6 +67,7 @@ def about(run: Recent, width: int) -> Text:
         ("algorithm", run.algorithm),
         ("pair", run.pair if len(run.pair) + 10 <= width else run.pair.replace("/", f"/\n{'':10}")),
         ("tests", str(run.tests)),
+        ("computing", f"{brief(run.computed)} of simulations"),
         ("decisions", f"{run.decisions} by hand" if run.decisions else "none by hand"),
     ]
     for name, words in facts:
@@ -81,17 +83,30 @@ def about(run: Recent, width: int) -> Text:
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
-    ("models left", 11, True, lambda run: f"{len(run.kept)} of {run.total}" if run.total else ""),
-    ("tests", 5, True, lambda run: str(run.tests) if run.total else ""),
-    ("changed", 11, True, lambda run: moment(run.changed)),
+    ("left", 10, True, lambda run: f"{len(run.kept)} of {run.total}" if run.total else ""),
+    ("tests", 6, True, lambda run: str(run.tests) if run.total else ""),
+    ("cost", 7, True, lambda run: brief(run.computed) if run.total else ""),
 )
 # Columns are added in this order while they fit.
 MORE: tuple[_Column, ...] = (
+    ("changed", 11, True, lambda run: moment(run.changed)),
     ("scenario", 16, False, lambda run: plain(run.scenario)),
     ("started", 11, True, lambda run: moment(run.started)),
     ("size", 8, True, lambda run: size(run.size)),
 )
-NARROWEST_NAME = 18
+# By what the runs are sorted, in the order in which a key goes through it. Numbers and times begin with the most.
+ORDERS: dict[str, Callable[[Recent], Any]] = {
+    "changed": lambda run: -run.changed,
+    "name": lambda run: run.path.stem.casefold(),
+    "state": lambda run: run.state_words,
+    "scenario": lambda run: run.scenario.casefold(),
+    "left": lambda run: len(run.kept) if run.total else math.inf,
+    "tests": lambda run: -run.tests,
+    "cost": lambda run: -run.computed,
+    "started": lambda run: -run.started,
+    "size": lambda run: -run.size,
+}
+NARROWEST_NAME = 12
 # Each column has a space at both sides of its text.
 AROUND = 2
 
@@ -126,6 +141,7 @@ class RunTable(DataTable[Text]):
         super().__init__(id=id, cursor_type="row", zebra_stripes=False)
         self._runs: list[Recent] = []
         self._wide = 0
+        self._order = ""
         self._name_width = NARROWEST_NAME
         self._cells: dict[str, list[str]] = {}
 
@@ -134,9 +150,11 @@ class RunTable(DataTable[Text]):
         """The run under the cursor."""
         return self._runs[self.cursor_row] if 0 <= self.cursor_row < len(self._runs) else None
 
-    def show(self, runs: list[Recent]) -> None:
-        """Shows these in this order; the cursor stays on its run."""
+    def show(self, runs: list[Recent], order: str = "") -> None:
+        """Shows these in this order, whose column is marked; the cursor stays on its run."""
         chosen = self.chosen
+        if order and order != self._order:
+            self._order, self._wide = order, 0
         same = self._wide == self.size.width and [run.path for run in runs] == [run.path for run in self._runs]
         self._runs = list(runs)
         if not same:
@@ -164,13 +182,16 @@ class RunTable(DataTable[Text]):
         columns = self._columns()
         name = self._wide - sum(column[1] + AROUND for column in columns) - AROUND - 1
         self._name_width = max(NARROWEST_NAME, name)
-        self.add_column("name", width=self._name_width, key="name")
+        self.add_column(self._title("name"), width=self._name_width, key="name")
         for title, width, number, _ in columns:
-            self.add_column(Text(title, justify="right" if number else "left"), width=width, key=title)
+            self.add_column(Text(self._title(title), justify="right" if number else "left"), width=width, key=title)
         for run in self._runs:
             cells = self._row(run)
             self._cells[str(run.path)] = cells
             self.add_row(*self._drawn(cells), key=str(run.path))
+
+    def _title(self, name: str) -> str:
+        return f"▾{name}" if name == self._order else name
 
     def _refill(self, run: Recent) -> None:
         key, cells = str(run.path), self._row(run)
