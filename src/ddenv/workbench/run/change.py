@@ -21,6 +21,7 @@ from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Value
 from ddenv.workbench.run.methods import KINDS, note, paragraph
+from ddenv.workbench.widgets.entry import Entry
 from ddenv.workbench.wording import plain
 
 # Beside the pair and the algorithm, which have lists.
@@ -63,7 +64,7 @@ class Change(ModalScreen[course.Change | None]):
                 for one in NUMBERS:
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
-                        yield Input(self._texts[one.name], id=one.name, compact=True)
+                        yield Entry(self._texts[one.name], id=one.name)
                     empty = "; empty for no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)

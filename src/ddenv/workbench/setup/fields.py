@@ -20,6 +20,7 @@ from ddenv.schemas import Kind, names, uses
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
+from ddenv.workbench.widgets.entry import Entry
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
@@ -336,7 +337,7 @@ def _widgets(fields: tuple[form.Field, ...], texts: dict[str, str]) -> list[Widg
 
 def _entry(field: form.Field, texts: dict[str, str]) -> Widget:
     if not field.choices:
-        return Input(texts.get(field.id, ""), id=field.id, compact=True, placeholder=field.empty)
+        return Entry(texts.get(field.id, ""), id=field.id, placeholder=field.empty)
     choices = [(choice, choice) for choice in field.choices]
     value = texts.get(field.id, field.choices[0])
     return Select(choices, value=value, id=field.id, allow_blank=False, compact=True)
