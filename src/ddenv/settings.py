@@ -12,9 +12,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from ddenv.errors import printable
+from ddenv.errors import UserError, printable
 
 Value = int | float | str | bool | None
+
+# Models and robots are at most this far from the origin, m, and a heading makes at most so many radians.
+FARTHEST, TURNS = 1e6, 1e3
 
 # Kinds of elements that the user can have skipped instead of refusing the world.
 Ignorable = Literal["heightmap", "image", "mesh", "include", "joint"]
@@ -78,7 +81,7 @@ class Setting:
     def range(self) -> str:
         """The allowed numbers, in words."""
         if self.least is not None:
-            return f"{self.least:g} or more" if self.most is None else f"{self.least:.0f} to {self.most:.0f}"
+            return f"{self.least:g} or more" if self.most is None else f"{self.least:g} to {number_text(self.most)}"
         above = "any number" if self.above is None else f"more than {self.above:g}"
         return above if self.most is None else f"{above}, at most {self.most:g}"
 
@@ -88,6 +91,12 @@ class Setting:
             return [self.option if value else f"--no-{self.option[2:]}"]
         # No limit has no number of its own.
         return [self.option, number_text(0 if value is None else value)]
+
+    def check(self, value: Value, where: str = "") -> None:
+        """Raises UserError for a number out of range; `where` is what the user knows it as, by default its option or its key."""
+        if not isinstance(value, bool | str) and not self.allows(value):
+            found = "" if value is None else number_text(value)
+            raise UserError(f"{where or self.option or self.key}: expected {self.range}, found {found}")
 
     def allows(self, value: Any) -> bool:
         """Whether `value` has the right type and is in range."""
@@ -142,6 +151,7 @@ class Reduction:
         None,
         "maximum number of simulated tests, the baseline included",
         least=1,
+        most=10_000_000,
         shown="basic",
         may_change=True,
         none="none",
@@ -241,12 +251,13 @@ class Reduction:
         printed="paper",
         used_by=("ddenv",),
     )
-    n_partitions: int = setting(2, "partitions in the first round", least=2, used_by=("ddenv",))
+    n_partitions: int = setting(2, "partitions in the first round", least=2, most=100_000, used_by=("ddenv",))
     delta: float = setting(
         0.5,
         "change of the angular velocity where trajectoryseg cuts",
         unit="rad/s",
         above=0,
+        most=1000,
         used_by=("trajectoryseg",),
     )
     prior: Literal["spatial", "uniform"] = setting(
@@ -257,12 +268,13 @@ class Reduction:
 class Failure:
     """What counts as the same failure: still short of the goal at `timeout`, within `epsilon` of where f ended."""
 
-    timeout: float = setting(45.0, "simulated time the robot has", unit="s", above=0, shown="basic")
+    timeout: float = setting(45.0, "simulated time the robot has", unit="s", least=0.01, most=100_000, shown="basic")
     epsilon: float = setting(
         0.33,
         "maximum distance between the ends of two similar failures",
         unit="m",
-        above=0,
+        least=0.001,
+        most=1000,
         shown="basic",
         cost="Wider accepts more failures as the same one; narrower misses f more often.",
     )
@@ -277,13 +289,14 @@ class Failure:
 class Simulation:
     """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that follows the speed."""
 
-    time_step: float = setting(0.005, "time step of the simulation", unit="s", above=0, most=0.05)
+    time_step: float = setting(0.005, "time step of the simulation", unit="s", least=0.0001, most=0.05)
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
     wall_timeout: float | None = setting(
         None,
         "maximum real time of one test without its preparation; unless given, 1800 in the baseline, then by its speed",
         unit="s",
-        above=0,
+        least=0.01,
+        most=1_000_000,
         none="by speed",
     )
 

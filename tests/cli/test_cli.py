@@ -222,17 +222,22 @@ MISTAKES = {
         ["run", WALL, "--algorithm", "ddmn"],
         "reduction.algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
     ),
-    "epsilon": (["run", WALL, "--epsilon", "0"], "failure.epsilon: should be greater than 0"),
+    "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
     "similarity": (
         ["run", WALL, "--similarity", "end"],
         "failure.similarity: 'end' is not allowed",
     ),
-    "iterations": (["run", WALL, "--iterations", "-1"], "reduction.iterations: should be greater than or equal to 0"),
-    "timeout": (["run", WALL, "--timeout", "0"], "failure.timeout: should be greater than 0"),
+    "iterations": (["run", WALL, "--iterations", "-1"], "--iterations: expected 0 to 1000, found -1"),
+    "timeout": (["run", WALL, "--timeout", "0"], "--timeout: expected 0.01 to 100000, found 0"),
     "not a number": (["run", WALL, "--seed", "x"], "'x' is not a valid integer"),
     "jobs": (["run", WALL, "--jobs", "0"], "--jobs"),
     "unknown option": (["run", WALL, "--fast"], "No such option"),
-    "unknown command": (["reduce"], "No such command 'reduce'"),
+    "endless": (["run", WALL, "--timeout", "1e300"], "--timeout: expected 0.01 to 100000, found 1e+300"),
+    "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "expected x,y,z,yaw"),
+    "unknown command": (["certfy"], "no command, run, scenario or world 'certfy' (did you mean certify?)"),
+    "folder to run": (["run", DATA], "is a folder; expected a scenario's name or file"),
+    "folder to open": (["open", DATA], "is a folder; expected a run, a scenario or a world"),
+    "folder alone": ([DATA], "is a folder; expected a run, a scenario or a world"),
     "spawn inside": (["run", DATA / "wall.sdf", "--spawn", "2,0,0.5,0", "--goal", "4,0"], "inside model 'wall'"),
     "no spawn": (["run", DATA / "wall.sdf"], "needs --spawn x,y,z,yaw and --goal x,y"),
     "bad spawn": (["run", DATA / "wall.sdf", "--spawn", "a,b", "--goal", "4,0"], "expected x,y,z,yaw"),
@@ -353,3 +358,17 @@ def test_what_was_not_taken_as_it_is_written_is_counted(number, words, capsys):
 
     announce_notes(SimpleNamespace(notes=[None] * number, path="w.sdf"), as_json=False)
     assert capsys.readouterr().out.startswith(words)
+
+
+@pytest.mark.parametrize("first", [[], ["open"]], ids=["alone", "open"])
+def test_a_file_or_a_run_alone_opens_the_workbench_on_it(home, monkeypatch, capsys, first):
+    opened = []
+    monkeypatch.setattr(
+        "ddenv.workbench.launch.run_workbench", lambda *run, **options: opened.append((run, options)) or 0
+    )
+    (home / "runs").mkdir()
+    (home / "runs" / "mine.ddenv").touch()
+    for word in (DATA / "wall.sdf", DATA / "wall.yaml", "mine", "friction"):
+        assert in_process(monkeypatch, capsys, *first, word).returncode == 0
+    files = [options["file"].name if "file" in options else run[0].name for run, options in opened]
+    assert files == ["wall.sdf", "wall.yaml", "mine.ddenv", "friction.yaml"]

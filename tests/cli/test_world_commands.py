@@ -142,10 +142,16 @@ def test_the_commands(tmp_path):
     assert ddenv("world", "convert", wall, "-o", tmp_path / "out.sdf").stdout == f"wrote {tmp_path / 'out.sdf'}\n"
 
 
+def test_a_scenario_stands_for_its_world(monkeypatch, capsys):
+    for name in (str(DATA / "wall.yaml"), "friction"):
+        done = in_process(monkeypatch, capsys, "world", "check", name)
+        assert done.returncode == 0 and "can be removed" in done.stdout
+
+
 WRONG = {
     "missing": (("check", "nowhere.sdf"), "nowhere.sdf: no such file"),
     "folder": (("show", str(DATA)), "is a folder"),
-    "scenario": (("check", str(DATA / "wall.yaml")), "is a scenario; give the SDF file of its world"),
+    "no scenario": (("check", "frction"), "frction: no such file"),
     "option": (("check", str(DATA / "wall.sdf"), "--stand-in", "x"), "--stand-in: expected URI=SHAPE"),
     "unknown": (("check", str(DATA / "wall.sdf"), "--ignore", "walls"), "'walls' is not one of"),
     "no folder": (("convert", str(DATA / "wall.sdf"), "-o", "/no/where/x.sdf"), "cannot be written"),

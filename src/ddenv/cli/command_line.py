@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any
 
 import click
@@ -16,7 +17,7 @@ from ddenv.cli.certify_command import certify_command
 from ddenv.cli.config_command import config_command
 from ddenv.cli.export_command import export_command
 from ddenv.cli.open_command import open_command
-from ddenv.cli.options import reading_options
+from ddenv.cli.options import given_reading, reading_options
 from ddenv.cli.report_command import report_command
 from ddenv.cli.resume_command import resume_command
 from ddenv.cli.run_command import run_command
@@ -27,27 +28,52 @@ from ddenv.cli.study_command import study_command
 from ddenv.cli.test_command import test_command
 from ddenv.cli.world_command import world_group
 from ddenv.errors import UserError
+from ddenv.schemas import nearest
 from ddenv.version import __version__
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+class Commands(click.Group):
+    """The commands by name; any other first word is what `ddenv open` opens."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        word = args[0]
+        if self.get_command(ctx, word) is not None or word.startswith("-"):
+            return super().resolve_command(ctx, args)
+        if not _can_be_opened(word):
+            known = [*self.list_commands(ctx), *bundled()]
+            raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
+        return open_command.name, open_command, args
+
+
+def _can_be_opened(word: str) -> bool:
+    """Whether a word names a file, a run or a bundled scenario."""
+    from ddenv.runs.folder import find_run
+
+    return Path(word).exists() or find_run(word).is_file() or word in bundled()
+
+
+def bundled() -> list[str]:
+    """The names of the bundled scenarios."""
+    from ddenv.world.load import bundled_names
+
+    return bundled_names()
+
+
+@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
 @reading_options
 @click.pass_context
 def app(context: click.Context, /, **reading: Any) -> None:
-    """Finds the few models of a world that make a robot fail. Without a command: the workbench.
+    """Finds the few models of a world that make a robot fail. Without a command, or with a file or a run: the workbench.
 
     These options set how the workbench reads worlds; commands that read worlds have them, too.
     """
     if context.invoked_subcommand is None:
         from ddenv.workbench.launch import run_workbench
 
-        if any(reading.values()):
-            from ddenv.runs.scenarios import reading_of
-
-            # Errors in them are reported before the screen opens.
-            reading_of(**reading)
-        context.exit(run_workbench(reading=reading))
+        context.exit(run_workbench(reading=given_reading(reading)))
     if any(reading.values()):
         raise UserError(f"options for reading worlds go after the command: ddenv {context.invoked_subcommand} ...")
 

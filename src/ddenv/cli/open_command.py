@@ -1,30 +1,68 @@
-"""`ddenv open`: the workbench on a run."""
+"""`ddenv open`: the workbench on a run, or on a scenario or world that is not started yet."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+from typing import Any
 
 import click
 
+from ddenv.cli.options import given_reading, reading_options
+from ddenv.errors import UserError
+
+FILES = (".yaml", ".yml", ".sdf", ".world")
+
 
 @click.command("open")
-@click.argument("run")
+@click.argument("run", metavar="RUN_OR_FILE", type=click.Path())
+@reading_options
 @click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
 @click.option("--lines", is_flag=True, help="Plain lines that are never drawn again, for screen readers: type help.")
-def open_command(run: str, watch: bool, lines: bool) -> int:
-    """Attaches the workbench to RUN (a name or a file)."""
+def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
+    """Attaches the workbench to a run (its name or file), or opens it on a scenario or an SDF world.
+
+    'ddenv RUN_OR_FILE' does the same.
+    """
     from ddenv.runs.folder import find_run
+    from ddenv.world.files.access import is_folder
 
     path = find_run(run)
-    if not lines:
-        from ddenv.workbench.launch import run_workbench
+    if path.suffix.lower() not in FILES and path.is_file():
+        if any(reading.values()):
+            raise UserError("options for reading worlds: a run keeps its own")
+        return _follow(path, watch) if lines else _show(path, watch=watch)
+    if is_folder(Path(run)):
+        raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
+    file = _scenario_or_world(run)
+    if file is None:
+        raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
+    if watch or lines:
+        raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
+    return _show(None, reading=given_reading(reading), file=file)
 
-        return run_workbench(path, watch=watch)
+
+def _show(run: Path | None, **options: Any) -> int:
+    from ddenv.workbench.launch import run_workbench
+
+    return run_workbench(run, **options)
+
+
+def _follow(run: Path, watch: bool) -> int:
     from ddenv.workbench.lines.line_mode import follow_in_lines
 
     try:
-        follow_in_lines(path, watch, sys.stdin, sys.stdout)
+        follow_in_lines(run, watch, sys.stdin, sys.stdout)
     except KeyboardInterrupt:
         # As quit: the engine goes on.
         return 130
     return 0
+
+
+def _scenario_or_world(name: str) -> Path | None:
+    """The file, or the file of the bundled scenario of this name."""
+    from ddenv.world.load import SCENARIOS, bundled_names
+
+    if Path(name).suffix.lower() in FILES and Path(name).is_file():
+        return Path(name).absolute()
+    return SCENARIOS / f"{name}.yaml" if name in bundled_names() else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -12,11 +11,11 @@ import click
 
 from ddenv import processor
 from ddenv.errors import UserError, printable
-from ddenv.settings import IGNORABLE, JOBS, OPTIONS, Setting
+from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, Setting
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
-    """Comma-separated finite numbers, with a minimum and a maximum number of them."""
+    """Comma-separated numbers of a place, m and rad, with a minimum and a maximum number of them."""
 
     def __init__(self, name: str, fewest: int, most: int) -> None:
         self.name, self.fewest, self.most = name, fewest, most
@@ -26,7 +25,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
             numbers = tuple(float(word) for word in value.split(","))
         except ValueError:
             numbers = ()
-        if not self.fewest <= len(numbers) <= self.most or not all(map(math.isfinite, numbers)):
+        if not self.fewest <= len(numbers) <= self.most or not all(abs(number) <= FARTHEST for number in numbers):
             self.fail(
                 f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
                 param,
@@ -106,6 +105,15 @@ reading_options = _together(
 )
 
 READING = ("model_path", "stand_in", "ignore")
+
+
+def given_reading(reading: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The options for reading worlds, checked before a screen opens. Raises UserError."""
+    if any(reading.values()):
+        from ddenv.runs.scenarios import reading_of
+
+        reading_of(**reading)
+    return reading
 
 
 def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:

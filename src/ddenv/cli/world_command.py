@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.options import Numbers, announce, reading_options
-from ddenv.errors import UserError
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
+    from ddenv.world.scenario import Reading
 
 
 @click.group("world")
@@ -24,7 +24,7 @@ def world_group() -> None:
 
 
 @world_group.command()
-@click.argument("file", type=Path)
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
@@ -38,7 +38,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 
 
 @world_group.command()
-@click.argument("file", type=Path)
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
 @reading_options
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
@@ -78,7 +78,7 @@ def show(
 
 
 @world_group.command()
-@click.argument("file", type=Path)
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
 @reading_options
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
@@ -93,22 +93,31 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
 
 
 @world_group.command()
-@click.argument("file", type=Path)
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
 @reading_options
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:
     """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
     from ddenv.cli.world_settle import settle_world
-    from ddenv.runs.scenarios import reading_of
 
-    print("\n".join(settle_world(_read(file, reading), reading_of(**reading), output)))
+    print("\n".join(settle_world(*_read_as(file, reading), output)))
     return 0
 
 
 def _read(file: Path, reading: dict[str, Any]) -> World:
+    """The world of an SDF file, or of a scenario. Raises UserError."""
+    return _read_as(file, reading)[0]
+
+
+def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
+    """The same, and how it was read."""
     from ddenv.runs.scenarios import reading_of
+    from ddenv.world.load import bundled_names, find_scenario, load_scenario
     from ddenv.world.read import read_world
 
-    if file.suffix.lower() in (".yaml", ".yml"):
-        raise UserError(f"{file}: is a scenario; give the SDF file of its world")
-    return read_world(file, reading_of(**reading), announce)
+    if file.suffix.lower() in (".yaml", ".yml") or (str(file) in bundled_names() and not file.exists()):
+        scenario = load_scenario(find_scenario(str(file)))
+        file, read_as = scenario.world, reading_of(scenario.reading, **reading)
+    else:
+        read_as = reading_of(**reading)
+    return read_world(file, read_as, announce), read_as

@@ -65,6 +65,9 @@ def with_options(
     `spawn` is x, y, z m and yaw rad (0 if left out), `goal` x, y m. `values` are settings by name; 0 takes back a limit.
     """
     given = {name: value for name, value in values.items() if value is not None}
+    for name, value in given.items():
+        if name in SETTINGS and (value or not SETTINGS[name].none):
+            SETTINGS[name].check(value)
     chosen = with_values(scenario.model_dump(mode="json"), given)
     if spawn is not None:
         chosen["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))

@@ -45,7 +45,7 @@ def _commands() -> type[Provider]:
 class Workbench(App[int]):
     """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
-    `reading` holds the command line's options on how to read worlds. With `watch` the run is only watched, never guided.
+    `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start with. With `watch` the run is only watched, never guided.
     """
 
     TITLE = "ddenv"
@@ -99,6 +99,7 @@ class Workbench(App[int]):
         *,
         watch: bool = False,
         config: Config | None = None,
+        file: Path | None = None,
     ) -> None:
         super().__init__()
         self._written = Written()
@@ -108,7 +109,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._first = ShowSetup() if run is None else ShowRun(run, watch)
+        self._first = ShowSetup(file=file) if run is None else ShowRun(run, watch)
         if run is not None:
             from ddenv.workbench.run.observed import Observed
 
@@ -151,7 +152,7 @@ class Workbench(App[int]):
             return RunScreen(asked.run, asked.engine, asked.watch)
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
-        return SetupScreen(self._reading, asked.like)
+        return SetupScreen(self._reading, asked.like, asked.file)
 
     @on(ShowRun)
     @on(ShowSetup)

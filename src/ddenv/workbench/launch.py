@@ -17,10 +17,19 @@ from ddenv.workbench.terminal.themes import fitting
 SIGNS = "╭▶●⠒█…"
 
 
-def run_workbench(run: Path | None = None, reading: Mapping[str, Any] | None = None, *, watch: bool = False) -> int:
-    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal."""
+def run_workbench(
+    run: Path | None = None,
+    reading: Mapping[str, Any] | None = None,
+    *,
+    watch: bool = False,
+    file: Path | None = None,
+) -> int:
+    """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal.
+
+    It opens on `run`, on the setup screen with a scenario's or a world's `file`, or else on the setup screen.
+    """
     config = read_config()
-    app = Workbench(run, reading, watch=watch, config=config)
+    app = Workbench(run, reading, watch=watch, config=config, file=file)
     check_terminal()
     if not config.theme:
         app.theme = fitting(app.console.color_system)

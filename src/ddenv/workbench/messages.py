@@ -23,9 +23,10 @@ class ShowRun(Message):
 
 @dataclass
 class ShowSetup(Message):
-    """The setup screen, with the settings of the run `like` filled in."""
+    """The setup screen, with the settings of the run `like` filled in, or with a scenario's or a world's `file` chosen."""
 
     like: Path | None = None
+    file: Path | None = None
 
 
 @dataclass

@@ -16,7 +16,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
-from ddenv.world.files.access import read_bytes
+from ddenv.world.files.access import is_folder, read_bytes
 from ddenv.world.scenario import Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -41,6 +41,8 @@ PLAINLY = {
 def find_scenario(name: str) -> Path:
     """The file of a bundled scenario, or the path itself. Raises UserError, with the nearest name for a typo."""
     path = Path(name)
+    if is_folder(path):
+        raise UserError(f"{name}: is a folder; expected a scenario's name or file")
     if path.suffix.lower() in (".yaml", ".yml") or path.is_file():
         return path
     bundled = SCENARIOS / f"{name}.yaml"

@@ -28,7 +28,7 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
     bodies = [hull(collision, place) for collision in solid]
     boxes = [shape_bounds(collision.shape, place @ collision.pose) for collision in solid]
-    where = f"robot.spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
+    where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
     for model in world.models:
         depths = [(_depth_inside(bodies, boxes, collision), collision.shape) for collision in model.collisions]
         depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))

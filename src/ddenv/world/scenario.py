@@ -13,11 +13,14 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from ddenv import settings
-from ddenv.settings import Ignorable
+from ddenv.settings import FARTHEST, TURNS, Ignorable
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+# Maximum of all other numbers.
+LARGEST = 1e6
+Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-TURNS, le=TURNS, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 
 
 class Section(BaseModel):
@@ -29,10 +32,10 @@ class Section(BaseModel):
 class Spawn(Section):
     """Where the robot's model frame starts, in the world frame; `yaw` about the vertical."""
 
-    x: Finite
-    y: Finite
-    z: Finite
-    yaw: Finite = 0.0
+    x: Coordinate
+    y: Coordinate
+    z: Coordinate
+    yaw: Angle = 0.0
 
 
 class Reading(Section):
@@ -72,8 +75,8 @@ class Robot(Section):
 class Goal(Section):
     """The goal is reached when the robot is within `tolerance` of (x, y), seen from above."""
 
-    x: Finite
-    y: Finite
+    x: Coordinate
+    y: Coordinate
     tolerance: Positive = 0.5
 
 
@@ -90,9 +93,9 @@ class Lidar(Section):
     range: Positive = Field(default=20.0, description="nothing beyond is measured, m")
     nearest: NotNegative = Field(default=0.05, description="nothing nearer is measured, m")
     noise: NotNegative = Field(default=0.01, description="standard deviation of a range, m")
-    x: Finite = 0.30
-    y: Finite = 0.0
-    z: Finite = 0.36
+    x: Coordinate = 0.30
+    y: Coordinate = 0.0
+    z: Coordinate = 0.36
 
 
 class Sensors(Section):
@@ -131,7 +134,7 @@ class Planner(Section):
     replan: Positive = Field(default=2.0, description="longest time between two plans, s")
     patience: Positive = Field(default=4.0, description="time without progress before the robot tries to recover, s")
     recoveries: int = Field(default=6, ge=0, description="attempts to recover in a row before the robot gives up")
-    lowest: Finite = Field(
+    lowest: Coordinate = Field(
         default=0.1, description="what is seen lower than this above where the robot stands is no obstacle, m"
     )
 

@@ -5,6 +5,11 @@ import pytest
 import yaml
 
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.setup import form
+from ddenv.workbench.setup.file_list import remember
+from ddenv.workbench.setup.places import places_of, remember_places
+from ddenv.workbench.setup.remembered import state_file
+from tests.tiers import slow
 from tests.workbench.setup.setup_session import Opened
 
 
@@ -133,3 +138,56 @@ async def test_the_crosshair_and_the_mouse_pick(scenarios):
         await session.pilot.click("#map", offset=(30, 6))
         await session.pilot.pause()
         assert places.numbers() == before
+
+
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (80, 24)], but=[(80, 24)]), ids=str)
+async def test_the_focus_is_where_a_new_world_asks(scenarios, tmp_path, size):
+    path = tmp_path / "bare.sdf"
+    path.write_bytes((scenarios / "crates.sdf").read_bytes())
+    async with Opened(size) as session:
+        await session.open(path)
+        places = Places(session)
+        assert session.app.focused is places.map and places.map.size.height > 5
+        before = places.map.viewport.cursor
+        await session.press("up")
+        assert places.map.viewport.cursor != before
+        await session.press("enter")
+        assert "the heading" in places.says()
+
+
+async def test_looking_at_a_world_in_the_list_asks_nothing_before_enter(scenarios, tmp_path):
+    path = tmp_path / "bare.sdf"
+    path.write_bytes((scenarios / "crates.sdf").read_bytes())
+    remember(path)
+    async with Opened() as session:
+        places = Places(session)
+        await session.press("down")
+        assert session.app.focused.id == "scenario-list" and not places.map.picking
+        assert "no start and goal yet: s sets them" in places.says()
+        await session.press("enter")
+        assert session.app.focused is places.map and "the start" in places.says()
+
+
+@pytest.mark.screens
+async def test_start_and_goal_are_remembered_for_each_world(scenarios, tmp_path):
+    worlds = [tmp_path / "one.sdf", tmp_path / "two.sdf"]
+    for number, path in enumerate(worlds):
+        path.write_bytes((scenarios / "crates.sdf").read_bytes())
+        async with Opened() as session:
+            await session.open(path)
+            session.fill(spawn_x="-6", spawn_y=str(number), spawn_z="0.16", spawn_yaw="0", goal_x="6", goal_y="0")
+            await session.open(scenarios / "crates.yaml")
+    for number, path in enumerate(worlds):
+        async with Opened() as session:
+            await session.open(path)
+            assert Places(session).numbers() == ["-6", str(number), "0.16", "0", "6", "0"]
+            assert not Places(session).map.picking
+            assert session.told("command").startswith("$ ddenv run")
+
+
+@pytest.mark.parametrize("content", ["[]", "{", '{"PATH": {"spawn_x": "1e300"}}', '{"PATH": 3}'])
+def test_damaged_places_are_passed_over(tmp_path, content):
+    path = tmp_path / "one.sdf"
+    remember_places(path, dict.fromkeys([field.id for field in form.PLACES], "1"))
+    state_file("places.json").write_text(content.replace("PATH", str(path)))
+    assert places_of(path) is None

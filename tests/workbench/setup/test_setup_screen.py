@@ -76,7 +76,7 @@ async def test_rarely_used_settings_are_opened_and_closed(scenarios):
         assert not advanced.display
         session.fill(baseline_runs="0")
         await session.press("ctrl+s")
-        assert "reduction.baseline_runs" in session.wrong()
+        assert "baseline runs: expected 1 to 1000, found 0" in session.wrong()
         assert advanced.display
         assert session.app.focused.id == "baseline_runs"
 
@@ -146,11 +146,15 @@ async def test_the_start_button_starts(scenarios, started):
 
 WRONG = (
     ("iterations", "three", "iterations: expected a whole number, found 'three'"),
-    ("iterations", "-1", "iterations"),
+    ("iterations", "-1", "iterations: expected 0 to 1000, found -1"),
     ("timeout", "", "timeout s: is missing"),
-    ("timeout", "nan", "timeout"),
-    ("epsilon", "0", "epsilon"),
-    ("seed", "99999999999", "seed"),
+    ("timeout", "nan", "timeout s: expected 0.01 to 100000, found nan"),
+    ("timeout", "1e300", "timeout s: expected 0.01 to 100000, found 1e300"),
+    ("epsilon", "0", "epsilon m: expected 0.001 to 1000, found 0"),
+    ("seed", "99999999999", "seed: expected 0 to 2147483647"),
+    ("spawn_x", "1e300", "spawn x m: expected -1000000 to 1000000, found 1e300"),
+    ("spawn_yaw", "-inf", "yaw rad: expected -1000 to 1000, found -inf"),
+    ("goal_y", "2e6", "goal y m: expected -1000000 to 1000000, found 2e6"),
     ("jobs", "0", "jobs: expected 1 to 1024, found 0"),
     ("name", " ", "run name: is missing"),
 )
@@ -170,6 +174,36 @@ async def test_an_error_is_shown_beside_the_field_and_nothing_is_written(scenari
             session.fill(**{field: right})
             await session.pilot.pause()
             assert not session.screen.query_one(f"#{field}", Input).has_class("-wrong")
+            assert session.wrong() == ""
+        await session.press("ctrl+s")
+        assert len(started) == 1
+
+
+async def test_a_field_is_checked_when_it_is_left_and_its_error_goes_when_it_is_right(scenarios):
+    async with Opened() as session:
+        await session.press("f4")
+        timeout = session.screen.query_one("#timeout", Input)
+        timeout.focus()
+        await session.press("minus")
+        assert session.wrong() == "" and not timeout.has_class("-wrong")
+        await session.press("3", "tab")
+        assert session.wrong() == "✗ timeout s: expected 0.01 to 100000, found -3"
+        # The error is next to the fields, above all that does not belong to them.
+        assert session.screen.query_one("#wrong").region.y == session.screen.query_one("#fields").region.bottom
+        timeout.focus()
+        await session.press("3", "0")
+        assert session.wrong() == "" and not timeout.has_class("-wrong")
+
+
+@pytest.mark.screens
+async def test_a_robot_inside_a_model_is_an_error_of_the_whole_spawn(scenarios, started):
+    async with Opened() as session:
+        session.fill(spawn_z="-3")
+        await session.press("ctrl+s")
+        assert session.wrong().startswith("✗ spawn (-6, 0, -3): the robot stands inside")
+        session.fill(spawn_z="0.2")
+        await session.pilot.pause()
+        assert session.wrong() == ""
         await session.press("ctrl+s")
         assert len(started) == 1
 

@@ -29,7 +29,7 @@ async def test_a_bare_world_asks_for_spawn_and_goal(scenarios, runs, started):
         assert session.screen.query_one(WorldMap).place.goal == (6.0, 0.0)
         session.fill(goal_x="inf")
         await session.press("ctrl+s")
-        assert "finite" in session.wrong()
+        assert "goal x m: expected -1000000 to 1000000, found inf" in session.wrong()
         session.fill(goal_x="6", spawn_z="0.05")
         await session.press("ctrl+s")
         assert "stands inside model" in session.wrong()

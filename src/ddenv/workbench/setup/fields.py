@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
@@ -114,6 +115,9 @@ class OptionsForm(Vertical):
         super().__init__(id=id, classes=classes)
         self._name_given = False
         self._suggested = ""
+        # What is wrong with the fields that are marked, by id, and what else is wrong.
+        self._problems: dict[str, str] = {}
+        self._message = ""
         # The texts of fields that were not opened yet: most never are, and the screen opens faster without them.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
         self.seconds: float | None = None
@@ -128,13 +132,13 @@ class OptionsForm(Vertical):
             yield _grid("basic", form.BASIC)
             yield _grid("places", form.PLACES)
             yield Button(Content(MORE), id="more", compact=True, tooltip="the rarely used settings (f9)")
+        yield Static("", id="wrong", markup=False)
         yield Explained(id="explained")
         with Horizontal(id="last"):
             yield from _widgets((form.NAME, form.ACCEPT), {})
             yield Button("▶ Start", id="start", variant="primary", compact=True, tooltip="start the reduction (ctrl+s)")
         yield Static("", id="cost", markup=False)
         yield Static("", id="command", markup=False)
-        yield Static("", id="wrong", markup=False)
 
     def on_mount(self) -> None:
         self.query_one("#jobs", Input).value = _default_jobs()
@@ -164,16 +168,10 @@ class OptionsForm(Vertical):
         name = self.texts["name"].strip()
         return name if self._name_given and name != self._suggested else ""
 
-    def show_settings(self, scenario: Scenario, placed: bool, keep_places: bool = False) -> None:
-        """Fills in the scenario's settings, in place of all earlier texts.
-
-        If it is not `placed`, spawn and goal stay as they are.
-        """
-        texts = form.texts_of(scenario)
-        if not placed:
-            old = self.texts
-            texts |= {field.id: old[field.id] if keep_places else "" for field in form.PLACES}
-        if not form.are_jobs(self.texts["jobs"]):
+    def show_settings(self, scenario: Scenario, places: Mapping[str, str] | None = None) -> None:
+        """Fills in the scenario's settings, in place of all earlier texts, with `places` for spawn and goal if given."""
+        texts = form.texts_of(scenario) | dict(places or {})
+        if form.problem(form.JOBS_FIELD, self.texts["jobs"]):
             texts["jobs"] = _default_jobs()
         self.set_texts(texts)
         names = chosen(scenario.reduction.algorithm, scenario.reduction.pair)
@@ -192,9 +190,10 @@ class OptionsForm(Vertical):
             if id in self._unopened:
                 continue
             field = self.query_one(f"#{id}")
-            field.remove_class("-wrong")
+            self._problems.pop(id, None)
             if isinstance(field, Input | Select) and str(field.value) != text:
                 field.value = text
+        self._show_problems()
 
     def show_fields(self, show: bool) -> None:
         """The whole form; without the settings only the cost, the command, the name and Start."""
@@ -263,24 +262,53 @@ class OptionsForm(Vertical):
         self.query_one("#command", Static).update(line.append(plain(words), "not bold"))
 
     def complain(self, error: UserError) -> None:
-        """Shows an error below the fields; the wrong field is marked and gets the cursor."""
-        self.show_message(f"{MARK}{error}")
+        """Shows an error below the fields, until it is corrected; the wrong field is marked and gets the cursor."""
         id = form.field_of(error)
         if id is None:
+            self.show_message(f"{MARK}{error}")
             return
         if FIELDS[id] in form.ADVANCED:
             self._open_more(True)
+        self._message, self._problems = "", {id: str(error)} | self._problems | {id: str(error)}
         self.call_after_refresh(self._point_at, id)
 
     def _point_at(self, id: str) -> None:
-        for wrong in self.query(f"#{id}"):
-            wrong.add_class("-wrong")
-            wrong.focus()
+        self._show_problems()
+        self.query_one(f"#{id}").focus()
 
     def show_message(self, words: str) -> None:
-        line = self.query_one("#wrong", Static)
+        """Shows `words` in place of all errors so far."""
+        self._message = words
+        self._problems.clear()
+        self._show_problems()
+
+    def _show_problems(self) -> None:
+        first = next(iter(self._problems.values()), "")
+        line, words = self.query_one("#wrong", Static), f"{MARK}{first}" if first else self._message
         line.display = bool(words)
         line.update(Text(plain(words)))
+        for id in FIELDS:
+            for field in self.query(f"#{id}"):
+                field.set_class(id in self._problems, "-wrong")
+
+    def on_descendant_blur(self, event: events.DescendantBlur) -> None:
+        """A field is checked when it is left; an empty one only at the start of a run."""
+        field = FIELDS.get(event.widget.id or "")
+        if field is not None and (text := _text(event.widget)).strip() and (wrong := form.problem(field, text)):
+            self._problems[field.id] = wrong
+            self._show_problems()
+
+    def _check_again(self, id: str) -> None:
+        """An error goes away as soon as its field is right."""
+        spoiled = [each for each in form.together(id) if each in self._problems]
+        for each in spoiled:
+            if wrong := form.problem(FIELDS[each], self.texts[each]):
+                self._problems[each] = wrong
+            else:
+                del self._problems[each]
+        if spoiled or self._message:
+            self._message = ""
+            self._show_problems()
 
     # Actions.
 
@@ -301,7 +329,6 @@ class OptionsForm(Vertical):
     @on(Input.Changed)
     def _typed(self, event: Input.Changed) -> None:
         event.stop()
-        event.input.remove_class("-wrong")
         if event.input.id == "name":
             self._name_given = bool(event.value.strip())
         self._edited(event.input)
@@ -313,8 +340,10 @@ class OptionsForm(Vertical):
         self._edited(event.select)
 
     def _edited(self, widget: Widget) -> None:
-        if widget.has_focus and widget.id in FIELDS:
-            self._explain_field(FIELDS[widget.id])
+        if widget.id in FIELDS:
+            self._check_again(widget.id)
+            if widget.has_focus:
+                self._explain_field(FIELDS[widget.id])
         self.post_message(self.Edited((widget.id or "").startswith(("spawn", "goal"))))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.settings import JOBS, OPTIONS, SETTINGS, Setting, Shown, Value, read
+from ddenv.settings import FARTHEST, JOBS, OPTIONS, SETTINGS, TURNS, Setting, Shown, Value, number_text, read
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -20,7 +20,8 @@ class Field:
     """`id` is the field's name on the screen, `label` the text before it, `kind` int, float, str or bool.
 
     `key` is the scenario's key for it, "" if a scenario has none. `choices` are the allowed words, if there are few. A field
-    with `empty` may be empty, and then shows it. `meaning` is a sentence. `setting` is the field's setting, if any.
+    with `empty` may be empty, and then shows it. `meaning` is a sentence. `setting` is the field's setting, if any. Without one, a
+    number is at most `most` from 0.
     """
 
     id: str
@@ -31,6 +32,7 @@ class Field:
     empty: str = ""
     meaning: str = ""
     setting: Setting | None = None
+    most: float = FARTHEST
 
 
 def _field(one: Setting) -> Field:
@@ -56,7 +58,12 @@ PLACES = (
         meaning="Height of the robot's frame at the start, m. A place picked on the map fills it in.",
     ),
     Field(
-        "spawn_yaw", "yaw rad", float, "robot.spawn.yaw", meaning="Heading at the start, rad, counterclockwise from x."
+        "spawn_yaw",
+        "yaw rad",
+        float,
+        "robot.spawn.yaw",
+        meaning="Heading at the start, rad, counterclockwise from x.",
+        most=TURNS,
     ),
     Field("goal_x", "goal x m", float, "goal.x", meaning="Where the robot has to go, m."),
     Field("goal_y", "goal y m", float, "goal.y", meaning="Where the robot has to go, m."),
@@ -96,10 +103,31 @@ def value(field: Field, text: str) -> Value:
     if not text:
         raise FieldError(field.id, f"{field.label}: is missing")
     try:
-        return str(text) if field.kind is str else int(text) if field.kind is int else float(text)
+        found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
         wanted = "a whole number" if field.kind is int else "a number"
         raise FieldError(field.id, f"{field.label}: expected {wanted}, found '{text[:40]}'") from None
+    if allowed := _out_of_range(field, found):
+        raise FieldError(field.id, f"{field.label}: expected {allowed}, found {text[:40]}")
+    return found
+
+
+def _out_of_range(field: Field, found: Value) -> str:
+    """What is allowed, if `found` is not."""
+    if field.setting is not None:
+        return "" if field.setting.allows(found) or isinstance(found, str) else field.setting.range
+    if isinstance(found, float) and not abs(found) <= field.most:
+        return f"{number_text(-field.most)} to {number_text(field.most)}"
+    return ""
+
+
+def problem(field: Field, text: str) -> str:
+    """What is wrong with a field's text, in its own name, or ""."""
+    try:
+        value(field, text)
+    except FieldError as error:
+        return str(error)
+    return ""
 
 
 def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Value]:
@@ -110,18 +138,8 @@ def values(fields: tuple[Field, ...], texts: Mapping[str, str]) -> dict[str, Val
 def jobs(text: str) -> int:
     """The number of tests at the same time. Raises FieldError."""
     number = value(JOBS_FIELD, text)
-    if not isinstance(number, int) or not JOBS.allows(number):
-        raise FieldError("jobs", f"jobs: expected {JOBS.range}, found {number}")
+    assert isinstance(number, int)
     return number
-
-
-def are_jobs(text: str) -> bool:
-    """Whether `text` can stand in the field for jobs."""
-    try:
-        jobs(text)
-    except FieldError:
-        return False
-    return True
 
 
 def text_of(value: Value) -> str:
@@ -182,6 +200,11 @@ def field_of(error: UserError) -> str | None:
     for field in ALL:
         if field.key and f" {field.key}:" in f" {message}":
             return field.id
-    if "robot.spawn" in message:
+    if message.startswith("spawn ("):
         return "spawn_x"
     return NAME.id if "exists already" in message else None
+
+
+def together(id: str) -> tuple[str, ...]:
+    """The fields whose errors a change of one field may correct: the robot stands where all numbers of the spawn say."""
+    return tuple(field.id for field in PLACES if field.id.startswith("spawn")) if id.startswith("spawn") else (id,)

@@ -70,6 +70,11 @@ class Preview(Vertical):
         self.choice: Choice | None = None
         self.border_title = "World"
 
+    @property
+    def asks(self) -> bool:
+        """Whether the chosen world has no start yet."""
+        return self.choice is not None and self.choice.scenario is None and self.picker.spawn is None
+
     def compose(self) -> ComposeResult:
         yield self.map
         yield self.missing
@@ -220,6 +225,10 @@ class PlacePicker(Static):
             self.update(words.append("   escape stops", "dim"))
             return
         spawn, goal = self.spawn, self.goal
+        if spawn is None and goal is None and self.choice is not None and self.choice.scenario is None:
+            words = Text("no start and goal yet: ", no_wrap=True, overflow="ellipsis")
+            self.update(words.append("s", "bold").append(" sets them on the map"))
+            return
         heading = f"{arrow(spawn[2])} {math.degrees(spawn[2]):.0f}°" if spawn else "?"
         text = Text(no_wrap=True, overflow="ellipsis")
         for what, where in (("start", _point(spawn)), ("heading", heading), ("goal", _point(goal))):

@@ -19,10 +19,12 @@ from ddenv.workbench.background import call_if_open
 from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
+from ddenv.workbench.setup.arrangement import HEADS, PANES, ROOMY, SMALLEST, VAST, arrange
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
 from ddenv.workbench.setup.file_list import FileList, recent_files, remember
+from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.setup_keys import KEYS
 from ddenv.workbench.setup.start_run import (
@@ -38,15 +40,6 @@ from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
-
-SMALLEST = (64, 18)
-# From this size on all panes are shown at once.
-ROOMY = (110, 32)
-# From this size on the rarely used settings are shown, too.
-VAST = (160, 48)
-PANES = {"choose": "F2 choose", "map": "F3 map", "settings": "F4 settings"}
-# Where the focus goes in each pane.
-HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
 class SetupScreen(Screen[None]):
@@ -66,11 +59,16 @@ class SetupScreen(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
     BINDINGS = KEYS
 
-    def __init__(self, reading: Mapping[str, Any] | None = None, like: Path | None = None) -> None:
-        """`reading` holds the command line's options for reading worlds; the form starts with the settings of the run `like`."""
+    def __init__(
+        self, reading: Mapping[str, Any] | None = None, like: Path | None = None, file: Path | None = None
+    ) -> None:
+        """`reading` holds the command line's options for reading worlds.
+
+        The form starts with the settings of the run `like`, or of the scenario or world `file`.
+        """
         super().__init__()
         self._reading = reading or {}
-        self._like = like
+        self._like, self._file = like, file
         self.form = OptionsForm(id="options", classes="panel")
         self.preview = Preview(self.form, self._reading, id="preview")
         # Whether the choice is still being read, as is the first file when the screen opens.
@@ -129,7 +127,9 @@ class SetupScreen(Screen[None]):
     def _offer(self, bundled: list[Path], recent: list[Path]) -> None:
         files = self.query_one(FileList)
         files.offer(bundled, recent, self._like)
-        if not files.option_count:
+        if self._file is not None:
+            self._opened(self._file)
+        elif not files.option_count:
             self.preview.show_nothing("there are no bundled scenarios; ctrl+o opens a file")
 
     @on(FileList.Looked)
@@ -138,7 +138,11 @@ class SetupScreen(Screen[None]):
 
     @on(OptionList.OptionSelected, "#scenario-list")
     def _selected(self) -> None:
-        self.action_pane("settings")
+        """A world without a start is asked for it first."""
+        if self.preview.choice is not None and self.preview.asks:
+            self.action_pick("start")
+        else:
+            self.action_pane("settings")
 
     @on(OptionList.OptionSelected, "#run-list")
     def _open_run(self, event: OptionList.OptionSelected) -> None:
@@ -158,6 +162,7 @@ class SetupScreen(Screen[None]):
     # The choice.
 
     def _choose(self, path: Path) -> None:
+        self._remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
@@ -183,10 +188,23 @@ class SetupScreen(Screen[None]):
             self._show_outcome()
             return
         placed = choice.scenario is not None
-        self.form.show_settings(choice.settings, placed, self._keep_places)
+        places = None if placed else self._places(choice)
+        self.form.show_settings(choice.settings, places)
         picker.show_places()
-        if not placed and picker.spawn is None:
-            picker.pick("start")
+        if self.preview.asks and choice.path == self._opened_now:
+            self.action_pick("start")
+
+    def _places(self, choice: Choice) -> dict[str, str]:
+        """Start and goal of a world without a scenario: as the last time, or as they are, or none yet."""
+        texts, ids = self.form.texts, [field.id for field in form.PLACES]
+        now = {id: texts[id] if self._keep_places else "" for id in ids}
+        return places_of(choice.path) or now
+
+    def _remember_places(self) -> None:
+        """For the next time that a world without a scenario is chosen."""
+        choice, picker = self.preview.choice, self.preview.picker
+        if choice is not None and choice.scenario is None and picker.spawn is not None and picker.goal is not None:
+            remember_places(choice.path, self.form.texts)
 
     @on(Preview.PastRead)
     def _past_was_read(self, event: Preview.PastRead) -> None:
@@ -300,6 +318,7 @@ class SetupScreen(Screen[None]):
         except UserError as error:
             self._complain(error)
             return
+        self._remember_places()
         self._busy = True
         self.form.show_message("checking ...")
         self._create(new, only_baseline)
@@ -360,19 +379,7 @@ class SetupScreen(Screen[None]):
         self._arrange()
 
     def _arrange(self) -> None:
-        # Not by classes of the screen: these would compute all styles again.
-        width, height = self.size
-        all, pane = width >= ROOMY[0] and height >= ROOMY[1], self._pane
-        fits = width >= SMALLEST[0] and height >= SMALLEST[1]
-        self.form.display = fits
-        self.query_one("#body").display = fits and (all or pane != "settings")
-        self.query_one("#choice").display = all or pane == "choose"
-        self.form.show_fields(all or pane == "settings")
-        self.form.set_class(not all and pane == "settings", "-alone")
-        self.form.set_class(not all, "-frameless")
-        panes = self.query_one(Panes)
-        panes.display = not all
-        panes.mark(pane)
+        arrange(self, self._pane)
 
     @on(Panes.Chosen)
     def _pane_chosen(self, event: Panes.Chosen) -> None:

@@ -1,0 +1,36 @@
+"""Which panes of the setup screen are shown: all of them where there is room, otherwise one at a time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ddenv.workbench.widgets.panes import Panes
+
+if TYPE_CHECKING:
+    from ddenv.workbench.setup.setup_screen import SetupScreen
+
+SMALLEST = (64, 18)
+# From this size on all panes are shown at once.
+ROOMY = (110, 32)
+# From this size on the rarely used settings are shown, too.
+VAST = (160, 48)
+PANES = {"choose": "F2 choose", "map": "F3 map", "settings": "F4 settings"}
+# Where the focus goes in each pane.
+HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
+
+
+def arrange(screen: SetupScreen, pane: str) -> None:
+    """Shows all panes, or only `pane`."""
+    # Not by classes of the screen: these would compute all styles again.
+    width, height = screen.size
+    all = width >= ROOMY[0] and height >= ROOMY[1]
+    fits = width >= SMALLEST[0] and height >= SMALLEST[1]
+    screen.form.display = fits
+    screen.query_one("#body").display = fits and (all or pane != "settings")
+    screen.query_one("#choice").display = all or pane == "choose"
+    screen.form.show_fields(all or pane == "settings")
+    screen.form.set_class(not all and pane == "settings", "-alone")
+    screen.form.set_class(not all, "-frameless")
+    panes = screen.query_one(Panes)
+    panes.display = not all
+    panes.mark(pane)
