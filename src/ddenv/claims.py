@@ -11,6 +11,7 @@ from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState
+from ddenv.runfile.supports import stack_with
 
 MOST_NAMES = 3
 NO_FRESH_RUNS = "no fresh runs were made"
@@ -41,11 +42,23 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
         names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
         if names:
             return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
-    but = f" except pinned ones ({pinned})" if pinned else ""
+    but = f"; {_stayed(pinned)}" if pinned else ""
     if not removals:
-        return f"nothing is left that can be removed{but}: {rate(left)}"
-    most = max(removals, key=lambda claim: claim.high)
-    return f"no {each} can be removed{but}: {rate(left)}; without any one of them at most {rate(most)}"
+        return f"nothing is left that can be removed: {rate(left)}{but}"
+    most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
+    return f"no {one} can be removed: {rate(left)}; without any one of these {len(removals)} at most {rate(most)}{but}"
+
+
+def _stayed(pinned: int) -> str:
+    """That nothing is claimed of models that were never left out."""
+    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+
+
+def never_left_out(state: RunState, certificate: Certificate) -> int:
+    """How many models of a finished certificate's environment no run leaves out: those that were pinned, with their stacks."""
+    there = state.nodes[certificate.node].environment
+    gone = {name for claim in certificate.claims for name in stack_with(state, there, claim.without)}
+    return len(there) - len(gone) if is_minimal(certificate) else 0
 
 
 class Counted(Protocol):
@@ -97,19 +110,23 @@ def short(claim: Claim) -> str:
     return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
 
 
-def terms(certificate: Certificate) -> str:
+def terms(certificate: Certificate, pinned: int = 0) -> str:
     """What a certificate asks for, in one sentence without a full stop."""
     rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
-    return f"what is left has to keep {rate}, and to fall below that without any one model"
+    return f"what is left has to keep {rate}, and to fall below that without {_any_one(pinned)}"
 
 
-def promise(certificate: Certificate) -> str:
-    """What "minimal" means by a certificate, in one sentence without a full stop."""
-    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+def promise(state: RunState, certificate: Certificate) -> str:
+    """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
+    rate, pinned = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}", never_left_out(state, certificate)
     return (
-        f"minimal means: what is left keeps {rate}, and falls below that without any one model; "
+        f"minimal means: what is left keeps {rate}, and falls below that without {_any_one(pinned)}; "
         f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
     )
+
+
+def _any_one(pinned: int) -> str:
+    return f"any one model that is not pinned ({_stayed(pinned)})" if pinned else "any one model"
 
 
 def ended(state: RunState) -> str:

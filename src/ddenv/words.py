@@ -9,7 +9,7 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import verdict_on
+from ddenv.claims import never_left_out, verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -117,7 +117,7 @@ def _certificate(kind: str, after: RunState) -> str:
         case "certificate_started":
             return f"certificate {last.number}: fresh runs of what is left ({models}), without each model, and of the whole world"
         case "certificate_finished":
-            return f"  certificate {last.number}: {verdict_on(last, len(after.pinned))}"
+            return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
         case "rate_lost":
             return f"  back to {models}, the last environment that seems to keep the rate"
     return (

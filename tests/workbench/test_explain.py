@@ -307,8 +307,10 @@ def test_what_was_pinned_is_not_called_needed(run):
     run.pin("crate_00")
     run.start_certificate()
     run.finish_certificate((None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"))
-    run.write("finished", minimal=True, reason="no single model can be removed except pinned ones (1)")
-    assert "1 model that you pinned always stayed; p unpins." in told(run, "absent")[1]
+    run.write("finished", minimal=True, reason="no other single model can be removed")
+    assert "without any one model that is not pinned (" in told(run, "absent")[1]
+    assert "never left out); the chance that this is wrong" in told(run, "absent")[1]
+    assert "p unpins." in told(run, "absent")[1]
 
 
 def test_a_file_that_is_gone_and_another_engine_are_named(run):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count, first_of
-from ddenv.claims import current, drift, is_minimal, meaning, missing, promise, rate, seen, short
+from ddenv.claims import current, drift, is_minimal, meaning, missing, never_left_out, promise, rate, seen, short, verdict_on
 from ddenv.errors import printable
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim
@@ -77,6 +77,8 @@ def certificate(state: RunState) -> dict[str, Any] | None:
         "keep_rate": found.keep_rate,
         "error": found.error,
         "minimal": is_minimal(found),
+        "never_left_out": never_left_out(state, found),
+        "means": promise(state, found) if is_minimal(found) else verdict_on(found),
         "claims": claims,
         "whole_world": None if whole is None else _share(whole.shown, whole.runs) | {"outcomes": dict(whole.outcomes)},
     }
@@ -122,7 +124,7 @@ def _certificate_lines(state: RunState) -> list[str]:
         lines += [f"  and {count(more, 'more model')}"] if more > 0 else []
     if (whole := _whole_world(state)) is not None:
         lines.append(f"  the whole world: {rate(whole)}")
-    return [*lines, promise(found)] if state.certified else lines
+    return [*lines, promise(state, found)] if state.certified else lines
 
 
 def _removal(claim: Claim) -> str:

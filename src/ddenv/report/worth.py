@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import current, drift, meaning, missing, promise, verdict_on
+from ddenv.claims import current, drift, meaning, missing, never_left_out, promise, verdict_on
 from ddenv.page.blocks import Block, Cell, Name, Section, Table, percent, plain, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.progress import Certificate
@@ -38,7 +38,7 @@ def _with(state: RunState, found: Certificate) -> list[Block]:
         "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
     )
     if state.certified:
-        means = promise(found)
+        means = promise(state, found)
         words += f" {means[:1].upper()}{means[1:]}."
     return [table, say(words), *_earlier(state, found)]
 
@@ -62,7 +62,7 @@ def _name(each: FreshRuns) -> Cell:
 def _earlier(state: RunState, found: Certificate) -> list[Block]:
     """Other certificates of the same environment: each stands for itself."""
     others = [one for one in state.certificates if one.node == found.node and one.claims and one is not found]
-    return [say(f"Certificate {one.number}, made before: {plain(verdict_on(one))}.") for one in others]
+    return [say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.") for one in others]
 
 
 def rate_of_left(state: RunState) -> tuple[str, str]:

@@ -314,11 +314,10 @@ def _finished(state: RunState) -> Happening:
     if not state.environment:
         none = "f shows without any removable model: look at the robot, its goal and the models that always stay."
         return "returned", ("Minimal: no model left.", _reason(state, ""), none, base)
-    pinned = state.pinned.intersection(state.environment)
-    stays = (f"{count(len(pinned), 'model')} that you pinned always stayed; p unpins.",) if pinned else ()
+    stays = ("p unpins.",) if state.pinned.intersection(state.environment) else ()
     certificate = current(state)
-    means = () if certificate is None else (_sentence(promise(certificate)),)
-    return "returned", (f"Minimal: {kept} left. {_reason(state, '')}", f"Kept: {_names(state)}.", *stays, *means, base)
+    means = () if certificate is None else (_sentence(promise(state, certificate)),)
+    return "returned", (f"Minimal: {kept} left. {_reason(state, '')}", f"Kept: {_names(state)}.", *means, *stays, base)
 
 
 def _reason(state: RunState, otherwise: str) -> str:

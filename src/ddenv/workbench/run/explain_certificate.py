@@ -19,7 +19,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
     if certificate.claims:
         return (_after(certificate), *_now(snapshot, certificate))
     return (
-        f"Full runs with fresh seeds check the result: {terms(certificate)}.",
+        f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
         *_so_far(state),
         *_now(snapshot, certificate),
     )
