@@ -51,7 +51,8 @@ def test_command(
     as_json: bool,
     **options: Any,
 ) -> int:
-    """Runs the robot in a scenario, or in a run's world, and prints each run's outcome."""
+    """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and in the end how often it fails."""
+    from ddenv.cli.test_summary import lines, summary
     from ddenv.engine.single_test import plan, run_trials
 
     what = _subject(subject, options)
@@ -71,8 +72,11 @@ def test_command(
         results.append(result)
         if not as_json:
             print(printable(_line(result)), flush=True)
+    rows = summary(results)
     if as_json:
-        print(json.dumps({"runs": results}))
+        print(json.dumps({"runs": results, "summary": rows}))
+    elif len(results) > 1:
+        print("\n".join(["", *lines(rows)]))
     return 0
 
 

@@ -1,0 +1,46 @@
+"""After several runs, `ddenv test` says how often f shows in each environment, for people and for programs."""
+
+import json
+
+import pytest
+
+from ddenv.cli.test_summary import lines, summary
+from tests.command import in_process
+from tests.conftest import DATA
+
+
+def runs(without, *outcomes):
+    return [{"without": without, "models": 3 - bool(without), "outcome": outcome} for outcome in outcomes]
+
+
+def test_each_environment_has_its_runs_its_rate_and_its_interval():
+    found = summary([*runs(None, *["similar"] * 4), *runs("ball", "pass", "other", "error"), *runs("wall", "timeout")])
+    assert [(row["without"], row["runs"], row["shown"], row["rate"]) for row in found] == [
+        (None, 4, 4, 1.0),
+        ("ball", 2, 0, 0.0),
+        ("wall", 0, 0, None),
+    ]
+    assert found[0]["low"] == pytest.approx(0.51, abs=0.01) and found[2]["low"] is None
+    assert lines(found) == [
+        "all 3 models: f in 4 of 4 runs (51 % to 100 %)",
+        "without ball: f in 0 of 2 runs (0 % to 66 %); 1 more run broke",
+        "without wall: no run ended; 1 more run broke",
+    ]
+
+
+def test_where_no_f_is_known_all_failures_count():
+    assert lines(summary(runs(None, "failed", "pass", "pass"))) == ["all 3 models: 1 of 3 runs failed (6 % to 79 %)"]
+
+
+def test_the_command_ends_with_it(monkeypatch, capsys):
+    results = [*runs(None, "failed", "failed"), *runs("w\x1b", "pass", "pass")]
+    more = {"seed": 1, "end_pose": None, "failure": "", "distance": None}
+    monkeypatch.setattr("ddenv.engine.single_test.run_trials", lambda *_: iter([one | more for one in results]))
+    said = in_process(monkeypatch, capsys, "test", DATA / "wall.yaml", "--repeat", 2).stdout
+    assert said.splitlines()[-3:] == [
+        "",
+        "all 3 models: 2 of 2 runs failed (34 % to 100 %)",
+        "without w�: 0 of 2 runs failed (0 % to 66 %)",
+    ]
+    told = json.loads(in_process(monkeypatch, capsys, "test", DATA / "wall.yaml", "--repeat", 2, "--json").stdout)
+    assert [row["shown"] for row in told["summary"]] == [2, 0] and len(told["runs"]) == 4
