@@ -228,6 +228,8 @@ async def test_layers_are_shown_or_not(run, layer):
             seen.append(SIGNS[layer] in text or (layer == "path" and any("⠀" < char <= "⣿" for char in text)))
             world.toggle_layer(layer)
         assert seen == [layer not in HIDDEN, layer in HIDDEN]
+        world.toggle_layer("partitions")
+        assert "A B" not in world.legend(200).plain
         assert layer in LAYERS
 
 

@@ -12,12 +12,14 @@ from ddenv.map.footprints import Footprint
 from ddenv.map.paint import HUES, NUMBERED, Canvas, luminance, packed
 from ddenv.map.raster import View, masks, owners
 from ddenv.workbench.map.map_colors import (
+    FLOOR,
     KEPT,
     LEFT_OUT,
     MANY,
     NONE,
     NUMBERS,
     PINNED,
+    REMOVED,
     SELECTED,
     SIXTEEN,
     mixed,
@@ -25,7 +27,7 @@ from ddenv.workbench.map.map_colors import (
     plain,
     sixteen,
 )
-from ddenv.workbench.map.model_looks import Kept, fill, looks
+from ddenv.workbench.map.model_looks import GONE, Kept, fill, ghosts, looks
 from ddenv.workbench.map.picture import strip
 
 DARK, LIGHT = ((15, 20, 27), (213, 219, 229)), ((250, 250, 250), (30, 30, 30))
@@ -124,6 +126,22 @@ def test_a_terminals_own_colour_is_never_in_a_block():
     assert blocks.any()
     assert (canvas.fore[blocks] >= NUMBERED).all()
     assert strip(canvas, VIEW.rows // 2)._segments[0].style.color.number == NUMBERS[0]
+
+
+@pytest.mark.parametrize("name", ["many", "light", "sixteen"])
+def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
+    palette = PALETTES[name]
+    floor = Footprint("floor", (np.array([(-5, -1.25), (5, -1.25), (5, 1.25), (-5, 1.25)]),), (-5, -1.25), (5, 1.25))
+    prints = [floor, *squares(3, 0.5)]
+    names = frozenset(each.name for each in prints)
+    how = looks(prints, Kept(names, frozenset({"floor"})), (0, 0, 0), (0, 0, 0), palette)
+    grids = [owners(masks(prints, VIEW), VIEW, np.flatnonzero(one)) for one in (how.kinds == REMOVED, how.kinds == FLOOR)]
+    canvas = Canvas(VIEW.rows, VIEW.columns, palette.back)
+    fill(canvas, grids[1], how)
+    dotted = ghosts(canvas, *grids, how, palette.faint)
+    on_floor = dotted & (np.maximum(grids[1][0::2], grids[1][1::2]) >= 0)
+    assert on_floor.any() and (canvas.chars[on_floor] == GONE).all()
+    assert set(canvas.back[on_floor].tolist()) == {how.looks[how.tones[0]].fill}
 
 
 def test_pinned_and_selected_models_have_signs_of_their_own():

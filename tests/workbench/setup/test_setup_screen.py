@@ -102,6 +102,19 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
         assert session.app.focused.id == "epsilon"
 
 
+async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenarios, runs):
+    fake_run.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
+    fake_run.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
+    async with Opened((80, 24)) as session:
+        title = session.screen.query_one("#title", Static)
+        assert len(title.render().plain) < title.size.width
+        options = session.screen.query_one("#run-list", OptionList)
+        shown = {str(options.get_option_at_index(index).prompt) for index in range(2)}
+        assert shown == {"■ crates-world-1  2/11", "■ a  2/11 finished"}
+        # The keys of panes are written as those of the footer.
+        assert session.told("pane-map").strip() == "f3 map"
+
+
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
 async def test_large_terminals_show_all_with_a_map_of_decent_size(scenarios, size):
     async with Opened(size) as session:

@@ -50,7 +50,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
     """
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
-        PARTS: bool(state.elements),
+        PARTS: bool(state.elements) and "partitions" in layers,
         SELECTED: bool(shown.selection),
         PINNED: bool(state.pinned) and "pinned" in layers,
         FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),

@@ -211,6 +211,10 @@ def ghosts(canvas: Canvas, removed: np.ndarray, grid: np.ndarray, how: Looks, co
     solid = np.append(~np.isin(how.kinds, (FLOOR, FLOOR_OUT, PROTECTED, REMOVED)), False)
     gone: np.ndarray = np.maximum(removed[0::2], removed[1::2]) != EMPTY
     gone &= ~solid[grid[0::2]] & ~solid[grid[1::2]]
+    # The floor around a dot stays whole, also where it fills only half of the cell.
+    under = np.maximum(grid[0::2], grid[1::2])[gone]
+    fills = np.array([*(each.fill for each in how.looks), how.palette.back], dtype=np.int32)
+    canvas.back[gone] = fills[np.append(how.tones, len(how.looks))[under]]
     canvas.chars[gone] = GONE
     canvas.fore[gone] = color
     return gone

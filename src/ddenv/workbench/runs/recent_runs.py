@@ -65,9 +65,14 @@ class Recent:
 
     @property
     def words(self) -> str:
-        """Its state, for a narrow list."""
+        """Its state, for a list."""
         word = "cannot be read" if self.trouble else STATUS.get(self.status, ("", self.status))[1]
-        return f"{len(self.kept)}/{self.total} {word}" if self.total else word
+        return f"{self.brief} {word}".strip()
+
+    @property
+    def brief(self) -> str:
+        """How many models are left, for a list in which its state has no room beside its sign."""
+        return f"{len(self.kept)}/{self.total}" if self.total else ""
 
     @property
     def is_worked_on(self) -> bool:

@@ -44,12 +44,20 @@ class RunList(OptionList):
         runs = self._folder.look(most=SHOWN)
         call_if_open(self, self._show, runs)
 
+    def on_resize(self) -> None:
+        at = self.highlighted
+        if self._runs:
+            self._show(list(self._runs.values()))
+            self.highlighted = at
+
     def _show(self, runs: list[Recent]) -> None:
         self._runs = {str(run.path): run for run in runs}
         self.clear_options()
+        width = self.scrollable_content_region.width or self.app.size.width
         for run in runs:
             text = Text(f"{run.sign} {plain(run.path.stem)}", no_wrap=True, overflow="ellipsis")
-            self.add_option(Option(text.append(f"  {run.words}", "dim"), id=str(run.path)))
+            words = run.words if text.cell_len + len(run.words) + 2 <= width else run.brief
+            self.add_option(Option(text.append(f"  {words}" if words else "", "dim"), id=str(run.path)))
         if not runs:
             self.add_option(Option(Text("none yet", "dim"), disabled=True))
 

@@ -14,7 +14,7 @@ SMALLEST = (64, 18)
 ROOMY = (110, 32)
 # From this size on the rarely used settings are shown, too.
 VAST = (160, 48)
-PANES = {"choose": "F2 choose", "map": "F3 map", "settings": "F4 settings"}
+PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
 # Where the focus goes in each pane.
 HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 

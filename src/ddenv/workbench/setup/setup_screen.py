@@ -83,7 +83,7 @@ class SetupScreen(Screen[None]):
     def compose(self) -> ComposeResult:
         with Horizontal(id="header"):
             title = Text(" ddenv", "bold", no_wrap=True)
-            yield Static(title.append("  find the few models that make a robot fail", "not bold dim"), id="title")
+            yield Static(title.append("  find what makes a robot fail", "not bold dim"), id="title")
             yield Panes(PANES, id="panes")
         with Horizontal(id="body"):
             with Vertical(id="choice"):
