@@ -7,10 +7,10 @@ from typing import Protocol
 
 from ddenv.amounts import count, first_of, percent
 from ddenv.rates import wilson_interval
-from ddenv.runfile.fold_decisions import origin
+from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Node, RunState
+from ddenv.runfile.state import Node, RunState, Trial
 from ddenv.runfile.supports import stack_with
 
 MOST_NAMES = 3
@@ -131,9 +131,33 @@ def _any_one(pinned: int) -> str:
 
 def ended(state: RunState) -> str:
     """Why a finished run ended, without a full stop; it says so where no fresh runs show what the result is worth."""
-    if state.baseline is None or current(state) is not None:
-        return state.reason
-    return f"{state.reason}; {missing(state)}" if state.reason else missing(state)
+    said = (state.reason, "" if state.baseline is None else missing(state), smaller_known(state))
+    return "; ".join(words for words in said if words)
+
+
+def smaller_known(state: RunState) -> str:
+    """That a smaller environment is known to show f, which the search may not take, and where it is; "" if there is none."""
+    left = len(state.environment)
+    nodes = [
+        (len(node.environment), f"#{node.number} in the history{', taken back' if node.rejected else ''}")
+        for node in state.nodes
+        if node.shown and not node.lost_rate and len(node.environment) < left and _same_f(state, node)
+    ]
+    trials = [(one.size, one.label) for one in state.trials if one.size < left and _shows_f(state, one)]
+    if not nodes and not trials:
+        return ""
+    size, where = min((*nodes, *trials), key=lambda each: each[0])
+    return f"a smaller environment is known to show f: {count(size, 'model')} ({where})"
+
+
+def _same_f(state: RunState, node: Node) -> bool:
+    """Whether the same failures count as f in a node as now."""
+    return failures_at(state, node.number) == state.failures
+
+
+def _shows_f(state: RunState, trial: Trial) -> bool:
+    tests = (state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests))
+    return trial.verdict == "similar" and any(test.outcome == "similar" for test in tests)
 
 
 def missing(state: RunState) -> str:

@@ -9,7 +9,7 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import never_left_out, verdict_on
+from ddenv.claims import never_left_out, smaller_known, verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -81,7 +81,8 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
         case "engine_started" | "comparing" | "compared":
             return _engine(kind, before, after)
         case "finished" | "engine_stopped" | "engine_failed":
-            return f"{after.status}: {after.reason}"
+            known = smaller_known(after)
+            return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
     return _news_by_hand(kind, before, after)
 
 

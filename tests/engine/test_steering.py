@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.claims import meaning
+from ddenv.claims import ended, meaning, smaller_known
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.runfile.atlas import atlas, models_of
@@ -248,6 +248,42 @@ def test_an_undone_reduction_is_not_made_again(tmp_path):
     assert "wall" in state.environment
 
 
+def test_what_was_undone_is_called_so_and_can_be_allowed_again(tmp_path):
+    def guide():
+        yield from until(lambda state: len(state.nodes) == 2)
+        yield "undo", {}
+        state = yield from until(lambda state: state.round is not None and undone_in(state))
+        candidate = undone_in(state)[0]
+        seen.append(candidate.verdict)
+        yield "unveto", {"round": state.round.number, "candidate": candidate.index}
+
+    def undone_in(state):
+        gone = state.nodes[1].environment
+        return [one for one in state.round.untried + tuple(state.round.candidates) if one.verdict and one.models == gone]
+
+    seen = []
+    state = guided(new_run(tmp_path), needs("wall"), guide())
+    assert seen == ["undone"]
+    assert state.decisions[-1].kind == "unveto" and state.decisions[-1].words.startswith("allowed part ")
+    assert state.environment == ("wall",)
+
+
+def test_an_end_above_a_smaller_environment_that_showed_f_says_so(tmp_path):
+    def guide():
+        state = yield from until(lambda state: state.status == "running" and len(state.environment) == 1)
+        assert state.environment == ("wall",)
+        yield "undo", {}
+
+    # The wall fails alone, as its undone reduction showed; otherwise only in pairs.
+    state = guided(new_run(tmp_path), needs("wall"), guide())
+    assert len(state.environment) > 1
+    said = smaller_known(state)
+    undone = next(node for node in state.nodes if node.rejected)
+    assert said == f"a smaller environment is known to show f: 1 model (#{undone.number} in the history, taken back)"
+    assert said in ended(state)
+    assert smaller_known(drive(new_run(tmp_path), FakePool(needs("wall"), 1))) == ""
+
+
 def test_from_any_reduction_there_is_a_branch_and_nothing_is_lost(tmp_path):
     def guide():
         yield from until(lambda state: len(state.nodes) == 3)
@@ -346,7 +382,7 @@ def test_a_veto_of_an_earlier_round_is_taken_back(tmp_path):
         ("change", {"settings": {"algorithm": "x"}}, "no algorithm 'x'"),
         ("change", {"settings": {"iterations": -1}}, "iterations"),
         ("change", {"settings": {"iterations": 1}}, "already"),
-        ("unveto", {"round": 1, "candidate": 0}, "neither vetoed nor rejected"),
+        ("unveto", {"round": 1, "candidate": 0}, "neither vetoed, rejected nor undone"),
         ("unveto", {"round": 9, "candidate": 0}, "round is over"),
     ],
 )

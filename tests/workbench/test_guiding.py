@@ -54,14 +54,17 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert "without B is vetoed" in session.said()
+        assert "without B is vetoed: it is not tried in any round; v again takes that back. Next is part C" in session.said()
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
         assert session.asked() == [("unveto", {"round": 2, "candidate": 3})]
         await session.press("home", "v", "u")
-        assert "part A is dissimilar already" in session.said()
+        said = session.said()
+        assert "part A is dissimilar already" in said
         assert session.asked() == [("undo", {})]
+        assert "part A is taken back. This round ends with 4 candidates untried; a new search begins from 11 models." in said
+        assert "It does not take these 6 again, in any branch, unless you allow it: v on their row" in said
         await session.press("u")
         assert session.asked() == []
         assert "the last undo is not done yet" in session.said()
@@ -89,7 +92,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
         assert isinstance(dialog, ChooseModels)
         await session.press(*"04", "enter")
         assert session.asked() == [("pin", {"models": [4]})]
-        assert "crate_04 is pinned" in session.said()
+        assert "crate_04 is pinned, and always stays. This round ends with" in session.said()
         world = session.screen.query_one(WorldMap)
         await session.press("1")
         world.go_to("crate_00")
@@ -286,7 +289,7 @@ async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch)
     async with Attached(run) as session:
         await session.press("p", *"00", "enter")
         assert (
-            "crate_00 is pinned, and always stays from the next round on; an engine is started for it" in session.said()
+            "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine is started" in session.said()
         )
         assert session.asked() == [("pin", {"models": [0]})]
         assert len(started) == 1

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count, first_of
-from ddenv.claims import current, drift, is_minimal, meaning, missing, never_left_out, promise, rate, seen, short, verdict_on
+from ddenv.claims import current, drift, is_minimal, meaning, missing, never_left_out, promise, rate, seen, short, smaller_known, verdict_on
 from ddenv.errors import printable
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim
@@ -38,6 +38,7 @@ def summary(state: RunState, path: Path) -> dict[str, Any]:
         "wall_seconds": round(state.working_seconds, 3),
         "status": state.status,
         "reason": state.reason,
+        "smaller_known": smaller_known(state) or None,
         "run_file": str(path),
     }
 
@@ -106,6 +107,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
         *_certificate_lines(state),
         f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
+        *([known] if (known := smaller_known(state)) else []),
         *broken(state),
         f"run file: {path}",
     ]

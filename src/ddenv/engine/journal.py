@@ -352,7 +352,7 @@ class Journal:
         self.refused.allow(wanted)
         self._refused_in.pop(wanted, None)
         if data.get("rejected") is not None:
-            self._refuse(frozenset(nodes[data["rejected"]].environment), "rejected")
+            self._refuse(frozenset(nodes[data["rejected"]].environment), "undone")
 
     def _enter(self, test: Test) -> None:
         keep = self._keeps[test.id]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ddenv.errors import UserError, printable
-from ddenv.guiding.situation import NO_FAILURE, Situation, Words
+from ddenv.guiding.situation import NO_FAILURE, Situation, Words, new_search
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState
 from ddenv.schemas import check, split_pair
@@ -32,8 +32,9 @@ class Undo:
         here = state.here
         if here is None or here.parent is None:
             return Words("undo")
-        before, after = len(here.environment), len(state.nodes[here.parent].environment)
-        return Words("undo", f"{here.what} is taken back: {before} → {count(after, 'model')}; it is not made again")
+        after = len(state.nodes[here.parent].environment)
+        said = f"{here.what} is taken back. {new_search(state, after)}. It does not take these {len(here.environment)} again, in any branch"
+        return Words("undo", f"{said}, unless you allow it: v on their row, or h and enter on #{here.number}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class GoBack:
             f"Go on from {there}?\n\nThe run pauses there. Change settings (c), pin (p) or try (w, o); then press space to go on. "
             "What was found since then stays in the history, and you can come back to it. No test is made twice."
         )
-        return Words("go back", f"back to {there}; the run pauses there", question)
+        return Words("go back", f"back to {there}; the run pauses there, and space begins a new search", question)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,8 @@ class Change:
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
         words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
-        return Words("change settings", f"from the next round on: {words}")
+        then = "" if set(self.new(state)) <= {"budget"} else f". {new_search(state)}"
+        return Words("change settings", f"from now on: {words}{then}")
 
     def new(self, state: RunState) -> dict[str, Value]:
         """The settings that differ from the current ones."""

@@ -13,7 +13,7 @@ from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.map.names import shortened
-from ddenv.runfile.state import RunState, Trial
+from ddenv.runfile.state import REFUSED, RunState, Trial
 from ddenv.settings import Value
 
 
@@ -101,7 +101,7 @@ def _veto(now: Situation, pointed: Pointed) -> Command:
         raise UserError(
             round_over(state) if state.round.done else "no candidate is under the cursor: 2 shows the table"
         )
-    make = Unveto if row.verdict in ("vetoed", "rejected") else Veto
+    make = Unveto if row.verdict in REFUSED else Veto
     return make(state.round.number, row.index)
 
 

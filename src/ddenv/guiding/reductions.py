@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ddenv.guiding.situation import ROUND_OVER, Situation, Words
-from ddenv.runfile.state import Candidate, RunState
+from ddenv.guiding.situation import ROUND_OVER, Situation, Words, next_candidate
+from ddenv.runfile.state import REFUSED, Candidate, RunState
+from ddenv.words import count
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,9 @@ class Accept:
         return _not_waiting(now, self)
 
     def words(self, state: RunState) -> Words:
-        return Words("accept", f"{_label(state, self)} is accepted")
+        one = _candidate(state, self)
+        left = "" if one is None else f": E is now its {count(one.size, 'model')}. The next round begins"
+        return Words("accept", f"{_label(state, self)} is accepted{left}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +41,7 @@ class Reject:
         return _not_waiting(now, self)
 
     def words(self, state: RunState) -> Words:
-        return Words("reject", f"{_label(state, self)} is rejected")
+        return Words("reject", f"{_label(state, self)} is rejected. {next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +62,8 @@ class Veto:
         return f"{one.label} is {one.verdict} already" if one.verdict else ""
 
     def words(self, state: RunState) -> Words:
-        return Words("veto", f"{_label(state, self)} is vetoed: it is not tried; v again takes that back")
+        said = f"{_label(state, self)} is vetoed: it is not tried in any round; v again takes that back"
+        return Words("veto", f"{said}. {next_candidate(state, self.candidate)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +79,12 @@ class Unveto:
         one = _candidate(now.state, self)
         if one is None:
             return round_over(now.state)
-        return "" if one.verdict in ("vetoed", "rejected") else f"{one.label} is neither vetoed nor rejected"
+        return "" if one.verdict in REFUSED else f"{one.label} is neither vetoed, rejected nor undone"
 
     def words(self, state: RunState) -> Words:
         one = _candidate(state, self)
         verdict = "vetoed" if one is None else one.verdict
-        return Words("take back the veto", f"{_label(state, self)} is no longer {verdict}: it is tried after all")
+        return Words("allow it again", f"{_label(state, self)} is no longer {verdict}: it is tried after all")
 
 
 def round_over(state: RunState) -> str:

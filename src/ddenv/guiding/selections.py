@@ -19,6 +19,7 @@ from ddenv.guiding.situation import (
     lacks_pinned,
     named,
     names_of,
+    new_search,
 )
 from ddenv.map.names import shortened
 from ddenv.runfile.atlas import models_of
@@ -50,7 +51,7 @@ class Pin:
     def words(self, state: RunState) -> Words:
         new = self.new(state)
         stays = "stays" if len(new) == 1 else "stay"
-        return Words("pin", f"{named(new)} {is_or_are(new)} pinned, and always {stays} from the next round on")
+        return Words("pin", f"{named(new)} {is_or_are(new)} pinned, and always {stays}. {new_search(state)}")
 
     def new(self, state: RunState) -> tuple[str, ...]:
         """The models that are not pinned yet."""
@@ -70,7 +71,7 @@ class Unpin:
 
     def words(self, state: RunState) -> Words:
         pinned = self.pinned(state)
-        return Words("unpin", f"{named(pinned)} {is_or_are(pinned)} unpinned")
+        return Words("unpin", f"{named(pinned)} {is_or_are(pinned)} unpinned. {new_search(state)}")
 
     def pinned(self, state: RunState) -> tuple[str, ...]:
         """The models that are pinned."""
@@ -130,7 +131,7 @@ class Adopt:
     def words(self, state: RunState) -> Words:
         trial = self.meant(state)
         size = 0 if trial is None else trial.size
-        return Words("adopt", f"try {self.trial} is adopted: E becomes its {count(size, 'model')}")
+        return Words("adopt", f"try {self.trial} is adopted. {new_search(state, size)}")
 
     def meant(self, state: RunState) -> Trial | None:
         """The try, None if no try has this number."""

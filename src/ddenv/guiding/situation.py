@@ -9,7 +9,7 @@ from typing import Literal
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for
-from ddenv.words import first_of
+from ddenv.words import count, first_of
 
 EngineIs = Literal["alive", "starting", "absent"]
 Row = Candidate | Trial
@@ -81,6 +81,22 @@ def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
     """The numbers of models, in the order of the world."""
     number = {name: index for index, name in enumerate(state.elements)}
     return tuple(sorted(number[name] for name in names))
+
+
+def new_search(state: RunState, size: int | None = None) -> str:
+    """What follows a decision that ends the search, as a sentence without a full stop: a new one begins from `size` models, or as many as are left."""
+    if state.baseline is None:
+        return "The search begins with that"
+    untried = 0 if state.round is None else len(state.round.untried)
+    ends = f"This round ends with {count(untried, 'candidate')} untried; a" if untried else "A"
+    return f"{ends} new search begins from {count(len(state.environment) if size is None else size, 'model')}"
+
+
+def next_candidate(state: RunState, after: int) -> str:
+    """What is tried after a candidate of the round, as a sentence without a full stop."""
+    waiting = () if state.round is None else state.round.untried
+    following = next((one for one in waiting if one.index > after), None)
+    return "It was the last one of this round" if following is None else f"Next is {following.label}"
 
 
 def lacks_pinned(state: RunState, models: Iterable[str]) -> str:

@@ -99,7 +99,7 @@ def _standing(record: Record) -> list[Paragraph]:
 def _minimal(state: RunState) -> Paragraph:
     if not state.environment:
         return say(Strong("Minimal."), " Look at the robot, its goal, and the models that always stay.")
-    return say(Strong("Minimal:"), f" {plain(state.reason).rstrip('.')}.")
+    return say(Strong("Minimal:"), f" {plain(ended(state)).rstrip('.')}.")
 
 
 def _failure(state: RunState) -> list[Paragraph]:

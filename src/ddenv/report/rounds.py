@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
-from ddenv.runfile.state import Candidate, Round, RunState
+from ddenv.runfile.state import REFUSED, Candidate, Round, RunState
 from ddenv.words import count
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
@@ -112,7 +112,7 @@ def _row(row: _Row) -> tuple[Cell, ...]:
 
 def _first_similar(row: _Row) -> str:
     verdicts = Counter(one.verdict for one in row.round.candidates)
-    refused = [f"{verdicts[word]} {word}" for word in ("vetoed", "rejected") if verdicts[word]]
+    refused = [f"{verdicts[word]} {word}" for word in REFUSED if verdicts[word]]
     words = f" ({', '.join(refused)})" if refused else ""
     if row.won is not None:
         return f"{row.won.label}{', taken back' if row.undone else ''}{words}"

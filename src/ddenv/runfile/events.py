@@ -42,7 +42,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
     accept_mode          mode
-    vetoed               candidate, verdict: vetoed, or rejected with `again`? if the same models were rejected in an earlier round
+    vetoed               candidate, verdict: vetoed; with `again`? also rejected or undone: the same models were refused so before
     unvetoed             round, candidate
     pinned / unpinned    models [..]
     trial_started        trial, models [..]: the user tries a selection

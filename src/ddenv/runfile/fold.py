@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
+from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Forecast, Point
-from ddenv.runfile.state import Candidate, Node, Round, RunState, Split, Test, Trial, many
+from ddenv.runfile.state import REFUSED, Candidate, Node, Round, RunState, Split, Test, Trial
 from ddenv.runfile.store import Event
 
 
@@ -236,7 +237,7 @@ def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
 
 
 def _vetoed(state: RunState, data: Data, at: float) -> Changes:
-    verdict = one_of(data["verdict"], "vetoed", "rejected")
+    verdict = one_of(data["verdict"], *REFUSED)
     candidate = replace(_tried(state, data["candidate"]), verdict=verdict)
     changes = _with_candidate(state, candidate)
     if data.get("again"):
@@ -249,6 +250,8 @@ def _unvetoed(state: RunState, data: Data, at: float) -> Changes:
     words = f"took back the veto of {_described(state, candidate)}"
     if candidate.verdict == "rejected":
         words = f"took back the rejection of {_described(state, candidate)}"
+    if candidate.verdict == "undone":
+        words = f"allowed {_described(state, candidate)} again"
     changes = _with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
     # The first similar candidate wins: a later one must wait for the verdict of this one.
     if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
@@ -371,7 +374,7 @@ def _check(split: Split, candidates: list[Any]) -> None:
 
 
 def _described(state: RunState, candidate: Candidate) -> str:
-    return f"{candidate.label} of round {_current(state).number} ({many(candidate.size)})"
+    return f"{candidate.label} of round {_current(state).number} ({count(candidate.size, 'model')})"
 
 
 def _tried(state: RunState, index: int) -> Candidate:

@@ -67,6 +67,7 @@ def rate_lost(state: RunState, data: Data, _: float) -> Changes:
         **searched_anew(state),
         "nodes": tuple(nodes),
         "node": node.number,
+        "came_at": state.tests_done,
         "environment": node.environment,
         "evidence_test": node.evidence_test,
         "lower_bound": 0,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from ddenv.amounts import count
 from ddenv.runfile.events import Changes, Data, names, number, one_of
 from ddenv.runfile.fold_rates import counted_again, same_runs, seen
 from ddenv.runfile.progress import Point
-from ddenv.runfile.state import Decision, Node, RunState, Test, Trial, many
+from ddenv.runfile.state import Decision, Node, RunState, Test, Trial
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40
@@ -16,14 +17,20 @@ NAMED, LONGEST = 3, 40
 
 def pinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    words = f"pinned {listed(models)}"
+    words = f"pinned {listed(models)}{_cut_short(state)}"
     return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
 
 
 def unpinned(state: RunState, data: Data, at: float) -> Changes:
     models = names(state.elements, data["models"])
-    words = f"unpinned {listed(models)}"
+    words = f"unpinned {listed(models)}{_cut_short(state)}"
     return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
+
+
+def _cut_short(state: RunState) -> str:
+    """That the round ends with candidates that were not tried."""
+    untried = 0 if state.round is None else len(state.round.untried)
+    return f"; round {state.round.number} ended with {untried} untried" if state.round and untried else ""
 
 
 def trial_started(state: RunState, data: Data, at: float) -> Changes:
@@ -45,7 +52,7 @@ def trial_judged(state: RunState, data: Data, _: float) -> Changes:
 
 def adopted(state: RunState, data: Data, at: float) -> Changes:
     trial = replace(tried(state, data["trial"]), adopted=True)
-    words = f"adopted {trial.label}: {many(trial.size)}"
+    words = f"adopted {trial.label}: {count(trial.size, 'model')}"
     return {
         **_with_trial(state, trial),
         **arrived(state, data, at, "adopted", trial.label, trial.tests),
@@ -106,7 +113,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
     else:
         last = nodes[here(state, undone).number]
         nodes[last.number] = replace(last, rejected=True)
-        words = f"took back {last.what}: {many(len(node.environment))} again"
+        words = f"took back {last.what}: {count(len(node.environment), 'model')} again"
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
@@ -121,6 +128,7 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         "failures": failures_at(state, node.number),
         "nodes": tuple(nodes),
         "node": node.number,
+        "came_at": state.tests_done,
         "environment": node.environment,
         "pinned": state.pinned - gone,
         "evidence_test": node.evidence_test,
@@ -160,14 +168,16 @@ def arrived(
     environment = names(state.elements, data["environment"])
     reduction = state.scenario.get("reduction", {})
     runs, shown = seen(state.tests, tests)
+    parent = state.node if below is None else below
     node = Node(
         number=len(state.nodes),
-        parent=state.node if below is None else below,
+        parent=parent,
         how=how,
         what=what,
         environment=environment,
         round=None if state.round is None else state.round.number,
         tests=state.tests_done,
+        own_tests=state.nodes[parent].own_tests + (state.tests_done - state.came_at) * (parent == state.node),
         time=at,
         evidence_test=int(data["evidence_test"]),
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
@@ -181,6 +191,7 @@ def arrived(
     return changes | {
         "nodes": (*state.nodes, node),
         "node": node.number,
+        "came_at": state.tests_done,
         "environment": environment,
         "evidence_test": node.evidence_test,
         "lower_bound": needed,
@@ -267,7 +278,7 @@ def counts(state: RunState, before: Test | None, after: Test) -> Changes:
 
 def place(node: Node) -> str:
     """A node in words."""
-    models = many(len(node.environment))
+    models = count(len(node.environment), 'model')
     return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
 
 

@@ -16,6 +16,8 @@ from ddenv.runfile.progress import Node as Node
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Tests that ended so say nothing about f.
 BROKEN = ("error", "timeout")
+# Verdicts of the user, which a key takes back.
+REFUSED = ("vetoed", "rejected", "undone")
 # Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
@@ -39,7 +41,8 @@ class RunState:
     failed     the engine could not continue: `reason` says why
 
     `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`.
-    `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the number of the current one.
+    `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the number of the current one; the
+    run came to it when `came_at` tests were finished.
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
@@ -79,6 +82,7 @@ class RunState:
     pinned: frozenset[str] = frozenset()
     nodes: tuple[Node, ...] = ()
     node: int = 0
+    came_at: int = 0
     trials: tuple[Trial, ...] = ()
     decisions: tuple[Decision, ...] = ()
     failures: tuple[int, ...] = ()
@@ -228,6 +232,11 @@ class Round:
     def partitions(self) -> tuple[tuple[str, ...], ...]:
         return self.split.partitions
 
+    @property
+    def untried(self) -> tuple[Candidate, ...]:
+        """The candidates that have no verdict, while the round goes on."""
+        return () if self.done or self.winner is not None else tuple(one for one in self.candidates if not one.verdict)
+
 
 @dataclass(frozen=True, slots=True)
 class Split:
@@ -246,7 +255,7 @@ class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
     `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm may come back to it),
-    "dissimilar", "unknown" (its tests broke), "vetoed" or "rejected" (similar, but the user rejected it). `distance` is what the
+    "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar, but the user rejected it) or "undone" (the user took it back before). `distance` is what the
     prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the ids of its tests so far, including
     re-runs and `known` tests of earlier rounds.
     """
@@ -375,8 +384,3 @@ def partition_letter(index: int) -> str:
         index, rest = divmod(index - 1, 26)
         letters = chr(ord("A") + rest) + letters
     return letters
-
-
-def many(models: int) -> str:
-    """1 model, 2 models."""
-    return f"{models} model{'s' * (models != 1)}"

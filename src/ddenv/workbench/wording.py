@@ -47,6 +47,7 @@ VERDICT = {
     "unknown": "✗ unknown",
     "vetoed": "⊘ vetoed",
     "rejected": "✗ rejected",
+    "undone": "↶ undone",
 }
 
 
