@@ -32,9 +32,7 @@ def pinned(home):
     run.certify_all(1, None, 23 * "s")
     for name in ("crate_01", "crate_02"):
         run.certify_all(1, name, 11 * "p")
-    run.finish_certificate(
-        (None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"), ("crate_02", "needed", 11 * "p")
-    )
+    run.finish_certificate((None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"), ("crate_02", "needed", 11 * "p"))
     events = run.file.events()
     state = fold(events)
     run.write("finished", minimal=True, reason=verdict_on(state.certificate, never_left_out(state, state.certificate)))
@@ -54,7 +52,7 @@ def test_screen_report_json_and_console_say_that_a_pinned_model_was_never_left_o
     assert told["certificate"]["means"] == means and told["certificate"]["never_left_out"] == 1
     assert PINNED in told["reason"] and json.dumps(told)
     assert f"without any one model that is not pinned ({PINNED})" in report
-    last = [event for event in pinned.file.events() if event.kind == "certificate_finished"][0]
+    last = next(event for event in pinned.file.events() if event.kind == "certificate_finished")
     before = fold(pinned.file.events()[: last.id - 1])
     assert news(last.kind, before, fold(pinned.file.events()[: last.id])).endswith(PINNED)
 

@@ -54,7 +54,10 @@ async def test_pausing_stepping_and_vetoing(run):
         assert "there is nothing to accept" in session.said()
         await session.press("down", "down", "v")
         assert session.asked() == [("veto", {"round": 2, "candidate": 3})]
-        assert "without B is vetoed: it is not tried in any round; v again takes that back. Next is part C" in session.said()
+        assert (
+            "without B is vetoed: it is not tried in any round; v again takes that back. Next is part C"
+            in session.said()
+        )
         run.write("vetoed", candidate=3, verdict="vetoed")
         await session.look()
         await session.press("v")
@@ -63,7 +66,10 @@ async def test_pausing_stepping_and_vetoing(run):
         said = session.said()
         assert "part A is dissimilar already" in said
         assert session.asked() == [("undo", {})]
-        assert "part A is taken back. This round ends with 4 candidates untried; a new search begins from 11 models." in said
+        assert (
+            "part A is taken back. This round ends with 4 candidates untried; a new search begins from 11 models."
+            in said
+        )
         assert "It does not take these 6 again, in any branch, unless you allow it: v on their row" in said
         await session.press("u")
         assert session.asked() == []
@@ -289,7 +295,8 @@ async def test_a_finished_run_is_searched_anew_with_other_pins(run, monkeypatch)
     async with Attached(run) as session:
         await session.press("p", *"00", "enter")
         assert (
-            "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine is started" in session.said()
+            "crate_00 is pinned, and always stays. A new search begins from 2 models; an engine is started"
+            in session.said()
         )
         assert session.asked() == [("pin", {"models": [0]})]
         assert len(started) == 1

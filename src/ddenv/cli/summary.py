@@ -6,7 +6,20 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count, first_of
-from ddenv.claims import current, drift, is_minimal, meaning, missing, never_left_out, promise, rate, seen, short, smaller_known, verdict_on
+from ddenv.claims import (
+    current,
+    drift,
+    is_minimal,
+    meaning,
+    missing,
+    never_left_out,
+    promise,
+    rate,
+    seen,
+    short,
+    smaller_known,
+    verdict_on,
+)
 from ddenv.errors import printable
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.options import Numbers, announce, reading_options
+from ddenv.errors import UserError
 
 if TYPE_CHECKING:
     from ddenv.world.model import World

@@ -33,8 +33,9 @@ class Undo:
         if here is None or here.parent is None:
             return Words("undo")
         after = len(state.nodes[here.parent].environment)
-        said = f"{here.what} is taken back. {new_search(state, after)}. It does not take these {len(here.environment)} again, in any branch"
-        return Words("undo", f"{said}, unless you allow it: v on their row, or h and enter on #{here.number}")
+        said = f"{here.what} is taken back. {new_search(state, after)}"
+        again = f"It does not take these {len(here.environment)} again, in any branch, unless you allow it"
+        return Words("undo", f"{said}. {again}: v on their row, or h and enter on #{here.number}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,7 +84,10 @@ def numbers_of(state: RunState, names: Iterable[str]) -> tuple[int, ...]:
 
 
 def new_search(state: RunState, size: int | None = None) -> str:
-    """What follows a decision that ends the search, as a sentence without a full stop: a new one begins from `size` models, or as many as are left."""
+    """What follows a decision that ends the search, as a sentence without a full stop.
+
+    A new one begins from `size` models, by default as many as are left.
+    """
     if state.baseline is None:
         return "The search begins with that"
     untried = 0 if state.round is None else len(state.round.untried)

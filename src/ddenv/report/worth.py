@@ -62,7 +62,10 @@ def _name(each: FreshRuns) -> Cell:
 def _earlier(state: RunState, found: Certificate) -> list[Block]:
     """Other certificates of the same environment: each stands for itself."""
     others = [one for one in state.certificates if one.node == found.node and one.claims and one is not found]
-    return [say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.") for one in others]
+    return [
+        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
+        for one in others
+    ]
 
 
 def rate_of_left(state: RunState) -> tuple[str, str]:

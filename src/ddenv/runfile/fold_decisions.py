@@ -278,7 +278,7 @@ def counts(state: RunState, before: Test | None, after: Test) -> Changes:
 
 def place(node: Node) -> str:
     """A node in words."""
-    models = count(len(node.environment), 'model')
+    models = count(len(node.environment), "model")
     return f"the whole world, {models}" if node.parent is None else f"{models} ({node.what})"
 
 

@@ -255,9 +255,9 @@ class Candidate:
     """A sub-environment to try. `kind` is "partition" or "complement" of partition number `partition` of `split`.
 
     `verdict` is "" while open, then "similar", "missed" (it missed f in a few tests; the algorithm may come back to it),
-    "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar, but the user rejected it) or "undone" (the user took it back before). `distance` is what the
-    prioritization ranked its partition by (m for the proximal ones), or None. `tests` are the ids of its tests so far, including
-    re-runs and `known` tests of earlier rounds.
+    "dissimilar", "unknown" (its tests broke), "vetoed", "rejected" (similar, but the user rejected it) or "undone" (the user took
+    it back before). `distance` is what the prioritization ranked its partition by (m for the proximal ones), or None. `tests` are
+    the ids of its tests so far, including re-runs and `known` tests of earlier rounds.
     """
 
     index: int

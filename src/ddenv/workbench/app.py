@@ -45,7 +45,8 @@ def _commands() -> type[Provider]:
 class Workbench(App[int]):
     """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
-    `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start with. With `watch` the run is only watched, never guided.
+    `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start
+    with. With `watch` the run is only watched, never guided.
     """
 
     TITLE = "ddenv"

@@ -135,7 +135,9 @@ def test_dots_of_removed_models_leave_the_floor_around_them_whole(name):
     prints = [floor, *squares(3, 0.5)]
     names = frozenset(each.name for each in prints)
     how = looks(prints, Kept(names, frozenset({"floor"})), (0, 0, 0), (0, 0, 0), palette)
-    grids = [owners(masks(prints, VIEW), VIEW, np.flatnonzero(one)) for one in (how.kinds == REMOVED, how.kinds == FLOOR)]
+    grids = [
+        owners(masks(prints, VIEW), VIEW, np.flatnonzero(one)) for one in (how.kinds == REMOVED, how.kinds == FLOOR)
+    ]
     canvas = Canvas(VIEW.rows, VIEW.columns, palette.back)
     fill(canvas, grids[1], how)
     dotted = ghosts(canvas, *grids, how, palette.faint)

@@ -26,6 +26,7 @@ from ddenv.workbench.setup.costs import Past, past_of
 from ddenv.workbench.setup.fields import OptionsForm
 from ddenv.workbench.setup.file_list import remember
 from ddenv.workbench.setup.missing_list import MissingList
+from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.remedies import remember_remedies
 from ddenv.workbench.wording import plain, shorten
 
@@ -74,6 +75,18 @@ class Preview(Vertical):
     def asks(self) -> bool:
         """Whether the chosen world has no start yet."""
         return self.choice is not None and self.choice.scenario is None and self.picker.spawn is None
+
+    def places_for(self, keep: bool) -> dict[str, str]:
+        """Start and goal of a world without a scenario: as the last time, or as they are if the user wants to `keep` them."""
+        texts = self.picker.form.texts
+        now = {field.id: texts[field.id] if keep else "" for field in form.PLACES}
+        return now if self.choice is None else places_of(self.choice.path) or now
+
+    def remember_places(self) -> None:
+        """For the next time that this world is chosen."""
+        choice, picker = self.choice, self.picker
+        if choice is not None and choice.scenario is None and picker.spawn is not None and picker.goal is not None:
+            remember_places(choice.path, picker.form.texts)
 
     def compose(self) -> ComposeResult:
         yield self.map
@@ -159,7 +172,7 @@ class PlacePicker(Static):
 
     def __init__(self, world: WorldMap, form: OptionsForm, *, id: str) -> None:
         super().__init__("", id=id, markup=False)
-        self._map, self._form = world, form
+        self._map, self.form = world, form
         self.choice: Choice | None = None
         self.picked_next = ""
 
@@ -182,7 +195,7 @@ class PlacePicker(Static):
         else:
             texts, then = {"goal_x": _metres(x), "goal_y": _metres(y)}, ""
         if texts:
-            self._form.set_texts(texts)
+            self.form.set_texts(texts)
             self.pick(then)
 
     def _start(self, choice: Choice, x: float, y: float) -> dict[str, str]:
@@ -190,7 +203,7 @@ class PlacePicker(Static):
         texts = {"spawn_x": _metres(x), "spawn_y": _metres(y)}
         if z is not None:
             texts["spawn_z"] = _metres(z)
-        if not self._form.texts["spawn_yaw"].strip():
+        if not self.form.texts["spawn_yaw"].strip():
             texts["spawn_yaw"] = "0"
         return texts
 
@@ -203,13 +216,13 @@ class PlacePicker(Static):
     @property
     def spawn(self) -> tuple[float, float, float] | None:
         """x and y, m, and yaw, rad, from the form; None while one of them is not a number."""
-        numbers = form.place("spawn", self._form.texts)
+        numbers = form.place("spawn", self.form.texts)
         return (numbers[0], numbers[1], numbers[3]) if numbers and all(map(math.isfinite, numbers)) else None
 
     @property
     def goal(self) -> tuple[float, float] | None:
         """x and y, m, from the form; None while one of them is not a number."""
-        numbers = form.place("goal", self._form.texts)
+        numbers = form.place("goal", self.form.texts)
         return (numbers[0], numbers[1]) if numbers and all(map(math.isfinite, numbers)) else None
 
     def show_places(self) -> None:

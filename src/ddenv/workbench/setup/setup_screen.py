@@ -24,7 +24,6 @@ from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
 from ddenv.workbench.setup.file_list import FileList, recent_files, remember
-from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.setup_keys import KEYS
 from ddenv.workbench.setup.start_run import (
@@ -162,7 +161,7 @@ class SetupScreen(Screen[None]):
     # The choice.
 
     def _choose(self, path: Path) -> None:
-        self._remember_places()
+        self.preview.remember_places()
         self._keep_places = self.preview.choice is not None and self.preview.choice.scenario is None
         self._past, self._awaited = Past(), True
         self.form.show_message("")
@@ -188,23 +187,11 @@ class SetupScreen(Screen[None]):
             self._show_outcome()
             return
         placed = choice.scenario is not None
-        places = None if placed else self._places(choice)
+        places = None if placed else self.preview.places_for(self._keep_places)
         self.form.show_settings(choice.settings, places)
         picker.show_places()
         if self.preview.asks and choice.path == self._opened_now:
             self.action_pick("start")
-
-    def _places(self, choice: Choice) -> dict[str, str]:
-        """Start and goal of a world without a scenario: as the last time, or as they are, or none yet."""
-        texts, ids = self.form.texts, [field.id for field in form.PLACES]
-        now = {id: texts[id] if self._keep_places else "" for id in ids}
-        return places_of(choice.path) or now
-
-    def _remember_places(self) -> None:
-        """For the next time that a world without a scenario is chosen."""
-        choice, picker = self.preview.choice, self.preview.picker
-        if choice is not None and choice.scenario is None and picker.spawn is not None and picker.goal is not None:
-            remember_places(choice.path, self.form.texts)
 
     @on(Preview.PastRead)
     def _past_was_read(self, event: Preview.PastRead) -> None:
@@ -318,7 +305,7 @@ class SetupScreen(Screen[None]):
         except UserError as error:
             self._complain(error)
             return
-        self._remember_places()
+        self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
         self._create(new, only_baseline)
