@@ -85,8 +85,8 @@ def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
     listing = listed(shown)
     rows = [words(shown, listing, row) for row in range(len(listing))]
     verdicts = [row["verdict"] for row in rows]
-    assert any(each.startswith(f"○ dissimilar, implied by tests {event.data['by']}, ") for each in verdicts)
-    assert any(row.get(IN_SHORT, "").startswith(f"○ by tests {event.data['by']}, ") for row in rows)
+    assert any("○ dissimilar, implied by test" in each and str(event.data["by"]) in each for each in verdicts)
+    assert any(row.get(IN_SHORT, "").startswith("○ by test") for row in rows)
 
 
 def test_the_chart_marks_what_went_without_a_test(moments):

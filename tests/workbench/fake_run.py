@@ -345,7 +345,7 @@ def sliced(run: FakeRun) -> FakeRun:
     run.created().write("still")
     run.met = [f"crate_{number:02}" for number in (2, 3, 4, 6, 7)]
     run.baseline()
-    run.write("sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1)
+    run.write("sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1, audit=False)
     run.write("leg_started", round=1, n_partitions=None)
     run.start_round(3, run.met)
     run.dissimilar(0)

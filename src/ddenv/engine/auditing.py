@@ -13,9 +13,13 @@ from ddenv.settings import SETTINGS, read
 
 
 def audit_is_due(state: RunState) -> bool:
-    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says."""
+    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says.
+
+    That a run repeats in a slice which it chose is implied, too.
+    """
     every = read(state.scenario, SETTINGS["audit"])
-    return isinstance(every, int) and state.audits * every <= state.implied + state.audits
+    known = state.implied + sum(len(node.sliced_by) for node in state.nodes)
+    return isinstance(every, int) and state.audits * every <= known + state.audits
 
 
 def compare(journal: Journal, audits: Iterable[Test]) -> None:

@@ -19,7 +19,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
-from ddenv.engine.slicing import slice_environment
+from ddenv.engine.slicing import audit_slice, slice_environment
 from ddenv.engine.subjects import Keep, other_way
 from ddenv.engine.wall_limit import limit_after
 from ddenv.errors import UserError
@@ -104,6 +104,7 @@ class Driver:
     def _search(self) -> None:
         """Searches from the current environment to the end. Raises Steered if the user changes something."""
         leg = self._journal.begin_leg()
+        audit_slice(self._journal, self._bench)
         self._reduction = Reduction.model_validate(leg.settings)
         self._learnt = set(leg.tests)
         self._trials = [

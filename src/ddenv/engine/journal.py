@@ -212,7 +212,7 @@ class Journal:
 
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even if the robot is stuck for good."""
-        return phase not in ("round", "hand") or not self.state.scenario["reduction"].get("early_stop", False)
+        return phase not in ("round", "hand", "audit") or not self.state.scenario["reduction"].get("early_stop", False)
 
     def start_test(self, asked: Asked, audits: int | None = None) -> int:
         """Writes that a test starts, although the test `audits` implies it; returns its id. Raises as `Asked.place`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ddenv.engine.auditing import audit_is_due
+from ddenv.engine.bench import Bench
 from ddenv.engine.journal import Journal
 from ddenv.engine.subjects import Keep
 from ddenv.reduction.stacks import Stacks
@@ -30,8 +32,18 @@ def slice_environment(journal: Journal) -> bool:
     if left == there or left in journal.refused or evidence is None:
         return False
     environment = [number for number, name in enumerate(state.elements) if name in left]
-    journal.record("sliced", environment=environment, tests=[test.id for test in tests], evidence_test=evidence)
+    chose, audit = [test.id for test in tests], audit_is_due(state)
+    journal.record("sliced", environment=environment, tests=chose, evidence_test=evidence, audit=audit)
     return True
+
+
+def audit_slice(journal: Journal, bench: Bench) -> None:
+    """Simulates the last similar run in the slice that the environment was cut down to, if that is due. Raises as `Bench.work`."""
+    state, here = journal.state, journal.state.here
+    if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
+        return
+    keep, run = frozenset(here.environment), state.tests[here.evidence_test - 1].run
+    bench.work("audit", None, lambda: [] if (keep, run, False) in journal.ledger else [(keep, run, None)])
 
 
 def _known(journal: Journal, there: Keep) -> tuple[list[Test], list[Keep]]:

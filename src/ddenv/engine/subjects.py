@@ -28,8 +28,8 @@ class Asked:
         if self.round is not None and self.round != current_round(state).number:
             raise UserError(other_way(self.round))
         place: dict[str, Any] = {"phase": self.phase, "round": self.round, "candidate": self.candidate}
-        if self.phase == "certify":
-            place |= _fresh(state, self.keep)
+        if self.phase in ("certify", "audit"):
+            place |= _node(state, self.keep)
         if self.phase == "hand":
             place["trial"] = self.trial
         # All candidates meet the same noise.
@@ -44,8 +44,8 @@ def other_way(round: int) -> str:
     )
 
 
-def _fresh(state: RunState, keep: Keep) -> dict[str, int]:
-    """How an event names the models of a fresh run: an environment of the run, perhaps without one model."""
+def _node(state: RunState, keep: Keep) -> dict[str, int]:
+    """How an event names the models of a fresh run, or of an audit: an environment of the run, perhaps without one model."""
     path = [node.number for node in state.path if frozenset(node.environment) == keep]
     if path:
         return {"node": path[-1]}
@@ -57,7 +57,7 @@ def keep_of(state: RunState, test: Test) -> Keep:
     """The models of a test that has just started."""
     if test.phase == "baseline":
         return frozenset(state.elements)
-    if test.phase in FRESH:
+    if test.phase in (*FRESH, "audit"):
         environment = state.nodes[test.node].environment
         return frozenset(environment) - frozenset(stack_with(state, environment, test.without))
     if test.phase == "hand":

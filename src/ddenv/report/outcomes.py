@@ -62,6 +62,7 @@ PHASES = (
     ("baseline", "whole world"),
     ("round", "in rounds"),
     ("hand", "by hand"),
+    ("audit", "audits of slices"),
     ("certify", "fresh runs"),
     ("confirm", "full runs at the end"),
 )

@@ -12,13 +12,14 @@ The kinds of events with their data. Models are indices into the run's `elements
                          [[models]] or null: what goes together, or not at all, without a test, null if that is unknown
     still                nothing in the world moves by itself: there are no ties
     noted                about, words: what is wrong with the whole world; a sentence about each thing, once
-    test_started         test, phase, round, candidate, run, seed; if phase is "certify": node, without? (a model); if it is "hand":
-                         trial; audits? (the test that implies it: it is simulated to be compared)
+    test_started         test, phase, round, candidate, run, seed; if phase is "certify" or "audit" (of a slice): node, without?
+                         (a model); if it is "hand": trial; audits? (the test that implies it: it is simulated to be compared)
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]], cut, took_part? [models that can have
                          changed a bit of it], taken? (the run whose result was copied); trajectories beside it
     implied              as test_started, and by (a test): the result is that of this test, which has its trajectories
-    sliced               environment [..], tests [ids] of which what took part is left, evidence_test
+    sliced               environment [..], tests [ids] of which what took part is left, evidence_test, audit (whether one of
+                         them is simulated there, too)
     slices_refuted       test, by, node: this audit does not repeat the test by, which implies it; slices are no longer used,
                          implied tests are void, and the run goes back to node
     test_lost            test: it was running when the engine died

@@ -41,7 +41,7 @@ def sliced(state: RunState, data: Data, at: float) -> Changes:
         raise ValueError(tests)
     changes = arrived(state, data, at, "sliced", "the slice", ())
     *others, last = changes["nodes"]
-    return changes | {"nodes": (*others, replace(last, sliced_by=tests))}
+    return changes | {"nodes": (*others, replace(last, sliced_by=tests, to_audit=bool(data["audit"])))}
 
 
 def slices_refuted(state: RunState, data: Data, _: float) -> Changes:

@@ -16,7 +16,7 @@ class Node:
     round that ended in it. `evidence_test` is the run in it that guides the next rounds, None before f is known. `method` is the
     algorithm and pair. `minimal`: the reduction ended here; `rejected`: it was taken back; `lost_rate`: fresh runs showed that f is
     too rare in it. `runs` are the tests of its environment that ended and did not break; `shown` of them showed f. Those that chose
-    a slice are not among them: they would show its rate as too high.
+    a slice are not among them: they would show its rate as too high. `to_audit`: one of these is simulated in the slice, too.
     """
 
     number: int
@@ -36,6 +36,7 @@ class Node:
     runs: tuple[int, ...] = ()
     shown: int = 0
     sliced_by: tuple[int, ...] = ()
+    to_audit: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -321,11 +321,12 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
-    "hand" (for the user's trial number `trial`) or "certify": a run with a fresh seed of the environment of `node`, or of that
-    without the model `without`. In other phases `node` was the current one. `run` is i in seed = base + i; above 0 in a round it
-    is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says
-    how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
-    sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
+    "hand" (for the user's trial number `trial`), "audit" (of the slice in `node`) or "certify": a run with a fresh seed of the
+    environment of `node`, or of that without the model `without`. In other phases `node` was the current one. `run` is i in
+    seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is
+    x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and
+    `first_touched` are the models that the robot sensed or touched, with the simulated time of the first time, s. `cut`: ended
+    early, because the robot was stuck for good.
     `took_part` are the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that
     test implies it; `audits`: it was, although that test implies it.
     `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.

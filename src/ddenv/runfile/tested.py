@@ -25,6 +25,8 @@ def purpose(state: RunState, test: Test) -> Purpose:
         return Purpose(f"{where}{row.label}", row.models)
     if test.phase == "round":
         return Purpose(f"round {test.round}", None)
+    if test.phase == "audit":
+        return Purpose("an audit of the slice", state.nodes[test.node].environment)
     if test.phase in FRESH:
         environment = state.nodes[test.node].environment
         gone = stack_with(state, environment, test.without)
