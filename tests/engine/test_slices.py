@@ -162,6 +162,7 @@ def test_what_rested_on_slices_is_open_again(tmp_path):
     assert before.here.how == "sliced"
     assert after.environment == state.elements
     assert after.implied == 0
+    assert [point.tests for point in after.history] == sorted(point.tests for point in after.history)
     assert not any(test.implied_by for test in after.tests if test.is_finished)
     assert state.made == sum(test.is_finished for test in state.tests)
 

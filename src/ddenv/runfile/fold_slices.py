@@ -63,6 +63,8 @@ def slices_refuted(state: RunState, data: Data, _: float) -> Changes:
             for trial in state.trials
         ),
     )
+    done = state.tests_done
+    now = Point(done, len(node.environment))
     return {
         "tests": state.tests,
         "tally": state.tally,
@@ -74,8 +76,10 @@ def slices_refuted(state: RunState, data: Data, _: float) -> Changes:
         "node": node.number,
         "environment": node.environment,
         "evidence_test": node.evidence_test,
+        "came_at": done,
         "lower_bound": 0,
-        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+        # Void tests are no longer counted.
+        "history": (*(replace(point, tests=min(point.tests, done)) for point in state.history), now),
     }
 
 
