@@ -25,6 +25,7 @@ from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
+from ddenv.robot.took_part import Reached
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.
@@ -38,6 +39,7 @@ class RunParts:
     """What one run consists of besides the plant. Without `watch` all of the world is in the plant.
 
     `kept` are the moving models whose motion is recorded. With `stuck` the run is cut short once the robot is stuck for good.
+    Without `reached` it stays unknown who took part; `unusual` take part in any case.
     """
 
     scenario: Scenario
@@ -48,6 +50,8 @@ class RunParts:
     lidar: Lidar | None
     watch: Watch | None
     stuck: Stuck | None
+    reached: Reached | None
+    unusual: frozenset[str]
     kept: Sequence[Body]
     seed: int
 
@@ -90,7 +94,15 @@ class Run:
             first_sensed=parts.notice.first_sensed(parts.lidar.first_seen if parts.lidar else {}),
             first_touched=parts.notice.first_touched,
             cut=cut,
+            took_part=None if outcome == "error" else self._took_part(),
         )
+
+    def _took_part(self) -> frozenset[str] | None:
+        parts = self._parts
+        if parts.reached is None:
+            return None
+        seen = parts.lidar.took_part if parts.lidar else frozenset()
+        return parts.reached.names | parts.sleep.took_part | seen | parts.unusual
 
     def _loop(self, progress: Progress | None) -> tuple[str, str, bool, float]:
         """The outcome, the failure, whether the run was cut short, and when (s) it ended."""
@@ -105,6 +117,8 @@ class Run:
                 # Sleep has just moved the models that are played back.
                 self._observer.look()
             pose = self._observer.robot()
+            if parts.reached:
+                parts.reached.look(pose, self._observer.speed(parts.reached.radius))
             if parts.watch:
                 parts.watch.look(pose[:2], sleep.awake_boxes())
             truth = self._observer.truth(pose)
@@ -202,6 +216,11 @@ class Observer:
     def robot(self) -> PoseRow:
         """The pose of the robot's first link, as in `pose`."""
         return self._floating(self._place)
+
+    def speed(self, radius: float) -> float:
+        """A bound of the speed (m/s) of what is rigid with the robot's first link, and within `radius` (m) of its origin."""
+        wx, wy, wz, vx, vy, vz = self._state[self._spin : self._spin + 6]
+        return math.hypot(vx, vy, vz) + radius * math.hypot(wx, wy, wz)
 
     def truth(self, pose: PoseRow) -> Truth:
         """What the robot's sensors would measure without noise at its `pose`."""

@@ -69,21 +69,21 @@ def reach(robot: Model) -> float:
 
     Infinite for a robot with loose parts or with unlimited sliding joints.
     """
-    chains = _chains(robot)
+    reached = chains(robot)
     farthest = 0.0
     for link in robot.links:
         box = solid_bounds(link.collisions, link.pose.inverse())
         if box is None:
             continue
-        if link.name not in chains:
+        if link.name not in reached:
             return math.inf
-        start, length = chains[link.name]
+        start, length = reached[link.name]
         corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         farthest = max(farthest, length + math.dist(start, link.pose.position) + corner)
     return farthest
 
 
-def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
+def chains(robot: Model) -> dict[str, tuple[Vector, float]]:
     """For each link that joints connect with the first one: its joint's place, and the distance there along the joints, m."""
     chains = {robot.links[0].name: (robot.links[0].pose.position, 0.0)}
     # A file may name its joints in any order.
@@ -93,12 +93,12 @@ def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
                 start, length = chains[joint.parent]
                 chains[joint.child] = (
                     joint.pose.position,
-                    length + math.dist(start, joint.pose.position) + _slide(joint),
+                    length + math.dist(start, joint.pose.position) + slide(joint),
                 )
     return chains
 
 
-def _slide(joint: Joint) -> float:
+def slide(joint: Joint) -> float:
     """How far `joint` moves its child along its axis, m."""
     return max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
 

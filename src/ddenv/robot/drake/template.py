@@ -13,11 +13,12 @@ from typing import TypeVar
 from ddenv.errors import UserError
 from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import controllers
+from ddenv.robot.controllers import BUILT_IN, controllers
 from ddenv.robot.drake.drive import Drive, find_drive, footprint
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
+from ddenv.robot.hull import Hull
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled
@@ -31,6 +32,7 @@ from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
+from ddenv.robot.took_part import Reached, Solids
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -68,6 +70,9 @@ class Template:
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
         self._reach = reach(robot) + YIELD
+        self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        # What decides in a run is known: no controller of the user's, and nothing that removed models could stir.
+        self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
         self._surround(_region(world, scenario))
         self._build(names)
 
@@ -142,7 +147,7 @@ class Template:
         kept = [body for name, body in self._context.built.moving.items() if name not in removed]
         present = self._names - removed
         self._context.presence.remove(removed)
-        with self._asleep(kept, present) as sleep:
+        with self._asleep(kept, present) as (sleep, unusual):
             suite = SensorSuite(self._scenario.sensors, seed)
             parts = RunParts(
                 scenario=self._scenario,
@@ -153,6 +158,8 @@ class Template:
                 lidar=self._lidar(present, kept, suite),
                 watch=Watch(self._region, self._reach) if self._far else None,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
+                reached=self._reached(sleep, present),
+                unusual=unusual,
                 kept=kept,
                 seed=seed,
             )
@@ -166,16 +173,46 @@ class Template:
         """How the whole world settles. Raises LeftRegion."""
         return settled(self._context, self._rehearsals, self._names)
 
+    def learn_piles(self) -> None:
+        """Finds out how the piles of the whole world move, if that is unknown. Raises LeftRegion."""
+        if not self._repertoire.learnt:
+            self._context.presence.remove(frozenset())
+            self._rehearsals.learn(self._names)
+
+    def needs(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """Each of `elements` that starts away from the robot with each one that it needs to move as in the whole world, sorted.
+
+        Call it after `learn_piles`. None: unknown.
+        """
+        if not self._slices:
+            return None
+        needs = self._repertoire.needs
+        return sorted((name, other) for name in elements & set(needs) for other in elements & needs[name])
+
     @contextmanager
-    def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[Sleep]:
-        """The moving models `kept` at their start, in a world that keeps the models `present`."""
-        scripts = self._rehearsals.scripts(kept, present) if self._sleeping else []
+    def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
+        """The moving models `kept` at their start, in a world that keeps the models `present`, and what moves otherwise there."""
+        piles = self._rehearsals.piles(kept, present) if self._sleeping else []
+        unusual = self._repertoire.unusual(piles, present)
+        scripts = [known.script for known in piles if known.script is not None]
         self._context.diagram_context.SetTime(0.0)
         sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
         try:
-            yield sleep
+            yield sleep, unusual | self._carriers(present)
         finally:
             sleep.end()
+
+    def _carriers(self, present: frozenset[str]) -> frozenset[str]:
+        """What those models need that are always kept, among the models `present`."""
+        if not self._repertoire.learnt:
+            return frozenset()
+        needs = self._repertoire.needs
+        return frozenset(name for always in self._always & set(needs) for name in needs[always] & present)
+
+    def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
+        if not (self._slices and self._sleeping and self._repertoire.learnt):
+            return None
+        return Reached(self._solids, self._hull, sleep, present, self._clock.period)
 
     def _notice(self, sleep: Sleep, kept: Sequence[Body], present: frozenset[str]) -> Notice:
         plant_context = self._context.plant_context
@@ -283,6 +320,7 @@ class Variants:
         full: bool = True,
     ) -> RunResult:
         """As `Template.run`, in a plant that has all that comes near."""
+        self._within(lambda: self._whole.learn_piles())
         return self._within(lambda: self._template(keep).run(keep, seed, progress, full))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
@@ -293,9 +331,10 @@ class Variants:
         """As `Template.settled`."""
         return self._within(lambda: self._whole.settled())
 
-    def ties(self, elements: frozenset[str]) -> list[frozenset[str]] | None:
-        """The models that go together, or not at all, without a test; None: unknown."""
-        return None
+    def needs(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """As `Template.needs`."""
+        self._within(lambda: self._whole.learn_piles())
+        return self._whole.needs(elements)
 
     def _within(self, work: Callable[[], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""

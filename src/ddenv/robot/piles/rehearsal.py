@@ -62,6 +62,35 @@ class Repertoire:
         self._by_use: dict[Known, int] = {}
         self._size = 0
         self._static = {model.name: model_bounds(model) for model in world.models if _has_static(model)}
+        # The static models near each pile of the whole world.
+        self._usual: dict[tuple[str, ...], frozenset[str]] | None = None
+
+    @property
+    def needs(self) -> dict[str, frozenset[str]]:
+        """What each model of a pile needs to move as in the whole world: the rest of its pile, and the static models near it.
+
+        Call it after `Rehearsals.learn`.
+        """
+        assert self._usual is not None
+        return {name: near.union(names) - {name} for names, near in self._usual.items() for name in names}
+
+    def learn(self, piles: Iterable[Known]) -> None:
+        """Stores which piles the whole world has."""
+        self._usual = {known.names: known.near for known in piles}
+
+    @property
+    def learnt(self) -> bool:
+        """Whether it knows the piles of the whole world."""
+        return self._usual is not None
+
+    def unusual(self, piles: Iterable[Known], present: frozenset[str]) -> frozenset[str]:
+        """The models of those among `piles` that do not move as in the whole world, and the static ones near them.
+
+        `present` are the models that are kept.
+        """
+        usual = self._usual or {}
+        other = (known for known in piles if not usual.get(known.names, known.near | {""}) <= present)
+        return frozenset(name for known in other for name in (*known.names, *(known.near & present)))
 
     def find(self, names: tuple[str, ...], present: frozenset[str]) -> Known | None:
         """The script of the pile `names` in a world that keeps the models `present`; None if it has to be rehearsed."""
@@ -115,8 +144,15 @@ class Rehearsals:
         context.hold.reset()
         self._apart, self._to_robot = self._start_gaps()
 
-    def scripts(self, kept: Sequence[Body], present: frozenset[str]) -> list[Script]:
-        """The scripts of all piles of `kept` that start away from the robot, in a world that keeps the models `present`.
+    def learn(self, present: frozenset[str]) -> None:
+        """Lets the repertoire know the piles of the whole world, with the models `present`, which this plant has.
+
+        Call it after `Presence.remove` of nothing.
+        """
+        self._repertoire.learn(self.piles(self._bodies, present))
+
+    def piles(self, kept: Sequence[Body], present: frozenset[str]) -> list[Known]:
+        """All piles of `kept` that start away from the robot, in a world that keeps the models `present`.
 
         Call it after `Presence.remove` of all other models.
         """
@@ -124,8 +160,7 @@ class Rehearsals:
         numbers = [number for number, body in enumerate(self._bodies) if body.name in names]
         joined = self._apart[np.ix_(numbers, numbers)] < NEAR
         near_robot = spread(self._to_robot[numbers] < NEAR, joined)
-        piles = self._piles(numbers, joined, ~near_robot)
-        return [known.script for known in self._known(piles, present) if known.script is not None]
+        return self._known(self._piles(numbers, joined, ~near_robot), present)
 
     def settle(self, present: frozenset[str]) -> list[tuple[tuple[Body, ...], Script | None]]:
         """All piles of the plant with their scripts, as if there were no robot. None: the simulation broke.

@@ -35,13 +35,15 @@ class Situation:
     """What the rules look at: for each of M models (M,), or for each pair of them (M, M).
 
     `close` to a robot that moves; `met` by something that moves, so that both must be simulated together; `stirred` by something
-    near that is not slow; `touching`, near enough to carry each other; `together`, moved by the same script.
+    near that is not slow; `touching`, near enough to carry each other; `reached`: perhaps touched, before the tick after next, by
+    something that is simulated; `together`, moved by the same script.
     """
 
     close: Booleans
     met: Booleans
     stirred: Booleans
     touching: Booleans
+    reached: Booleans
     together: Booleans
 
 
@@ -95,6 +97,7 @@ class Sleep:
         self._due: Booleans = np.zeros(count, dtype=bool)
         self._motion = Motion.still(len(self._links.bodies))
         self._pace = np.zeros(len(self._links.bodies))
+        self._took_part: Booleans = np.zeros(count, dtype=bool)
         self._stillness = Stillness(self._links)
         self._loads = Loads(context, kept)
         # Where the robot was (M, 12) when each model last woke, or was awake, beside it, m.
@@ -134,6 +137,18 @@ class Sleep:
             return NO_BOXES
         low, high = self.boxes()
         return low[self._awake], high[self._awake]
+
+    def awake_links(self) -> tuple[Floats, Floats, Floats]:
+        """The K links that are simulated, at the last tick: corners (K, 3) m and (K, 3) m of the boxes around them, and bounds of
+        their speeds (K,), m/s.
+        """
+        links = self._links.of_models(np.flatnonzero(self._awake))
+        return self._motion.low[links], self._motion.high[links], self._motion.speed[links]
+
+    @property
+    def took_part(self) -> frozenset[str]:
+        """The kept models that were simulated, or were perhaps touched by the robot or by what was."""
+        return frozenset(body.name for body in self._bodies(self._took_part))
 
     def poses(self) -> tuple[Floats, Floats]:
         """The poses of all L links of the kept models at the last tick: places (L, 3) m and rotations (L, 3, 3)."""
@@ -211,6 +226,7 @@ class Sleep:
         if not (near.any() or self._awake.any() or (self._played >= 0).any() or self._due.any()):
             return
         now = self._situation(speed, slow, close)
+        self._took_part |= near | now.reached
         self._stillness.look(self._motion, seconds)
         within = self._settled & (near | now.touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
@@ -221,7 +237,8 @@ class Sleep:
             self._wake(spread(start, joined) & ~self._awake & ~self._gone)
         rests = self._stillness.at_rest
         restless = self._awake & (~rests | (~self._has_twin & (now.close | now.stirred)))
-        self._lay(self._awake & np.where(self._has_twin, rests, ~spread(restless, now.touching)))
+        joined = now.touching & self._awake[:, None] & self._awake
+        self._lay(self._awake & np.where(self._has_twin, rests, ~spread(restless, joined)))
         if within.any() or start.any():
             self._loads.note(self._settled, self._awake)
 
@@ -258,7 +275,10 @@ class Sleep:
         meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
         # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
         met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
-        return Situation(close, met, np.asarray(stirring.any(axis=1)), touching, together)
+        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
+        return Situation(
+            close, met, np.asarray(stirring.any(axis=1)), touching, np.asarray(beside.any(axis=1)), together
+        )
 
     def _struck(self, apart: Floats) -> Booleans:
         """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
@@ -285,6 +305,7 @@ class Sleep:
         self._twins.lift(self._bodies(models))
         self._presence.join(self._bodies(models), self._bodies(self._awake))
         self._awake |= models
+        self._took_part |= models
         self._due &= ~models
         self._stillness.restart(models, self._motion)
 

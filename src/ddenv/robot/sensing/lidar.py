@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import accumulate
 from typing import Any
@@ -65,6 +65,13 @@ class Lidar:
         # Whether one of their models was not seen yet, and the scans that may show it.
         self._may_notice = True
         self._waiting: list[Turn] = []
+        # The models on which beams of scans ended that someone read.
+        self._read: Booleans = np.zeros(len(obstacles.names), dtype=bool)
+
+    @property
+    def took_part(self) -> frozenset[str]:
+        """The models without which a scan that was read would be another."""
+        return frozenset(name for name, read in zip(self._names, self._read, strict=True) if read)
 
     @property
     def first_seen(self) -> dict[str, float]:
@@ -101,6 +108,7 @@ class Lidar:
         if turn.ranges is None:
             self._measure([turn])
         assert turn.ranges is not None
+        self._read[turn.met] = True
         return turn.ranges
 
     def _work_out_waiting(self) -> None:
@@ -119,6 +127,10 @@ class Lidar:
             ranges = self._noise(turn.number) + distances
             ranges[(ranges < nearest) | (ranges > farthest)] = np.inf
             turn.ranges = ranges
+        beams, shapes = ends.first()
+        scans, owners = beams // len(self._fan.angles), turns[0].near.owners[shapes]
+        for number, turn in enumerate(turns):
+            turn.met = np.unique(owners[scans == number])
         return ends
 
     def _noise(self, number: int) -> Floats:
@@ -182,13 +194,17 @@ def _firsts(models: Sequence[Model]) -> list[int]:
 
 @dataclass(slots=True, eq=False)
 class Turn:
-    """Scan `number` of a lidar, at `time` (s): its pose, the shapes that its beams may hit, and its ranges once computed."""
+    """Scan `number` of a lidar, at `time` (s): its pose and the shapes that its beams may hit.
+
+    Once computed: its ranges, and the models on which its beams ended, also those too near to be measured.
+    """
 
     time: float
     number: int
     place: Pose
     near: Near
     ranges: Floats | None = None
+    met: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
 
 
 class LazyScan(Scan):
