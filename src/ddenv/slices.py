@@ -14,6 +14,7 @@ Who uses this keeps to three rules, so that neither workers nor kills change a r
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,30 +23,37 @@ Models = frozenset[str]
 
 @dataclass(frozen=True)
 class Ties:
-    """Groups of models that go together, or not at all, without a test; by each of their models."""
+    """What each model is tied to: without one of these it would move by itself, so without a test it stays with them, or goes.
 
-    of: Mapping[str, tuple[Models, ...]]
+    `of` has these models by name; `on` has, by name, the models that are tied to each.
+    """
+
+    of: Mapping[str, Models]
+    on: Mapping[str, Models]
 
     @classmethod
-    def among(cls, groups: Iterable[Iterable[str]]) -> Ties:
-        """The ties `groups`, which may overlap."""
-        of: dict[str, tuple[Models, ...]] = {}
-        for group in map(frozenset, groups):
-            for name in group:
-                of[name] = (*of.get(name, ()), group)
-        return cls(of)
+    def among(cls, pairs: Iterable[tuple[str, str]]) -> Ties:
+        """The ties `pairs` of a model and one that it is tied to."""
+        of, on = defaultdict(set), defaultdict(set)
+        for name, other in pairs:
+            of[name].add(other)
+            on[other].add(name)
+        both = ({name: frozenset(others) for name, others in each.items()} for each in (of, on))
+        return cls(*both)
 
     def breaks(self, there: Models, keep: Models) -> bool:
         """Whether a tie of the models `there` is broken where only `keep`, a part of them, stay."""
-        few, others = (keep, there - keep) if 2 * len(keep) < len(there) else (there - keep, keep)
-        return any(not others.isdisjoint(tie) for name in few for tie in self.of.get(name, ()))
+        removed = there - keep
+        # Of thousands of models few stay, or few go.
+        if len(keep) < len(removed):
+            return any(not removed.isdisjoint(self.of.get(name, ())) for name in keep)
+        return any(not keep.isdisjoint(self.on.get(name, ())) for name in removed)
 
     def closed(self, models: Models, there: Models) -> Models:
-        """`models`, with all models `there` that are tied to them, directly or by others."""
+        """`models`, with all models `there` that they are tied to, directly or by others."""
         found, new = set(models), set(models)
         while new:
-            tied = {other for name in new for tie in self.of.get(name, ()) for other in tie if other in there}
-            new = tied - found
+            new = {other for name in new for other in self.of.get(name, ()) if other in there} - found
             found |= new
         return frozenset(found)
 
@@ -78,6 +86,6 @@ def reasons(before: Models, after: Models, met: Sequence[Models], pinned: Models
             return f"took part in none of {runs}"
         if took_part:
             return f"took part in {took_part} of {runs}"
-        return "is pinned" if name in pinned else "is tied to one that took part"
+        return "is pinned" if name in pinned else "one that took part is tied to it"
 
     return {name: why(name) for name in before}

@@ -64,7 +64,7 @@ class FakePool:
         self.made: list[tuple[frozenset[str], int]] = []
         # What rests on what, and how often the driver asks before it is known.
         self.supports: list[tuple[str, str]] | Broken = []
-        self.ties: list[frozenset[str]] | None = None
+        self.ties: list[tuple[str, str]] | None = None
         self.took_part: TookPart = lambda *_: None
         # Where the robot is to the left of its way, m: runs that end alike may still differ.
         self.aside: Callable[[frozenset[str], int], float] = lambda *_: 0.0

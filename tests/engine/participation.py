@@ -38,14 +38,14 @@ class Participation:
 
     salt: int
     needed: tuple[str, ...]
-    ties: tuple[Keep, ...] = ()
+    ties: tuple[tuple[str, str], ...] = ()
     tenths: int = 10
     looks: int = 3
     hidden: Keep = frozenset()
 
     def run(self, keep: Keep, seed: int) -> tuple[str, Keep, int]:
         """The outcome, what took part, and all bits in one number."""
-        broken = [sorted(tie & keep) for tie in self.ties if tie & keep and tie - keep]
+        broken = [name for name, other in self.ties if name in keep and other not in keep]
         bits, met = crc32(f"{self.salt} {seed} {broken}".encode()), set[str]()
 
         def finds(name: str) -> bool:
@@ -54,7 +54,7 @@ class Participation:
             met.update({name} & keep)
             return name in keep
 
-        met.update(name for models in broken for name in models)
+        met.update(broken)
         for _ in range(self.looks):
             # Few of them are near the robot's way.
             finds(MODELS[bits % 97 % 9])

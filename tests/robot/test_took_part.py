@@ -1,8 +1,7 @@
-"""Who took part in a run: without the others, as whole piles with what they stand on, every bit of it stays the same."""
+"""Who took part in a run: without the others, and with no tie broken, every bit of it stays the same."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable
 
 import numpy as np
@@ -15,6 +14,7 @@ from ddenv.robot.drake.template import Variants
 from ddenv.robot.hull import Hull
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
+from ddenv.slices import Ties
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of
@@ -56,20 +56,15 @@ def bits(result: RunResult, keep: frozenset[str]) -> tuple:
     return result.outcome, result.failure, result.trajectory.tobytes(), motions
 
 
-def with_needs(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
-    """`models` with all of `there` that they need to move as in the whole world."""
-    needs = defaultdict(set)
-    for name, other in world.needs(there):
-        needs[name].add(other)
-    while (wider := models | {other for name in models for other in needs[name]}) != models:
-        models = wider
-    return models
+def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
+    """`models` with all of `there` that they are tied to."""
+    return Ties.among(world.ties(there)).closed(models, there)
 
 
 def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:
-    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these need."""
+    """Whether a run of `there` has the same bits with only what took part, `more` of it, and what these are tied to."""
     whole = world.run(there, seed)
-    keep = with_needs(world, (whole.took_part & there) | (more & there), there)
+    keep = with_ties(world, (whole.took_part & there) | (more & there), there)
     return bits(world.run(keep, seed), keep) == bits(whole, keep)
 
 
@@ -92,16 +87,16 @@ def test_a_model_takes_part_if_a_beam_ends_on_it_that_somebody_reads(flat):
     assert not blind.run(everything, 1).took_part & {"wall", "behind"}
 
 
-def test_a_shelf_is_needed_by_what_stands_on_it(flat):
+def test_what_stands_on_a_shelf_is_tied_to_it(flat):
     shelf, ball = still("shelf", 2.0, 3.0, (0.4, 0.4, 0.5)), cube("ball", 2.0, 3.0, 0.65)
     world = flat(shelf, ball)
-    assert world.needs(frozenset({"shelf", "ball"})) == [("ball", "shelf")]
+    assert world.ties(frozenset({"shelf", "ball"})) == [("ball", "shelf")]
     assert not world.run(frozenset({"shelf", "ball"}), 1).took_part & {"shelf", "ball"}
     # Without its shelf it moves otherwise than in the whole world.
     assert "ball" in world.run(frozenset({"ball"}), 1).took_part
 
 
-def test_what_an_always_kept_model_needs_takes_part(world_of, add, husky, scenario_of):
+def test_what_an_always_kept_model_is_tied_to_takes_part(world_of, add, husky, scenario_of):
     shelf, ball = still("shelf", 2.0, 3.0, (0.4, 0.4, 0.5)), cube("ball", 2.0, 3.0, 0.65)
     scenario = scenario_of(**SECTIONS, protected=["ball"])
     assert "shelf" in Variants(add(world_of(), shelf, ball), husky, scenario).run(names(shelf), 1).took_part
@@ -117,7 +112,7 @@ def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
 
 def test_nothing_is_claimed_where_it_is_unknown(flat):
     assert flat(cube("own", 2, 3, 0.15, self_collide=True)).run(frozenset({"own"}), 1).took_part is None
-    assert flat(cube("own", 2, 3, 0.15, self_collide=True)).needs(frozenset({"own"})) is None
+    assert flat(cube("own", 2, 3, 0.15, self_collide=True)).ties(frozenset({"own"})) is None
     own = {"controller": {"use": "ddenv.robot.navigation.navigate:Straight"}}
     assert flat(cube("other", 2, 3, 0.15), **own).run(frozenset({"other"}), 1).took_part is None
 
@@ -157,14 +152,14 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
         "models": flat(crate, stop),
         "asleep": flat(crate, cube("next", 1.65, 0.0, 0.15)),
         "lidar": flat(wall, **SEES),
-        "needs": flat(shelf, ball),
+        "ties": flat(shelf, ball),
     }
     everything = {
         "robot": names(bump),
         "models": names(crate, stop),
         "asleep": frozenset({"crate", "next"}),
         "lidar": names(wall),
-        "needs": names(shelf, ball),
+        "ties": names(shelf, ball),
     }
     for kind, world in worlds.items():
         assert is_implied(world, everything[kind]), kind
@@ -176,8 +171,8 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["lidar"], everything["lidar"])
     monkeypatch.setattr("ddenv.robot.piles.sleep.Sleep.took_part", frozenset())
     assert not is_implied(worlds["asleep"], everything["asleep"])
-    monkeypatch.setattr(Variants, "needs", lambda *_: [])
-    assert not is_implied(worlds["needs"], everything["needs"], frozenset({"ball"}))
+    monkeypatch.setattr(Variants, "ties", lambda *_: [])
+    assert not is_implied(worlds["ties"], everything["ties"], frozenset({"ball"}))
 
 
 def test_the_hull_holds_the_robot_whatever_its_wheels_do(husky):

@@ -18,7 +18,7 @@ class KnownTests:
 
     def __init__(self) -> None:
         self._made: dict[tuple[int, bool], list[tuple[Keep, Keep, int]]] = defaultdict(list)
-        self._ties: tuple[object, Ties] = None, Ties({})
+        self._ties: tuple[object, Ties] = None, Ties.among(())
 
     def enter(self, test: Test, keep: Keep, full: bool) -> None:
         """Another finished test in a world of the models `keep`; `full`: it ran to its end."""

@@ -44,7 +44,7 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
             note(journal, about, words)
         number = {name: index for index, name in enumerate(elements)}
         pairs = [[number[upper], number[lower]] for upper, lower in found.supports]
-        ties = None if found.ties is None else [sorted(number[name] for name in tie) for tie in found.ties]
+        ties = None if found.ties is None else [[number[name], number[other]] for name, other in found.ties]
         journal.record("supports", pairs=pairs, ties=ties)
     elif needed:
         raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")

@@ -45,13 +45,13 @@ class Limited(Protocol):
 class Settling(Protocol):
     """A simulator that lets a world come to rest.
 
-    `ties` groups the models of `elements` that go together, or not at all, without a test: without one of them another would move
-    by itself. It returns None where that is unknown: then nothing is known without a test.
+    `ties` has each of `elements` with each other one that it is tied to: without that it would move by itself, as a ball without
+    its shelf. So without a test it stays with that, or goes. None: unknown; then nothing is known without a test.
     """
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]: ...
     def settled(self) -> Settled: ...
-    def ties(self, elements: frozenset[str]) -> list[frozenset[str]] | None: ...
+    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None: ...
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Start:
 
     supports: list[tuple[str, str]]
     settled: Settled
-    ties: list[frozenset[str]] | None = None
+    ties: list[tuple[str, str]] | None = None
 
 
 @dataclass(frozen=True)

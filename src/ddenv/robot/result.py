@@ -29,7 +29,7 @@ class RunResult:
     view or touched it, which is never later. Models that it never touched or sensed are absent.
     `cut` is True if the run was cut short because the robot was stuck for good.
     `took_part` names the models that can have changed a bit of the run; None if that is unknown. A run with the same seed in a
-    world that lacks others, as whole ties, repeats every bit of this one. Equal runs name the same models.
+    world that lacks others, and breaks no tie, repeats every bit of this one. Equal runs name the same models.
     `taken` names the finished run that implies this one, "" for a run that was made.
     """
 

@@ -9,7 +9,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     compared             same: whether its bits are the same; if not, the user goes on with mixed tests
     supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
     supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled; ties?
-                         [[models]] or null: what goes together, or not at all, without a test, null if that is unknown
+                         [[model, other]] or null: which model would move by itself without which other; null if that is unknown
     still                nothing in the world moves by itself: there are no ties
     noted                about, words: what is wrong with the whole world; a sentence about each thing, once
     test_started         test, phase, round, candidate, run, seed; if phase is "certify" or "audit" (of a slice): node, without?

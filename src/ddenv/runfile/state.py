@@ -47,8 +47,8 @@ class RunState:
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
-    `settling`; `unsettled` says why it could not be found. `ties` has groups of models that
-    go together, or not at all, without a test; None if that is unknown. Of the tests, `implied` ones were not simulated, and
+    `settling`; `unsettled` says why it could not be found. `ties` has (model, other)
+    where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
     `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
     `notes` say what is wrong with the whole world: a word and a sentence each.
@@ -89,7 +89,7 @@ class RunState:
     certificates: tuple[Certificate, ...] = ()
     lower_bound: int = 0
     supports: Supports = ()
-    ties: tuple[tuple[str, ...], ...] | None = None
+    ties: tuple[tuple[str, str], ...] | None = None
     implied: int = 0
     audits: int = 0
     refuted: tuple[int, int] | None = None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 from ddenv.resting import Names, dropped, stacks
 from ddenv.runfile.events import Changes, Data, names
 from ddenv.runfile.state import Candidate, RunState, Trial
@@ -13,13 +16,18 @@ def supports_started(_: RunState, __: Data, ___: float) -> Changes:
 
 
 def supports(state: RunState, data: Data, _: float) -> Changes:
-    pairs = [names(state.elements, [upper, lower]) for upper, lower in data["pairs"]]
     return {
         "settling": False,
         "unsettled": str(data.get("why", "")),
-        "supports": tuple((upper, lower) for upper, lower in pairs),
-        "ties": None if data.get("ties") is None else tuple(names(state.elements, tie) for tie in data["ties"]),
+        "supports": tuple(_pairs(state, data["pairs"])),
+        "ties": None if data.get("ties") is None else tuple(_pairs(state, data["ties"])),
     }
+
+
+def _pairs(state: RunState, pairs: Any) -> Iterator[tuple[str, str]]:
+    for pair in pairs:
+        one, other = names(state.elements, pair)
+        yield one, other
 
 
 def drops(state: RunState, tried: Candidate | Trial) -> Names:

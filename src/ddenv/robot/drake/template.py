@@ -179,15 +179,15 @@ class Template:
             self._context.presence.remove(frozenset())
             self._rehearsals.learn(self._names)
 
-    def needs(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
-        """Each of `elements` that starts away from the robot with each one that it needs to move as in the whole world, sorted.
+    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
 
         Call it after `learn_piles`. None: unknown.
         """
         if not self._slices:
             return None
-        needs = self._repertoire.needs
-        return sorted((name, other) for name in elements & set(needs) for other in elements & needs[name])
+        ties = self._repertoire.ties
+        return sorted((name, other) for name in elements & set(ties) for other in elements & ties[name])
 
     @contextmanager
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
@@ -203,11 +203,11 @@ class Template:
             sleep.end()
 
     def _carriers(self, present: frozenset[str]) -> frozenset[str]:
-        """What those models need that are always kept, among the models `present`."""
+        """What those models are tied to that are always kept, among the models `present`."""
         if not self._repertoire.learnt:
             return frozenset()
-        needs = self._repertoire.needs
-        return frozenset(name for always in self._always & set(needs) for name in needs[always] & present)
+        ties = self._repertoire.ties
+        return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
         if not (self._slices and self._sleeping and self._repertoire.learnt):
@@ -331,10 +331,10 @@ class Variants:
         """As `Template.settled`."""
         return self._within(lambda: self._whole.settled())
 
-    def needs(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
-        """As `Template.needs`."""
+    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """As `Template.ties`."""
         self._within(lambda: self._whole.learn_piles())
-        return self._whole.needs(elements)
+        return self._whole.ties(elements)
 
     def _within(self, work: Callable[[], Result]) -> Result:
         """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""

@@ -66,8 +66,10 @@ class Repertoire:
         self._usual: dict[tuple[str, ...], frozenset[str]] | None = None
 
     @property
-    def needs(self) -> dict[str, frozenset[str]]:
-        """What each model of a pile needs to move as in the whole world: the rest of its pile, and the static models near it.
+    def ties(self) -> dict[str, frozenset[str]]:
+        """What each model of a pile is tied to: the rest of its pile, and the static models near its motion.
+
+        Without these the pile would move otherwise than in the whole world.
 
         Call it after `Rehearsals.learn`.
         """
