@@ -78,12 +78,12 @@ def fresh_chance(met: Sequence[Models]) -> float:
 
 def reasons(before: Models, after: Models, met: Sequence[Models], pinned: Models = frozenset()) -> dict[str, str]:
     """Why each model of `before` stays in `after` or goes, where `met` took part in each of the runs known there."""
-    runs = f"{len(met)} run{'s' * (len(met) != 1)}"
+    one, runs = len(met) == 1, f"{len(met)} run{'s' * (len(met) != 1)}"
 
     def why(name: str) -> str:
         took_part = sum(name in models for models in met)
         if name not in after:
-            return f"took part in none of {runs}"
+            return "took no part in the one run known" if one else f"took part in none of {runs}"
         if took_part:
             return f"took part in {took_part} of {runs}"
         return "is pinned" if name in pinned else "one that took part is tied to it"

@@ -47,8 +47,9 @@ def slice_words(state: RunState, node: Node) -> str:
     before = 0 if node.parent is None else len(state.nodes[node.parent].environment)
     met = met_by(state, node)
     gone = count(before - len(node.environment), "model")
+    runs = f"took part in none of {len(met)} runs" if len(met) > 1 else "took no part in the one run known here"
     return (
-        f"{gone} took part in none of {count(len(met), 'run')}, so {'it goes' if gone == '1 model' else 'they go'} without a test; "
+        f"{gone} {runs}, so {'it goes' if gone == '1 model' else 'they go'} without a test; "
         f"the chance that a fresh run meets a model that no run met is at most about {percent(fresh_chance(met))}"
     )
 
