@@ -20,7 +20,7 @@ ROOM, LEAST_ROOM = 20, 4
 BLOCK = 3, 8
 # One per model, the largest first: without S and G, which mark start and goal, and without look-alikes.
 SIGNS = "ABCDEFHJKLMNPQRTUVWXYZabcdefghijkmnopqrstuvwxyz23456789"
-NO_SIGN, FLOORS = "+", ".:"
+NO_SIGN, FLOORS, FAINT_SIGN = "+", ".:", "░"
 HALF_TOP, HALF_BOTTOM, FULL = "▀", "▄", "█"
 GREY: RGB = (120, 120, 124)
 FAINT, DIM = packed(GREY), packed((70, 70, 74))
@@ -168,9 +168,7 @@ def _letters(
     canvas: Canvas, grid: np.ndarray, models: Sequence[Drawn], letters: Sequence[str], faint: Sequence[bool]
 ) -> None:
     """Every cell shows its model; of two models in one cell the one drawn later."""
-    own = [
-        FLOORS[index % 2] if each.floor or faint[index] else letters[index] or NO_SIGN
-        for index, each in enumerate(models)
-    ]
+    plain = (FLOORS[index % 2] if each.floor else letters[index] or NO_SIGN for index, each in enumerate(models))
+    own = [FAINT_SIGN if is_faint else char for char, is_faint in zip(plain, faint, strict=True)]
     chars = np.array([ord(char) for char in [*own, " "]], dtype=np.uint32)
     canvas.chars[:] = chars[np.maximum(grid[0::2], grid[1::2])]
