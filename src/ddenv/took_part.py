@@ -50,8 +50,13 @@ def slice_words(state: RunState, node: Node) -> str:
     runs = f"took part in none of {len(met)} runs" if len(met) > 1 else "took no part in the one run known here"
     return (
         f"{gone} {runs}, so {'it goes' if gone == '1 model' else 'they go'} without a test; "
-        f"the chance that a fresh run meets a model that no run met is at most about {percent(fresh_chance(met))}"
+        f"the chance that a fresh run meets a model that no run met is {_chance(met)}"
     )
+
+
+def _chance(met: list[Models]) -> str:
+    chance = fresh_chance(met)
+    return f"at most about {percent(chance)}" if chance else f"probably below {percent(1 / len(met))}"
 
 
 def refuted_words(state: RunState) -> str:
