@@ -13,7 +13,8 @@ from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.test_certify import _killed, _resumed
-from tests.engine.test_driver import Killed, needs
+from tests.engine.test_driver import Killed, _kill, needs
+from tests.engine.test_repeating import another_drake
 from tests.engine.test_steering import Guided, until
 from tests.tiers import examples
 
@@ -228,3 +229,16 @@ def test_implied_tests_do_not_count_for_the_budget(tmp_path):
     state = state_of(path)
     assert state.made == 30
     assert state.tests_done == 30 + state.implied > 30
+
+
+def test_what_was_made_with_other_software_implies_no_test_of_this(tmp_path, monkeypatch):
+    path = sliced_run(tmp_path, accept_rate="kept", audit=1)
+    with pytest.raises(Killed):
+        drive(path, HONEST.pool(), prepare=lambda file: _kill(file, 10))
+    another_drake(monkeypatch)
+    pool = HONEST.pool()
+    pool.aside = lambda keep, seed: HONEST.run(keep, seed)[2] / 2**32 + 1e-9
+    state = drive(path, pool, mixed=True)
+    assert state.physics.mixed
+    assert state.refuted is None
+    assert state.minimal

@@ -285,6 +285,11 @@ class Journal:
         if again and self.state.baseline is not None:
             self.steered = True
 
+    def _compared(self, data: dict[str, Any]) -> None:
+        """What was made with something else implies nothing of tests that are made now."""
+        if not data["same"]:
+            self.known = KnownTests()
+
     def _rests(self, data: dict[str, Any]) -> None:
         """Decisions rest on these tests, whatever the number of workers."""
         self._rested_on.update(data.get("tests", ()))
@@ -369,6 +374,7 @@ class Journal:
 
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "engine_started": Journal._engine_started,
+    "compared": Journal._compared,
     "baseline_finished": Journal._baseline_finished,
     "candidate_judged": Journal._rests,
     "trial_judged": Journal._rests,
