@@ -11,7 +11,7 @@ from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.took_part import why_sliced
+from ddenv.took_part import slice_in_short, why_sliced
 from ddenv.words import news
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain
@@ -55,6 +55,7 @@ def test_a_slice_is_told_with_the_chance_that_a_fresh_run_meets_what_went(moment
         f"  reduced to {len(after.environment)} models without a test: {gone} models took part in none of 3 runs"
     )
     assert "the chance that a fresh run meets a model that no run met is " in line
+    assert slice_in_short(after, after.here).startswith(f"none of 3 runs met the other {gone}; a fresh run meets one: ")
     why = why_sliced(after, after.here)
     assert why.keys() == set(before.environment)
     assert why["box_12"] == "took part in 3 of 3 runs"

@@ -19,7 +19,7 @@ from ddenv.guiding.commands import refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Decision, Node
-from ddenv.took_part import slice_words
+from ddenv.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.history import branches
@@ -182,7 +182,7 @@ class History(Screen[int | None]):
         text = Text(f"{place(node)}: {how}", "bold", no_wrap=True)
         text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
-        sliced = f"\n{slice_words(self._look_at().state, node)}" if node.how == "sliced" else ""
+        sliced = f"\n{slice_in_short(self._look_at().state, node)}" if node.how == "sliced" else ""
         text.append(f"{sliced}\n{names or 'no models'}", "not bold dim")
         self.query_one("#about", Static).update(text)
 
