@@ -20,9 +20,9 @@ from pathlib import Path
 
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.robot.took_part import Reached
 from ddenv.runs.scenarios import load_parts, scenario_for_world
 from ddenv.slices import Ties
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate

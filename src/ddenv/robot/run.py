@@ -22,10 +22,10 @@ from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.notice import Notice
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.reached import Reached
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
-from ddenv.robot.took_part import Reached
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.

@@ -25,6 +25,7 @@ from ddenv.robot.piles.settling import settled
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.piles.support import supports
 from ddenv.robot.protocol import Setup
+from ddenv.robot.reached import Reached, Solids
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
@@ -32,7 +33,6 @@ from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
-from ddenv.robot.took_part import Reached, Solids
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground

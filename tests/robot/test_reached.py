@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot import took_part
+from ddenv.robot import reached
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.hull import Hull
 from ddenv.robot.result import RunResult
@@ -163,9 +163,9 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     }
     for kind, world in worlds.items():
         assert is_implied(world, everything[kind]), kind
-    monkeypatch.setattr(took_part.Reached, "_look_around_robot", lambda *_: None)
+    monkeypatch.setattr(reached.Reached, "_look_around_robot", lambda *_: None)
     assert not is_implied(worlds["robot"], everything["robot"])
-    monkeypatch.setattr(took_part.Reached, "_look_around_models", lambda *_: None)
+    monkeypatch.setattr(reached.Reached, "_look_around_models", lambda *_: None)
     assert not is_implied(worlds["models"], everything["models"])
     monkeypatch.setattr(Lidar, "took_part", frozenset())
     assert not is_implied(worlds["lidar"], everything["lidar"])
