@@ -67,6 +67,8 @@ class FakePool:
         self.ties: list[tuple[str, str]] | None = None
         self.took_part: TookPart = lambda *_: None
         # Where the robot is to the left of its way, m: runs that end alike may still differ.
+        # The models that move by themselves wherever they are kept.
+        self.moves: frozenset[str] = frozenset()
         self.aside: Callable[[frozenset[str], int], float] = lambda *_: 0.0
         self.settling = 0
         self.settled = Settled()
@@ -99,7 +101,8 @@ class FakePool:
         outcome, x = ENDS[shown]
         made = result(outcome, seed, x, bool(cut))
         made.trajectory[1, 2] = self.aside(keep, seed)
-        return [(test, replace(made, took_part=self.took_part(keep, seed)))]
+        motions = {name: made.trajectory.copy() for name in self.moves & keep}
+        return [(test, replace(made, took_part=self.took_part(keep, seed), motions=motions))]
 
     def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         looks = iter([None] * self.settling)

@@ -72,6 +72,7 @@ class Participation:
         pool.took_part = lambda keep, seed: self.run(keep, seed)[1] - self.hidden
         pool.aside = lambda keep, seed: self.run(keep, seed)[2] / 2**32
         pool.ties = list(self.ties)
+        pool.moves = frozenset(MODELS[-2:])
         return pool
 
 

@@ -8,7 +8,6 @@ from itertools import takewhile
 from ddenv.engine.journal import Journal
 from ddenv.runfile.fold_slices import rests_on_slices
 from ddenv.runfile.state import RunState, Test
-from ddenv.runfile.store import RunFile
 from ddenv.settings import SETTINGS, read
 
 
@@ -25,19 +24,21 @@ def audit_is_due(state: RunState) -> bool:
 def compare(journal: Journal, audits: Iterable[Test]) -> None:
     """Ends the use of slices if one of the finished `audits` differs from the run that implies it."""
     state = journal.state
-    wrong = next((test for test in audits if not repeats(journal.file, state, test)), None)
+    wrong = next((test for test in audits if not repeats(journal, test)), None)
     if wrong is None or state.refuted is not None:
         return
     sound = takewhile(lambda node: not rests_on_slices(state, node), state.path)
     journal.record("slices_refuted", test=wrong.id, by=wrong.audits, node=[node.number for node in sound][-1])
 
 
-def repeats(file: RunFile, state: RunState, audit: Test) -> bool:
+def repeats(journal: Journal, audit: Test) -> bool:
     """Whether a finished audit has the bits of the run that implies it; True for one that has none, since its worker died."""
-    if audit.audits is None or not (again := file.motions(audit.id)):
+    if audit.audits is None or not (again := journal.file.motions(audit.id)):
         return True
-    source = state.tests[audit.audits - 1]
-    first = file.motions(source.id)
+    source, state = journal.state.tests[audit.audits - 1], journal.state
+    # What took no part may have moved by itself.
+    gone = frozenset(state.elements) - journal.keep_of_test(audit.id)
+    first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}
     same_end = _end(source) == _end(audit) and first.keys() == again.keys()
     return same_end and all(first[name].tobytes() == again[name].tobytes() for name in first)
 
