@@ -42,7 +42,7 @@ def test_every_picture_was_made_and_is_still_needed():
 @pytest.mark.parametrize("path", sorted((DOCS / "screens").glob("*.svg")), ids=lambda path: path.stem)
 def test_pictures_tell_nothing_of_the_machine(path):
     text = path.read_text(encoding="utf-8")
-    assert re.findall(r"/(?:home|root|work|Users|opt)\b", text) == []
+    assert re.findall(r"/(?:home|root|work|Users|opt|wt)\b", text) == []
 
 
 def test_the_list_of_keys_has_every_key():
