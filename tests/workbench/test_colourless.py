@@ -63,7 +63,7 @@ async def test_at_every_moment_of_a_run(run, moment, size):
 
 
 @pytest.mark.screens
-@pytest.mark.parametrize("opened", [(), ("f7",), ("ctrl+o",)], ids=["setup", "save", "open"])
+@pytest.mark.parametrize("opened", [(), ("ctrl+o",)], ids=["setup", "open"])
 async def test_on_the_screens_before_a_run(scenarios, runs, opened):
     fake_run.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     await what_keys_change_is_seen(Workbench(), USUAL, opened)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import ClassVar
 
 from rich.cells import cell_len, set_cell_size
@@ -17,9 +18,13 @@ from textual.strip import Strip
 
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
-from ddenv.workbench.run.candidate_rows import IN_SHORT, Column, Listed, Words, fitting, listed, words
+from ddenv.words import first_of
+from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Listed, Words, fitting, listed, words
 from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import plain
 
+# The maximum number of models that a tooltip names.
+NAMED = 12
 STRONG, WEAK = Style(bold=True), Style(dim=True)
 
 
@@ -149,6 +154,22 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         if event.y > 0 and row < len(self._listed):
             event.stop()
             self._by_hand(row)
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        # The same words again would hide what is shown.
+        if (words := self._hint(event.x, event.y)) != self.tooltip:
+            self.tooltip = words
+
+    def _hint(self, x: int, y: int) -> str | None:
+        """What the pointer is on: a column's meaning, or the models of a row."""
+        if y == 0:
+            ends = accumulate(column.width for column in self.columns)
+            column = next((each for each, end in zip(self.columns, ends, strict=True) if x < end), self.columns[-1])
+            return MEANINGS.get(column.name)
+        row = self._listed.item(y - 1 + self.scroll_offset.y)
+        if not isinstance(row, Candidate | Trial):
+            return None
+        return f"{row.label}: {first_of([plain(name) for name in row.models], NAMED) or 'no models'}"
 
     def _by_hand(self, row: int) -> None:
         self.following = False

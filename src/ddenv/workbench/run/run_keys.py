@@ -211,3 +211,10 @@ LOOKING = (
     ),
     "run.quit",
 )
+# What the pointer shows over the parts that take no keys, by their ids.
+TOOLTIPS = {
+    "header": "scenario and method; the round, and how many models are left",
+    "status": "the state of the run, its tests by outcome, how often f shows, time, and what is left",
+    "map-lines": "the signs on the map; k explains all of them",
+    "chart": "how many models were left after each test; the dashed line: how many seem to be needed",
+}

@@ -40,7 +40,7 @@ from ddenv.workbench.run.noteworthy import title, worth_a_look
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine, Scene
-from ddenv.workbench.run.run_keys import BROWSING, FIRST, GUIDES, KEYS, LOOKING, ON_MAP, SHOWN
+from ddenv.workbench.run.run_keys import BROWSING, FIRST, GUIDES, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
 from ddenv.workbench.run.status import Header, Status
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
@@ -121,6 +121,8 @@ class RunScreen(Screen[None]):
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
+        for id in TOOLTIPS:
+            self.query_one(f"#{id}").tooltip = TOOLTIPS[id]
         self.add_class(f"-pane-{self._pane}")
         self.query_one(Panes).mark(self._pane)
         self.following.begin()
@@ -370,8 +372,7 @@ class RunScreen(Screen[None]):
         self.call_after_refresh(self._show_keys)
 
     def action_next_pane(self) -> None:
-        names = list(PANES)
-        self._show_pane(names[(names.index(self._pane) + 1) % len(names)])
+        self._show_pane([*PANES, *PANES][list(PANES).index(self._pane) + 1])
 
     def action_follow(self) -> None:
         if self.browsing.is_past:
