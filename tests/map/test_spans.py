@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.map.footprints import Footprint
-from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners
+from ddenv.map.raster import EMPTY, View, extent, label_cells, masks, owners, pack, threads
 from ddenv.world.extent import convex_hull
 from tests.tiers import examples
 
@@ -42,6 +42,9 @@ def slowly(each: Footprint, view: View) -> tuple[np.ndarray, np.ndarray]:
     x, y = view.pixels(np.array([each.center]))[0]
     if (each.area < 4 * view.scale**2 or not each.polygons) and 0 <= x < view.columns and 0 <= y < 2 * view.rows:
         inside[int(y), int(x)], unsure[int(y), int(x)] = True, False
+    # What is thinner than a pixel fills more than it covers, see below.
+    _, dots = threads(pack([each]), view)
+    inside[dots[:, 1], dots[:, 0]], unsure[dots[:, 1], dots[:, 0]] = True, False
     return inside, unsure
 
 

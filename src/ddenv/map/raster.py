@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Tolerance of the fill test at the edges of outlines, pixels.
 SLACK = 1e-9
+# A model thinner than a pixel and longer than this many of them is drawn as a line.
+SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
 DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
@@ -169,11 +171,69 @@ def spans(outlines: Outlines, view: View) -> Spans:
     middle = view.pixels(outlines.centers[tiny])
     seen = ((middle >= 0) & (middle < (width, height))).all(axis=1)
     tiny, dots = tiny[seen], middle[seen].astype(np.intp)
-    models = np.concatenate([outlines.models[polygon], tiny])
+    thin, thread = threads(outlines, view)
+    models = np.concatenate([outlines.models[polygon], tiny, thin])
+    dots = np.concatenate([dots, thread])
     starts = np.concatenate([row * width + left, dots[:, 1] * width + dots[:, 0]])
-    lengths = np.concatenate([right - left + 1, np.ones(len(tiny), dtype=np.intp)])
+    lengths = np.concatenate([right - left + 1, np.ones(len(dots), dtype=np.intp)])
     order = np.argsort(models, kind="stable")
     return Spans(models[order], starts[order], lengths[order], len(outlines.areas))
+
+
+def threads(outlines: Outlines, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels along polygons that are thinner than one, which would have gaps or vanish: their models, and (column, row) of each."""
+    nothing = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
+    if not len(outlines.first):
+        return nothing
+    corners, first, last = view.pixels(outlines.corners), outlines.first, outlines.first + outlines.counts - 1
+    with np.errstate(invalid="ignore", over="ignore"):
+        low, high = np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)
+        extent = high - low
+        # Twice the area of each polygon, by the cross products of its edges.
+        following = np.arange(1, len(corners) + 1)
+        following[last] = first
+        ahead = corners[following] - low[np.repeat(np.arange(len(first)), outlines.counts)]
+        here = corners - low[np.repeat(np.arange(len(first)), outlines.counts)]
+        area = np.abs(np.add.reduceat(here[:, 0] * ahead[:, 1] - here[:, 1] * ahead[:, 0], first)) / 2
+        length = np.hypot(extent[:, 0], extent[:, 1])
+        thin = np.isfinite(length) & (length > SHORT) & (area < length) & (outlines.counts > 2)
+        thin &= (high >= 0).all(axis=1) & (low < (view.columns, 2 * view.rows)).all(axis=1)
+    which = np.flatnonzero(thin)
+    if not len(which):
+        return nothing
+    ends, which = _in_view(_ends(corners, outlines, which, extent), which, view)
+    steps = np.ceil(2 * np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)).astype(np.intp) + 2
+    part = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    along = (part / np.repeat(steps - 1, steps))[:, None]
+    begin, end = np.repeat(ends[:, 0], steps, axis=0), np.repeat(ends[:, 1], steps, axis=0)
+    dots = np.floor(begin * (1 - along) + end * along)
+    seen = ((dots >= 0) & (dots < (view.columns, 2 * view.rows))).all(axis=1)
+    return np.repeat(outlines.models[which], steps)[seen], dots[seen].astype(np.intp)
+
+
+def _ends(corners: np.ndarray, outlines: Outlines, which: np.ndarray, extent: np.ndarray) -> np.ndarray:
+    """The two ends of long thin polygons, in the middle of their short sides, shape (N, 2, 2)."""
+    ends = np.empty((len(which), 2, 2))
+    for place, polygon in enumerate(which.tolist()):
+        begin = outlines.first[polygon]
+        own = corners[begin : begin + outlines.counts[polygon]]
+        order = np.argsort(own[:, int(extent[polygon, 1] > extent[polygon, 0])], kind="stable")
+        half = 2 if len(own) == 4 else 1
+        ends[place] = own[order[:half]].mean(axis=0), own[order[-half:]].mean(axis=0)
+    return ends
+
+
+def _in_view(ends: np.ndarray, which: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """The parts of lines (N, 2, 2) that are in the view, and whose lines they are."""
+    begin, way = ends[:, 0], ends[:, 1] - ends[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        borders = np.stack([-begin / way, ((view.columns, 2 * view.rows) - begin) / way])
+    borders = np.where(way == 0, np.array([-np.inf, np.inf])[:, None, None], borders)
+    enter = np.clip(borders.min(axis=0).max(axis=1), 0, 1)
+    leave = np.clip(borders.max(axis=0).min(axis=1), 0, 1)
+    seen = enter < leave
+    parts = begin[:, None] + way[:, None] * np.stack([enter, leave], axis=1)[:, :, None]
+    return parts[seen], which[seen]
 
 
 def rows_of(corners: np.ndarray, outlines: Outlines, width: int, height: int) -> tuple[np.ndarray, ...]:

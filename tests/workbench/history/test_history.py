@@ -1,6 +1,7 @@
 """The history of a run: its tree, going back in it, and two of its environments side by side."""
 
 import fake_run
+import pytest
 from attached import Attached, starts
 from textual.widgets import DataTable
 
@@ -9,8 +10,10 @@ from ddenv.runfile.state import Node
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare, compare
 from ddenv.workbench.history.history_screen import History
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
+from tests.tiers import slow
 
 
 def tree(*parents, here=0):
@@ -107,3 +110,24 @@ async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_
             in session.said()
         )
         assert len(started) == 1
+
+
+def test_each_branch_counts_its_own_tests(run):
+    state = fold(fake_run.guided(run).file.events())
+    baseline, first, undone, adopted = state.nodes
+    assert [node.own_tests for node in (baseline, first, undone)] == [0, 5, 6]
+    # The test of the reduction that was taken back is not its own.
+    assert (adopted.tests, adopted.own_tests) == (7, 6)
+
+
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (121, 36), (147, 40)], but=[(121, 36)]), ids=str)
+async def test_both_maps_have_one_scale_and_one_frame(run, size):
+    fake_run.guided(run).hold()
+    async with Attached(run, size) as session:
+        await session.press("h", "m", "up", "up", "c")
+        await session.pilot.pause()
+        first, second = session.app.screen.query(WorldMap)
+        assert first.viewport.view == second.viewport.view
+        assert first.region.y == second.region.y
+        words = session.dialog()
+        assert "after 6 tests of its own" in words and "after 5 tests of its own" in words

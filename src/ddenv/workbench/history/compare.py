@@ -82,10 +82,16 @@ class Compare(ModalScreen[None]):
             world.show(Snapshot(self._state.changed(environment=node.environment, round=None, trials=())), None)
         self.query_one("#common", Lines).show(found.common)
 
+    def on_resize(self) -> None:
+        # Of one size, so that both maps have one scale and one frame.
+        both = self.query_one(".sides").content_size.width or self.size.width
+        for side in self.query(".side"):
+            side.styles.width = both // 2
+
     def _facts(self, name: str, node: Node) -> Text:
         words = branches.words(node, self._state.node)
         text = Text(f"{name}  {place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
-        after = f"\nafter {count(node.tests, 'test')}"
+        after = f"\nafter {count(node.own_tests, 'test')} of its own"
         return text.append(after + (f"; {words}" if words else ""), "not bold dim")
 
 

@@ -144,7 +144,7 @@ class History(Screen[int | None]):
         size = len(node.environment)
         marked = MARK if node.number == self._marked else ""
         words = ", ".join(part for part in (marked, branches.words(node, self._here)) if part)
-        texts = (str(node.number), plain(node.what), str(node.tests), seen(node), words, plain(node.method))
+        texts = (str(node.number), plain(node.what), str(node.own_tests), seen(node), words, plain(node.method))
         cells = (
             Text(text, style, justify=_side(name), no_wrap=True) for text, (name, _) in zip(texts, COLUMNS, strict=True)
         )

@@ -193,8 +193,8 @@ def _seams(canvas: Canvas, grid: np.ndarray, tone: np.ndarray, how: Looks) -> No
     halved = full & above[1::2] if many else np.zeros_like(full)
     canvas.chars[halved] = ord("─")
     canvas.fore[halved], canvas.back[halved] = seams[upper[halved]], fills[upper[halved]]
-    # Of dithered models, those that are kept or left out.
-    dithered = np.isin(canvas.chars, [ord(char) for char in PATTERNS[1:] + ("" if many else "▒")])
+    # Between protected platforms, too: a gap between them may be narrower than a pixel, and what the failure is about.
+    dithered = np.isin(canvas.chars, [ord(char) for char in f"{PATTERNS[1:]}▒"])
     for where, line in ((above[0::2], "▔"), (beside[0::2] | beside[1::2], "▕")):
         canvas.chars[where & dithered] = ord(line)
     for half, quarter, sides in (("▀", "▘", beside[0::2]), ("▄", "▖", beside[1::2])):
