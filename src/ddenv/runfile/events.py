@@ -65,7 +65,6 @@ An event caused by a viewer's command also holds `command`, its number.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -74,14 +73,24 @@ Data = dict[str, Any]
 Changes = dict[str, Any]
 Names = tuple[str, ...]
 LATEST = 1e11  # maximum time, Unix time in s: the year 5138
+# No robot comes so far, no test takes so long, and no run counts so far (m, s). Squares of these are still numbers.
+LARGEST = 1e15
 
 
 def number(value: Any) -> float:
-    """A finite number."""
-    finite = float(value)
-    if not math.isfinite(finite):
+    """A number that something in a run can have."""
+    found = float(value)
+    if not abs(found) <= LARGEST:
         raise ValueError(value)
-    return finite
+    return found
+
+
+def whole(value: Any) -> int:
+    """A whole number that something in a run can have."""
+    found = int(value)
+    if not abs(found) <= LARGEST:
+        raise ValueError(value)
+    return found
 
 
 def chance(value: Any) -> float:
@@ -124,8 +133,8 @@ def names(elements: Names, numbers: list[int]) -> Names:
 
 def moments(elements: Names, pairs: Iterable[Any]) -> tuple[tuple[str, float], ...]:
     """(name, s) for each pair of a model's index and a time since the start of a test, s."""
-    found = [(index, float(time)) for index, time in pairs]
-    if not all(index >= 0 and 0 <= time < math.inf for index, time in found):
+    found = [(index, number(time)) for index, time in pairs]
+    if not all(index >= 0 and time >= 0 for index, time in found):
         raise ValueError(pairs)
     return tuple((elements[index], time) for index, time in found)
 

@@ -9,7 +9,7 @@ from typing import Any
 from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports
-from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector
+from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector, whole
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Forecast, Point
@@ -62,7 +62,7 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "waiting_candidate": None,
         "confirming": state.certificate is not None and not state.certificate.claims,
         "settling": False,
-        "jobs": int(data["jobs"]),
+        "jobs": whole(data["jobs"]),
         "engine_version": str(data["version"]),
         "simulator": str(data["simulator"]),
         "physics": state.physics.started(data, state.tests_done),
@@ -79,12 +79,12 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
     round, candidate = data["round"], data["candidate"]
     without = data.get("without")
     test = Test(
-        id=int(data["test"]),
+        id=whole(data["test"]),
         phase=str(data["phase"]),
         round=round,
         candidate=candidate,
-        run=int(data["run"]),
-        seed=int(data["seed"]),
+        run=whole(data["run"]),
+        seed=whole(data["seed"]),
         without=None if without is None else names(state.elements, [without])[0],
         trial=data.get("trial"),
         audits=data.get("audits"),
@@ -122,7 +122,7 @@ def _test_finished(state: RunState, data: Data, _: float) -> Changes:
         "took_part": None if data.get("took_part") is None else frozenset(names(state.elements, data["took_part"])),
         "taken": "taken" in data,
     }
-    return _ended_as(state, int(data["test"]), values)
+    return _ended_as(state, whole(data["test"]), values)
 
 
 def _ended_as(state: RunState, test: int, values: Data) -> Changes:
@@ -137,13 +137,13 @@ def _implied(state: RunState, data: Data, at: float) -> Changes:
     """A test that starts and ends at once."""
     started = _test_started(state, data, at)
     now = state.changed(**started)
-    ended = _ended_as(now, len(now.tests), fold_slices.result_of(now, int(data["by"])))
+    ended = _ended_as(now, len(now.tests), fold_slices.result_of(now, whole(data["by"])))
     return {**started, **ended, "implied": state.implied + 1}
 
 
 def _test_lost(state: RunState, data: Data, _: float) -> Changes:
-    changes = with_test(state, int(data["test"]), {"outcome": "lost"})
-    lost = state.tests[int(data["test"]) - 1]
+    changes = with_test(state, whole(data["test"]), {"outcome": "lost"})
+    lost = state.tests[whole(data["test"]) - 1]
     return changes | {"audits": state.audits - (lost.audits is not None)}
 
 
@@ -152,19 +152,19 @@ def _round_started(state: RunState, data: Data, _: float) -> Changes:
     partitions = tuple(names(state.elements, part) for part in data["partitions"])
     split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
     _check(split, data["candidates"])
-    if state.round is not None and int(data["round"]) <= state.round.number:
+    if state.round is not None and whole(data["round"]) <= state.round.number:
         raise ValueError(data["round"])
     candidates = PersistentTuple.of(
         Candidate(index, kind, partition, split, None if distance is None else number(distance))
         for index, (kind, partition, distance) in enumerate(data["candidates"])
     )
-    round = Round(int(data["round"]), int(data["n_partitions"]), split, candidates)
+    round = Round(whole(data["round"]), whole(data["n_partitions"]), split, candidates)
     return {**waits_no_more(state), "round": round}
 
 
 def _forecast(_: RunState, data: Data, __: float) -> Changes:
-    low, likely, high = (int(number(tests)) for tests in data["tests"])
-    found = Forecast(low, likely, high, int(data["tests_done"]))
+    low, likely, high = (whole(number(tests)) for tests in data["tests"])
+    found = Forecast(low, likely, high, whole(data["tests_done"]))
     if not 0 <= low <= likely <= high or found.tests_done < 0:
         raise ValueError(data)
     return {"forecast": found}
@@ -174,8 +174,8 @@ def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
     candidate = replace(
         _tried(state, data["candidate"]),
         verdict=one_of(data["verdict"], "similar", "missed", "dissimilar", "unknown"),
-        tests=tuple(map(int, data["tests"])),
-        known=int(data["known"]),
+        tests=tuple(map(whole, data["tests"])),
+        known=whole(data["known"]),
     )
     round = _with(_current(state), candidate)
     # Without tests it is part of what has lost the rate.
@@ -260,7 +260,7 @@ def _unvetoed(state: RunState, data: Data, at: float) -> Changes:
 
 
 def _command_handled(state: RunState, data: Data, _: float) -> Changes:
-    return {"last_command": max(state.last_command, int(data["command"]))}
+    return {"last_command": max(state.last_command, whole(data["command"]))}
 
 
 def _finished(state: RunState, data: Data, at: float) -> Changes:

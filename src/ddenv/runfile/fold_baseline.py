@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ddenv.runfile.events import Changes, Data, chance, number, vector
+from ddenv.runfile.events import Changes, Data, chance, number, vector, whole
 from ddenv.runfile.failures import Baseline, SeenFailure
 from ddenv.runfile.fold_decisions import with_outcomes
 from ddenv.runfile.fold_rates import seen
@@ -15,16 +15,16 @@ from ddenv.runfile.state import RunState
 def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
     x, y, z = vector(data["position"], 3)
     baseline = Baseline(
-        runs=int(data["runs"]),
-        failures=int(data["failures"]),
+        runs=whole(data["runs"]),
+        failures=whole(data["failures"]),
         rate=chance(data["rate"]),
         low=chance(data["low"]),
         high=chance(data["high"]),
-        failure_test=int(data["failure_test"]),
+        failure_test=whole(data["failure_test"]),
         position=(x, y, z),
         miss_chance=chance(data["miss_chance"]),
-        iterations_95=int(data["iterations_95"]),
-        broken=int(data.get("broken", 0)),
+        iterations_95=whole(data["iterations_95"]),
+        broken=whole(data.get("broken", 0)),
         wall_limit=None if data.get("wall_limit") is None else number(data["wall_limit"]),
         seen=tuple(map(_seen, data.get("seen", ()))),
     )
@@ -48,4 +48,4 @@ def baseline_finished(state: RunState, data: Data, _: float) -> Changes:
 
 def _seen(data: Data) -> SeenFailure:
     x, y, z = vector(data["position"], 3)
-    return SeenFailure(int(data["test"]), int(data["runs"]), tuple(map(str, data["kinds"])), (x, y, z))
+    return SeenFailure(whole(data["test"]), whole(data["runs"]), tuple(map(str, data["kinds"])), (x, y, z))

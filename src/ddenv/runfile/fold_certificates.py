@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ddenv.runfile.events import Changes, Data, chance, names, one_of
+from ddenv.runfile.events import Changes, Data, chance, names, one_of, whole
 from ddenv.runfile.fold_decisions import arrived, here, listed, origin, searched_anew
 from ddenv.runfile.progress import Certificate, Claim, Point
 from ddenv.runfile.state import OUTCOMES, RunState
@@ -12,13 +12,13 @@ from ddenv.runfile.state import OUTCOMES, RunState
 
 def certificate_started(state: RunState, data: Data, _: float) -> Changes:
     one = Certificate(
-        number=int(data["certificate"]),
+        number=whole(data["certificate"]),
         node=state.node,
-        first_run=int(data["run"]),
+        first_run=whole(data["run"]),
         keep_rate=chance(data["keep_rate"]),
         rate=chance(data["rate"]),
         error=chance(data["error"]),
-        at_least=int(data["at_least"]),
+        at_least=whole(data["at_least"]),
         branch=origin(state, state.node).parent is not None,
     )
     if one.number != len(state.certificates) + 1 or not one.error or one.first_run < 0 or one.at_least < 0:
@@ -34,7 +34,7 @@ def certificate_finished(state: RunState, data: Data, _: float) -> Changes:
 
 
 def _claim(state: RunState, data: Data) -> Claim:
-    without, shown, runs = data["without"], int(data["shown"]), int(data["runs"])
+    without, shown, runs = data["without"], whole(data["shown"]), whole(data["runs"])
     if not 0 <= shown <= runs or (data["verdict"] == "lost" and not runs):
         raise ValueError(shown)
     return Claim(

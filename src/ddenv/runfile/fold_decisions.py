@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ddenv.amounts import count
-from ddenv.runfile.events import Changes, Data, names, number, one_of
+from ddenv.runfile.events import Changes, Data, names, number, one_of, whole
 from ddenv.runfile.fold_rates import counted_again, same_runs, seen
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import Decision, Node, RunState, Test, Trial
@@ -34,7 +34,7 @@ def _cut_short(state: RunState) -> str:
 
 
 def trial_started(state: RunState, data: Data, at: float) -> Changes:
-    trial = Trial(int(data["trial"]), names(state.elements, data["models"]), state.node)
+    trial = Trial(whole(data["trial"]), names(state.elements, data["models"]), state.node)
     if trial.number != len(state.trials) + 1 or len(set(trial.models)) != len(trial.models):
         raise ValueError(trial.number)
     inside = frozenset(trial.models)
@@ -45,9 +45,9 @@ def trial_started(state: RunState, data: Data, at: float) -> Changes:
 
 
 def trial_judged(state: RunState, data: Data, _: float) -> Changes:
-    tests = tuple(map(int, data["tests"]))
+    tests = tuple(map(whole, data["tests"]))
     trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar", "unknown")
-    return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=int(data["known"])))
+    return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=whole(data["known"])))
 
 
 def adopted(state: RunState, data: Data, at: float) -> Changes:
@@ -158,7 +158,7 @@ def leg_started(state: RunState, data: Data, _: float) -> Changes:
 
 
 def command_refused(state: RunState, data: Data, _: float) -> Changes:
-    return {"refusal": (int(data["command"]), str(data["why"]))}
+    return {"refusal": (whole(data["command"]), str(data["why"]))}
 
 
 def arrived(
@@ -179,7 +179,7 @@ def arrived(
         tests=state.tests_done,
         own_tests=state.nodes[parent].own_tests + (state.tests_done - state.came_at) * (parent == state.node),
         time=at,
-        evidence_test=int(data["evidence_test"]),
+        evidence_test=whole(data["evidence_test"]),
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
         runs=runs,
         shown=shown,

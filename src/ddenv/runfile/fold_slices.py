@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ddenv.runfile.atlas import models_of
-from ddenv.runfile.events import Changes, Data
+from ddenv.runfile.events import Changes, Data, whole
 from ddenv.runfile.fold_decisions import arrived, counts, here, searched_anew
 from ddenv.runfile.progress import Node, Point
 from ddenv.runfile.state import BROKEN, RunState, Test
@@ -36,7 +36,7 @@ def result_of(state: RunState, source: int) -> Data:
 
 def sliced(state: RunState, data: Data, at: float) -> Changes:
     """The environment is cut down to what took part in the runs known there."""
-    tests = tuple(map(int, data["tests"]))
+    tests = tuple(map(whole, data["tests"]))
     if not tests or any(state.tests[test - 1].took_part is None or test < 1 for test in tests):
         raise ValueError(tests)
     changes = arrived(state, data, at, "sliced", "the slice", ())
@@ -49,7 +49,7 @@ def slices_refuted(state: RunState, data: Data, _: float) -> Changes:
 
     The results of all implied tests are void. The run goes back to the last environment that rests on none.
     """
-    audit, source, node = state.tests[int(data["test"]) - 1], int(data["by"]), here(state, data["node"])
+    audit, source, node = state.tests[whole(data["test"]) - 1], whole(data["by"]), here(state, data["node"])
     if audit.audits != source or any(rests_on_slices(state, each) for each in _path(state, node)):
         raise ValueError(source)
     for test in state.tests:

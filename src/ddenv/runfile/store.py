@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import moment
+from ddenv.runfile.events import LARGEST, moment, number, vector, whole
 from ddenv.runfile.lock import engine_lock
 
 APPLICATION_ID = 0x64644531
@@ -210,8 +210,8 @@ class RunFile:
         """The running tests, by worker slot."""
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
-            return [Live(int(slot), int(test), float(at), tuple(json.loads(pose))) for slot, test, at, pose in rows]
-        except (ValueError, TypeError, RecursionError):
+            return [Live(whole(slot), whole(test), number(at), vector(json.loads(pose), 7)) for slot, test, at, pose in rows]
+        except (ValueError, TypeError, OverflowError, RecursionError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
     # The methods below are for the engine alone.
@@ -300,4 +300,9 @@ def _floats(samples: object, path: Path) -> array[float]:
     values.frombytes(samples)
     if sys.byteorder == "big":
         values.byteswap()
+    # What is no number at all is passed over where it is drawn.
+    if not all(abs(value) <= LARGEST for value in (min(values, default=0.0), max(values, default=0.0))) and any(
+        abs(value) > LARGEST for value in values
+    ):
+        raise UserError(f"{path}: damaged run file: a trajectory leads too far")
     return values

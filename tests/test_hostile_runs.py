@@ -1,0 +1,89 @@
+"""Whatever values a stored run has, it opens in every viewer, or says in a line that it is damaged."""
+
+import pytest
+from rich.cells import cell_len
+
+from ddenv.errors import UserError
+from ddenv.page.html import html
+from ddenv.page.markdown import markdown
+from ddenv.report.report import content
+from ddenv.report.run_data import read_run
+from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.store import RunFile
+from ddenv.scene.player import Player
+from ddenv.scene.stage import Stage
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.messages import ShowRun
+from tests.hostile_runs import hostile_run, templates
+from tests.tiers import slow
+
+# 2000 runs in all: a batch is one test.
+SIZE = 20
+BATCHES = slow(pytest.mark.fuzz, range(100), but=[0])
+KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape")
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory):
+    return templates(tmp_path_factory.mktemp("scenes"))
+
+
+@pytest.fixture
+def hostile(scenes, home):
+    """The runs of a batch, with their seeds."""
+    (home / "runs").mkdir()
+
+    def made(batch):
+        seeds = range(SIZE * batch, SIZE * batch + SIZE)
+        return [(seed, hostile_run(scenes, home / "runs" / f"run-{seed}.ddenv", seed)) for seed in seeds]
+
+    return made
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_the_report_is_written_or_says_what_is_damaged(hostile, batch):
+    for seed, path in hostile(batch):
+        try:
+            report = content(read_run(path))
+            assert html(report) and markdown(report, "report"), seed
+        except UserError as error:
+            assert "\n" not in str(error)
+        except Exception as error:
+            raise AssertionError(f"run {seed}") from error
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+def test_the_scene_is_drawn_or_says_what_is_damaged(hostile, batch):
+    for seed, path in hostile(batch):
+        sent = []
+        try:
+            with RunFile(path) as run, engine_lock(path):
+                player = Player(run, Stage(lambda message, _, to=sent: to.append(message)), lambda **_: None)
+                for now in (0.0, 0.5, 2.0, 9.0):
+                    player.tick(now)
+                assert sent, seed
+        except UserError as error:
+            assert "\n" not in str(error)
+        except Exception as error:
+            raise AssertionError(f"run {seed}") from error
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+async def test_the_workbench_stands(hostile, batch):
+    size = (120, 36) if batch % 2 else (80, 24)
+    now = 0
+    app = Workbench()
+    try:
+        async with app.run_test(size=size) as pilot:
+            for seed, path in hostile(batch):
+                now = seed
+                with engine_lock(path):
+                    app.post_message(ShowRun(path, watch=bool(seed % 2)))
+                    await pilot.pause()
+                    await app.workers.wait_for_complete()
+                    await pilot.press(*KEYS)
+                    assert app.is_running, seed
+                    lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
+                    assert all(cell_len(line) == size[0] for line in lines), seed
+    except Exception as error:
+        raise AssertionError(f"run {now}") from error
