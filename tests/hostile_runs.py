@@ -41,7 +41,9 @@ def hostile_run(scenes: list[Path], path: Path, seed: int) -> Path:
     shutil.copy(chance.choice(scenes), path)
     with sqlite3.connect(path) as database:
         for _ in range(chance.choice((1, 1, 1, 2, 5))):
-            chance.choice((_event, _event, _event, _scenario, _scenario, _samples, _live, _world, _time))(database, chance)
+            chance.choice((_event, _event, _event, _scenario, _scenario, _samples, _live, _world, _time))(
+                database, chance
+            )
     database.close()
     return path
 
@@ -97,7 +99,7 @@ def _samples(database: sqlite3.Connection, chance: random.Random) -> None:
     for test, model, samples in database.execute("SELECT test, model, samples FROM motion").fetchall():
         values = array("d", samples)
         for _ in range(chance.choice((1, 3, 50))):
-            number = chance.choice(NUMBERS[:-4] + (math.nan, math.inf))
+            number = chance.choice((*NUMBERS[:-4], math.nan, math.inf))
             values[chance.randrange(len(values))] = float(number) if abs(number) < 1e308 else math.inf
         database.execute("UPDATE motion SET samples = ? WHERE test = ? AND model = ?", (values.tobytes(), test, model))
 

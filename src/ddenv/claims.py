@@ -6,7 +6,7 @@ import math
 from typing import Protocol
 
 from ddenv.amounts import count, first_of, percent
-from ddenv.rates import wilson_interval
+from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.run_settings import settings
@@ -199,6 +199,15 @@ def drift(state: RunState) -> tuple[str, ...]:
 def seen(node: Node) -> str:
     """How often f showed in an environment, from all runs so far; "" without runs."""
     return f"{node.shown} of {len(node.runs)}" if node.runs else ""
+
+
+def missed(state: RunState) -> str:
+    """How likely all runs of a candidate miss f, by the baseline's rate, and by the lower end of its interval."""
+    base, iterations = state.baseline, settings(state).iterations
+    if base is None:
+        return ""
+    middle, most = (percent(miss_chance(rate, iterations)) for rate in (base.rate, base.low))
+    return middle if middle == most else f"{middle} (at most {most})"
 
 
 def of_runs(shown: int, runs: int) -> str:

@@ -9,9 +9,10 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import never_left_out, smaller_known, verdict_on
+from ddenv.claims import missed, never_left_out, smaller_known, verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.took_part import implied_words, refuted_words, slice_words
 
@@ -191,10 +192,10 @@ def _endings(state: RunState, one: Candidate | Trial) -> str:
 
 def iterations(state: RunState) -> str:
     """The chance that all runs of a candidate miss f, and how many are enough; "" before the baseline is finished."""
-    found, given = state.baseline, state.scenario["reduction"]["iterations"]
+    found, given = state.baseline, settings(state).iterations
     if found is None:
         return ""
-    line = f"the chance that {count(1 + given, 'run')} of a candidate miss f is {found.miss_chance:.2g}"
+    line = f"the chance that {count(1 + given, 'run')} of a candidate miss f is {missed(state)}"
     if found.iterations_95 > given:
         line += f"; a 95 % chance to see f needs --iterations {found.iterations_95}"
     return line

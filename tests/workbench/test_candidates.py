@@ -63,7 +63,7 @@ class Table(App):
 
 def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
     rows = rows_of(snapshot(fake_run.mid_round(run)))
-    assert [rows[0][name] for name in ("tests", "evidence", "to f", "time", "verdict")] == [
+    assert [rows[0][name] for name in ("tests", "evidence", "to f", "real", "verdict")] == [
         "4/4",
         "2◇ 2○",
         "2.3 m",
@@ -72,7 +72,7 @@ def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
     ]
     assert rows[1]["tests"] == "1/4"
     assert rows[1]["verdict"].startswith("▶ 2")
-    assert (rows[3]["tests"], rows[3]["evidence"], rows[3]["time"]) == ("", "", "")
+    assert (rows[3]["tests"], rows[3]["evidence"], rows[3]["real"]) == ("", "", "")
 
 
 def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
@@ -109,8 +109,8 @@ def told_of(run, engine="alive") -> list[tuple[str, ...]]:
 def test_a_certificate_in_the_making_counts_runs_without_broken_ones(run):
     assert told_of(fake_run.certifying(run)) == [
         ("what is left", "6", "6●", "100 %", "61 to 100", ""),
-        ("- crate_00", "3", "1◇ 2○ 1✗", "0 %", "0 to 56", "▶ 26.8 s"),
-        ("- crate_01", "", "", "", "", "▶ 10.8 s"),
+        ("- crate_00", "3", "1◇ 2○ 1✗", "0 %", "0 to 56", "▶ 26.8/45 s"),
+        ("- crate_01", "", "", "", "", "▶ 10.8/45 s"),
         ("whole world", "6", "5● 1○", "83 %", "44 to 97", ""),
     ]
     assert [row[-1] for row in told_of(run, "absent")] == ["", "", "", ""]
@@ -165,7 +165,7 @@ def test_what_matters_least_has_no_column_where_there_is_little_room(run):
     widths = {width: [column.name for column in fitting(listing, width)] for width in (20, 41, 54, 58, 80)}
     assert widths[20] == widths[41] == ["#", "candidate", "models", "tests", "verdict"]
     assert widths[54] == ["#", "candidate", "models", "tests", "evidence", "verdict"]
-    assert "time" in widths[58]
+    assert "real" in widths[58]
     assert widths[80] == [column.name for column in COLUMNS]
     assert sum(column.width for column in fitting(listing, 80)) == 80
     assert len(fitting(listing, 80, narrow=True)) == 5

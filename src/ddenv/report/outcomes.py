@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+from ddenv.claims import missed
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -120,7 +121,7 @@ def _missed(state: RunState, base: Baseline) -> list[Block]:
         return []
     words = (
         f"A candidate is dissimilar when f does not show in {count(1 + iterations, 'test')}; "
-        f"by this rate the chance that they all miss it is {percent(base.miss_chance)}."
+        f"by this rate the chance that they all miss it is {missed(state)}."
     )
     if base.iterations_95 > iterations:
         words += f" For 95 % certainty it needs {base.iterations_95} re-runs (--iterations {base.iterations_95})."

@@ -30,9 +30,10 @@ from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
 from ddenv.report.worth import rate_of_left, worth
-from ddenv.runfile.events import DEEDS, deed
+from ddenv.runfile.events import DEEDS, deed, vector
 from ddenv.runfile.failures import Place
 from ddenv.runfile.state import RunState
+from ddenv.runfile.working import spent
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
@@ -123,11 +124,11 @@ def _noted(state: RunState) -> list[Paragraph]:
 
 def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
-    x, y = goal.get("x"), goal.get("y")
-    if not isinstance(x, (int, float)) or not isinstance(y, (int, float)):
+    try:
+        x, y = vector((goal.get("x"), goal.get("y")), 2)
+    except (TypeError, ValueError, OverflowError):
         return ""
-    away = math.dist((x, y), position[:2])
-    return f", {away:.1f} m short of the goal at ({x:g}, {y:g})" if math.isfinite(away) else ""
+    return f", {math.dist((x, y), position[:2]):.1f} m short of the goal at ({x:g}, {y:g})"
 
 
 def _after(state: RunState) -> str:
@@ -147,14 +148,12 @@ def _figures(record: Record) -> tuple[tuple[str, str], ...]:
         figures.append((percent(1 - after / before), "smaller"))
     if state.baseline is not None and (shown := rate_of_left(state))[0]:
         figures.append(shown)
-    spent, rounds = state.working_seconds, len(record.rounds)
-    if state.started_at is not None:
-        spent += max(0.0, state.updated_at - state.started_at)
+    rounds = len(record.rounds)
     return (
         *figures,
         (thousands(state.tests_done), "test" if state.tests_done == 1 else "tests"),
         *(((thousands(rounds), "round" if rounds == 1 else "rounds"),) if rounds else ()),
-        (duration(spent), "of computing"),
+        (duration(spent(state, state.updated_at)), "of computing"),
     )
 
 

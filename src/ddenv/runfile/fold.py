@@ -8,7 +8,7 @@ from typing import Any
 
 from ddenv.amounts import count
 from ddenv.errors import UserError
-from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports
+from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports, working
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector, whole
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
@@ -36,7 +36,7 @@ def apply(state: RunState, event: Event) -> RunState:
             changes["last_command"] = max(state.last_command, int(command))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
         raise UserError(f"damaged run file: event {event.id} ({event.kind}) is invalid here") from None
-    return state.changed(revision=event.id, updated_at=event.time, **changes)
+    return working.counted(state, state.changed(revision=event.id, updated_at=event.time, **changes))
 
 
 def _created(state: RunState, data: Data, _: float) -> Changes:
@@ -53,9 +53,9 @@ def _created(state: RunState, data: Data, _: float) -> Changes:
 
 
 def _engine_started(state: RunState, data: Data, at: float) -> Changes:
-    # A killed engine wrote no end: it worked at least until its last event.
-    spent = 0.0 if state.started_at is None else max(0.0, state.updated_at - state.started_at)
     return {
+        # A killed engine wrote no end: it worked at least until its last event.
+        **working.stopped(state, state.updated_at),
         "status": "baseline" if state.baseline is None else "running",
         "reason": "",
         "paused": False,
@@ -67,7 +67,6 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "simulator": str(data["simulator"]),
         "physics": state.physics.started(data, state.tests_done),
         "started_at": at,
-        "working_seconds": state.working_seconds + spent,
     }
 
 
@@ -336,14 +335,12 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
 
 
 def _ended(state: RunState, status: str, data: Data, at: float) -> Changes:
-    spent = 0.0 if state.started_at is None else max(0.0, at - state.started_at)
     return {
+        **working.stopped(state, at),
         "status": status,
         "reason": str(data["reason"]),
         "waiting_candidate": None,
         "paused": False,
-        "working_seconds": state.working_seconds + spent,
-        "started_at": None,
     }
 
 

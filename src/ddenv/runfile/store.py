@@ -210,7 +210,9 @@ class RunFile:
         """The running tests, by worker slot."""
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
-            return [Live(whole(slot), whole(test), number(at), vector(json.loads(pose), 7)) for slot, test, at, pose in rows]
+            return [
+                Live(whole(slot), whole(test), number(at), vector(json.loads(pose), 7)) for slot, test, at, pose in rows
+            ]
         except (ValueError, TypeError, OverflowError, RecursionError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 

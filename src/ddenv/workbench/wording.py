@@ -88,6 +88,11 @@ def brief(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 36_000 else f"{seconds / 3600:.0f} h"
 
 
+def simulated(seconds: float | None, timeout: float) -> str:
+    """How far a running test is, in simulated time: beside real times it has to be told apart from them."""
+    return "" if seconds is None else f" {seconds:.1f}/{timeout:g} s"
+
+
 def about(low: float, middle: float, high: float) -> str:
     """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
     unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")

@@ -17,6 +17,7 @@ from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open, is_open
+from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import count, plain
 
 # What can be written: its id, its label, and the endings that its name may have.
@@ -73,7 +74,7 @@ class ExportScreen(ModalScreen[None]):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)
-                yield Input(str(_here()), id="export-folder", compact=True)
+                yield PathEntry(str(_here()), id="export-folder")
             for (id, title, _), name in zip(KINDS, names, strict=True):
                 with Horizontal(classes="row"):
                     yield Tick(title, True, id=f"export-{id}", compact=True, classes="name")

@@ -9,6 +9,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.tested import made_for, purpose
+from ddenv.runfile.working import spent
 from ddenv.words import news
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.wording import count, outcome, plain
@@ -91,8 +92,7 @@ class Browsing:
 
 def _spent(state: RunState) -> int:
     """Time that engines had worked by then, s."""
-    since = 0.0 if state.started_at is None else max(0.0, state.updated_at - state.started_at)
-    return int(state.working_seconds + since)
+    return int(spent(state, state.updated_at))
 
 
 def _pointed(moment: Moment) -> Candidate | None:

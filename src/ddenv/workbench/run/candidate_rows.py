@@ -16,7 +16,7 @@ from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.took_part import implied_words
 from ddenv.workbench.run import certificate_rows
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs
+from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated
 
 # Maximum width of a model's name, in cells.
 NAME = 8
@@ -48,7 +48,7 @@ COLUMNS = (
     Column("tests", 6, right=True),
     Column("evidence", 10, spare=1),
     Column("to f", 7, right=True, spare=3),
-    Column("time", 8, right=True, spare=2),
+    Column("real", 8, right=True, spare=2),
     Column("verdict", 14),
 )
 FRESH_COLUMNS = (
@@ -178,7 +178,9 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     ended = signs(Counter(test.outcome for test in done))
     # More runs are made of what shows f until it is clear that it keeps the rate.
     options = settings(snapshot.state)
-    most = f"/{1 + options.iterations}" if options.accept_rate == "first" else ""
+    # What has a verdict needs no more.
+    enough = options.accept_rate != "first" or (item.verdict and len(done) <= options.iterations)
+    most = "" if enough else f"/{1 + options.iterations}"
     return {
         "environment": item.label,
         "runs": str(len(done)) if done else "",
@@ -190,7 +192,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
         "tests": f"{len(done)}{most}" if done or running else "",
         "evidence": ended,
         "to f": metres(min(distances)) if distances else "",
-        "time": brief(seconds) if done else "",
+        "real": brief(seconds) if done else "",
         "verdict": _verdict(snapshot, item, tests) or _fallen(fallen),
         **_in_short(snapshot.state, item),
     }
@@ -223,7 +225,7 @@ def _fallen(models: Sequence[str]) -> str:
 
 def _seconds(snapshot: Snapshot, test: Test) -> str:
     seconds = snapshot.seconds(test.id)
-    return "" if seconds is None else f" {seconds:.1f} s"
+    return simulated(seconds, settings(snapshot.state).timeout)
 
 
 def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
@@ -235,6 +237,6 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
         "models": str(len(snapshot.state.environment)),
         "tests": "",
         "to f": metres(test.distance),
-        "time": brief(test.wall_seconds) if test.is_finished else "",
+        "real": brief(test.wall_seconds) if test.is_finished else "",
         "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),
     }

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 from ddenv.claims import short
 from ddenv.map.names import shortened
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import CLAIM, count, percent, signs
+from ddenv.workbench.wording import CLAIM, count, percent, signs, simulated
 
 # Maximum width of a model's name, in cells.
 NAME = 20
@@ -54,4 +55,4 @@ def _verdict(snapshot: Snapshot, one: FreshRuns) -> str:
     if not running:
         return ""
     seconds = snapshot.seconds(running[0].id)
-    return "▶" * min(3, len(running)) + ("" if seconds is None else f" {seconds:.1f} s")
+    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)

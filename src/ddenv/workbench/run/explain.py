@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.claims import current, ended, of_runs, promise
+from ddenv.claims import current, ended, missed, of_runs, promise
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_rates import seen
 from ddenv.runfile.run_settings import Settings, settings
@@ -103,7 +103,7 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
         return sentence
     tests = count(1 + iterations, "test")
     need = "" if base.iterations_95 <= iterations else f"; for 95 % certainty set iterations to {base.iterations_95}"
-    return f"{sentence} The chance that {tests} of a candidate all miss f is {percent(base.miss_chance)}{need}."
+    return f"{sentence} The chance that {tests} of a candidate all miss f is {missed(state)}{need}."
 
 
 def _with_pause(state: RunState, happening: Happening) -> Happening:

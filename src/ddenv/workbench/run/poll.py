@@ -16,6 +16,7 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
+from ddenv.runfile.working import spent
 from ddenv.version import __version__
 from ddenv.workbench.run.observed import Busy, Gone, Observed
 
@@ -249,10 +250,7 @@ class Poll:
         return self._original[1]
 
     def _spent(self, state: RunState, engine: EngineIs) -> int:
-        if state.started_at is None:
-            return int(state.working_seconds)
-        until = now() if engine == "alive" else state.updated_at
-        return int(state.working_seconds + max(0.0, until - state.started_at))
+        return int(spent(state, now() if engine == "alive" else state.updated_at))
 
 
 def _finite(row: Live) -> bool:

@@ -17,6 +17,7 @@ from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
 from ddenv.workbench.setup.remedies import Missing, remedy
+from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import count, plain
 
 OPEN, DONE = "?", "✓"
@@ -34,9 +35,7 @@ class MissingList(OptionList):
         Binding(
             "enter", "select", "remedy", id="missing.choose", tooltip="choose a folder or a shape, or leave it out"
         ),
-        Binding(
-            "a", "guess", "guess all", id="missing.guess", tooltip="take the guessed shape wherever nothing is chosen"
-        ),
+        Binding("a", "guess", "guess", id="missing.guess", tooltip="take the guessed shape wherever nothing is chosen"),
         Binding("w", "without", "without", id="missing.without", tooltip="leave this one out"),
     ]
 
@@ -105,7 +104,7 @@ class AskRemedy(ModalScreen[str | None]):
             yield Static(Text(plain(self._row.uri)), markup=False)
             now = "now" if self._row.remedy else "guess"
             yield Static(Text(f"{now}: {plain(self._row.words)}", "dim"), markup=False)
-            yield Input(self._row.remedy or "auto", id="remedy", compact=True)
+            yield PathEntry(self._row.remedy or "auto", id="remedy")
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield Static(Text(HOW, "dim"), markup=False)
 

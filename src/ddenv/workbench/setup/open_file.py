@@ -17,6 +17,7 @@ from textual.widgets import DirectoryTree, Input, Static
 
 from ddenv.errors import shortened
 from ddenv.workbench.setup.file_list import is_file
+from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import plain
 
 SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
@@ -59,8 +60,8 @@ class OpenFile(ModalScreen[Path | None]):
     def compose(self) -> ComposeResult:
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = "Open a scenario (.yaml) or a world (.sdf, .world)"
-            dialog.border_subtitle = "enter opens   escape cancels"
-            yield Input(placeholder="path of a file", id="path", compact=True)
+            dialog.border_subtitle = "tab completes   enter opens   escape cancels"
+            yield PathEntry(placeholder="path of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield WorldTree(self._folder, id="tree")
 

@@ -15,6 +15,7 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open
+from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ class SaveScenario(ModalScreen[Path | None]):
             dialog.border_title = "Save as a scenario"
             dialog.border_subtitle = "enter saves   escape cancels"
             yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
-            yield Input(_suggested(self._scenario.name), placeholder="name of a file", id="path", compact=True)
+            yield PathEntry(_suggested(self._scenario.name), placeholder="name of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
 
     @on(Input.Changed)
