@@ -118,6 +118,7 @@ async def test_a_folder_is_a_remedy_if_the_file_is_in_it(depot, tmp_path):
     async with Opened() as session:
         await session.open(depot)
         assert [row[:5] for row in rows(session)] == ["✓ old", "? bar"]
+        assert f"not in {folder.parent}; guess cylinder" in rows(session)[1]
         assert shape(session, "shelf") == Box((3, 1, 2))
         await session.press("m", "a")
         place(session)

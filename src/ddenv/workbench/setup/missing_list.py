@@ -23,7 +23,7 @@ from ddenv.workbench.wording import count, plain
 OPEN, DONE = "?", "✓"
 HOW = """auto       a guessed shape
 none       without it
-/a/folder  the folder that its model is in
+/a/folder  the folder that holds its model's folder; tab completes
 box:x,y,z  or cylinder:radius,length, or sphere:radius (m)
 It is used in every world that names this file."""
 
@@ -66,7 +66,7 @@ class MissingList(OptionList):
     def _line(self, row: Missing) -> Text:
         color = self.app.theme_variables["text-success" if row.remedy else "text-warning"]
         text = Text(no_wrap=True, overflow="ellipsis").append(DONE if row.remedy else OPEN, f"bold {color}")
-        return text.append(f" {_short(row.uri)}  ").append(("" if row.remedy else "guess ") + plain(row.words), "dim")
+        return text.append(f" {_short(row.uri)}  ").append(plain(row.words), "dim")
 
     @on(OptionList.OptionSelected)
     def _selected(self, event: OptionList.OptionSelected) -> None:
@@ -102,8 +102,7 @@ class AskRemedy(ModalScreen[str | None]):
             dialog.border_title = "A remedy for a missing file"
             dialog.border_subtitle = "enter takes it   escape cancels"
             yield Static(Text(plain(self._row.uri)), markup=False)
-            now = "now" if self._row.remedy else "guess"
-            yield Static(Text(f"{now}: {plain(self._row.words)}", "dim"), markup=False)
+            yield Static(Text(f"now: {plain(self._row.words)}", "dim"), markup=False)
             yield PathEntry(self._row.remedy or "auto", id="remedy")
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield Static(Text(HOW, "dim"), markup=False)

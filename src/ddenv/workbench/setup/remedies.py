@@ -23,7 +23,7 @@ class Missing:
     """A URI that cannot be found.
 
     Its `remedy` is a stand-in as for `--stand-in`, the absolute path of a folder, or "" for none yet. `words` say what stands on
-    the map for it.
+    the map for it, and first if it is not in the folder that was chosen for it.
     """
 
     uri: str
@@ -82,7 +82,7 @@ def read_with_remedies(
     from ddenv.world.read import read_world
     from ddenv.world.sdf.standin import AUTO
 
-    known, found = remembered(), dict[str, str]()
+    known, found, vain = remembered(), dict[str, str](), dict[str, str]()
     while True:
         chosen = with_remedies(options, found)
         try:
@@ -91,13 +91,18 @@ def read_with_remedies(
         except MissingFiles as error:
             # A folder does not help if the file is not in it.
             fresh = {uri: "" if uri in found else known.get(uri, "") for uri in error.uris}
+            vain |= {uri: found[uri] for uri in error.uris if found.get(uri)}
             changed = {uri: text for uri, text in fresh.items() if found.get(uri, "") != text}
             found |= fresh
         if not changed:
             guessing = {**chosen, "stand_in": (*chosen.get("stand_in", ()), AUTO)}
             world = read_world(path, reading_of(reading, **guessing))
             break
-    return world, chosen, tuple(Missing(uri, text, _words(uri, text, world)) for uri, text in found.items())
+    return (
+        world,
+        chosen,
+        tuple(Missing(uri, text, _words(uri, text, vain.get(uri, ""), world)) for uri, text in found.items()),
+    )
 
 
 def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[str, Any]:
@@ -108,9 +113,15 @@ def with_remedies(options: Mapping[str, Any], found: Mapping[str, str]) -> dict[
     return {**options, **{name: (*options.get(name, ()), *each) for name, each in more.items() if each}}
 
 
-def _words(uri: str, text: str, world: World) -> str:
+def _words(uri: str, text: str, vain: str, world: World) -> str:
     if text.startswith("/"):
         return f"in {text}"
+    if text:
+        return _on_the_map(uri, world)
+    return f"{f'not in {vain}; ' if vain else ''}guess {_on_the_map(uri, world)}"
+
+
+def _on_the_map(uri: str, world: World) -> str:
     begin = f"'{uri}' by "
     by = next((note.why.removeprefix(begin) for note in world.notes if note.why.startswith(begin)), "left out")
     return by.removeprefix("a guess, ").removeprefix("the stand-in ")
