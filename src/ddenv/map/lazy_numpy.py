@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 # What the maps use of numpy, for the type checker.
 if TYPE_CHECKING:
     from numpy import abs as abs
+    from numpy import add as add
     from numpy import append as append
     from numpy import arange as arange
     from numpy import argsort as argsort
@@ -19,11 +20,14 @@ if TYPE_CHECKING:
     from numpy import concatenate as concatenate
     from numpy import cumsum as cumsum
     from numpy import diff as diff
+    from numpy import empty as empty
     from numpy import errstate as errstate
     from numpy import flatnonzero as flatnonzero
     from numpy import floor as floor
     from numpy import fromiter as fromiter
     from numpy import full as full
+    from numpy import hypot as hypot
+    from numpy import inf as inf
     from numpy import int32 as int32
     from numpy import intp as intp
     from numpy import isfinite as isfinite
@@ -37,8 +41,9 @@ if TYPE_CHECKING:
     from numpy import ones as ones
     from numpy import repeat as repeat
     from numpy import searchsorted as searchsorted
-    from numpy import uint8 as uint8
+    from numpy import stack as stack
     from numpy import uint32 as uint32
+    from numpy import uint8 as uint8
     from numpy import unique as unique
     from numpy import vstack as vstack
     from numpy import where as where

@@ -232,7 +232,7 @@ def _in_view(ends: np.ndarray, which: np.ndarray, view: View) -> tuple[np.ndarra
     enter = np.clip(borders.min(axis=0).max(axis=1), 0, 1)
     leave = np.clip(borders.max(axis=0).min(axis=1), 0, 1)
     seen = enter < leave
-    parts = begin[:, None] + way[:, None] * np.stack([enter, leave], axis=1)[:, :, None]
+    parts: np.ndarray = begin[:, None] + way[:, None] * np.stack([enter, leave], axis=1)[:, :, None]
     return parts[seen], which[seen]
 
 
