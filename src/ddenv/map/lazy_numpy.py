@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from numpy import repeat as repeat
     from numpy import searchsorted as searchsorted
     from numpy import stack as stack
-    from numpy import uint32 as uint32
     from numpy import uint8 as uint8
+    from numpy import uint32 as uint32
     from numpy import unique as unique
     from numpy import vstack as vstack
     from numpy import where as where
