@@ -171,7 +171,10 @@ def test_the_footer_offers_what_the_rules_allow(salt, plan, moment, models, engi
             SimpleNamespace(selection=models, has_focus=False),
             SimpleNamespace(snapshot=SimpleNamespace(state=state)),
         )
-        keys, said = KeyOffers(poll, table, world, SimpleNamespace(situation=now), None), {}
+        keys, said = (
+            KeyOffers(SimpleNamespace(is_past=False), poll, table, world, SimpleNamespace(situation=now), None),
+            {},
+        )
         keys.show(SimpleNamespace(say=said.__setitem__))
         for action, binding in GUIDING.items():
             offered = keys.offer(action)
