@@ -39,7 +39,7 @@ def test_pause_step_accept_and_a_killed_terminal(terminal, tmp_path, width, heig
     wait_until(lambda: len(state_of(run).finished_tests) > made or state_of(run).status in ("waiting", "finished"))
     assert engine_is_alive(run) or state_of(run).status == "finished"
     again = terminal(width, height, "open", "one")
-    again.see("accept: ask")
+    again.see("The reduction waits for you")
     again.press("t")
     again.see("finished")
     assert set(state_of(run).environment) == {"deck", "wall"}

@@ -66,7 +66,7 @@ async def test_the_baseline_is_listed_run_by_run(run):
     run.live((run.start(None, 1), 0.5))
     async with Attached(run) as session:
         table = session.screen.query_one(Candidates)
-        assert [table.get_row_at(row)[-1].plain.strip() for row in range(2)] == ["◆ failed", "▶ 22.2 s"]
+        assert [table.get_row_at(row)[-1].plain.strip() for row in range(2)] == ["◆ failed", "▶ 22.2/45 s"]
         assert "Baseline" in str(session.screen.query_one("#round").border_title)
         await session.press("v", "w")
         assert "there are no candidates yet" in session.said()

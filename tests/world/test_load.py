@@ -39,7 +39,7 @@ WRONG = {
         {"reduction": {"iterations": -1}},
         "reduction.iterations: should be greater than or equal to 0, found -1",
     ),
-    "timeout": ({"failure": {"timeout": 0}}, "failure.timeout: should be greater than 0, found 0"),
+    "timeout": ({"failure": {"timeout": 0}}, "failure.timeout: should be greater than or equal to 0.01, found 0"),
     "infinite": ({"failure": {"timeout": float("inf")}}, "failure.timeout: should be a finite number"),
     "word": ({"goal": {"x": "far", "y": 0}}, "goal.x: .*found 'far'"),
     "missing": ({"goal": {"x": 1}}, "goal.y: is missing"),

@@ -67,7 +67,7 @@ MEANINGS = {
     "tests": "how many of the possible tests were made",
     "evidence": "how its tests ended; k explains the signs",
     "to f": "how near to the end of f the nearest of its tests came",
-    "time": "how long its tests took, or how far the running one is",
+    "real": "how long its tests took by the clock, or how far the running one is",
     "verdict": "what its tests add up to; k explains the signs",
     "environment": "what was run with fresh seeds: what is left, that without one model, or the whole world",
     "runs": "the runs that did not break",
