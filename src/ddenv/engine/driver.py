@@ -104,7 +104,6 @@ class Driver:
     def _search(self) -> None:
         """Searches from the current environment to the end. Raises Steered if the user changes something."""
         leg = self._journal.begin_leg()
-        audit_slice(self._journal, self._bench)
         self._reduction = Reduction.model_validate(leg.settings)
         self._learnt = set(leg.tests)
         self._trials = [
@@ -187,6 +186,7 @@ class Driver:
         return held[1]
 
     def _finish(self, kept: Keep) -> None:
+        audit_slice(self._journal, self._bench)
         # Their results count, too.
         self._bench.finish_trials()
         free = [name for name in self._stacks.representatives if name in kept]
@@ -234,6 +234,8 @@ class Driver:
     def _round(self, number: int, round: Round) -> Candidate | None:
         """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""
         self._announce(number, round)
+        # Whoever waits before the first test of a round sees its candidates.
+        audit_slice(self._journal, self._bench)
         self._judged = 0
         forecast = self._forecast(number, self._moment(round))
         winner = self._judge(number, round, forecast)
