@@ -129,10 +129,7 @@ class Driver:
         self._stacks = Stacks.of(free)
 
     def _begin(
-        self,
-        asked: Reduction,
-        n_partitions: int | None = None,
-        again: tuple[tuple[str, ...], ...] = (),
+        self, asked: Reduction, n_partitions: int | None = None, again: tuple[tuple[str, ...], ...] = ()
     ) -> Search:
         """The algorithm and the schemas by name; first it leaves out the groups `again`. Raises UserError for unknown names."""
         partitioning, prioritization = split_pair(asked.pair)
