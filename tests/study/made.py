@@ -32,7 +32,7 @@ def crates(folder: Path, name: str = "crates", **reduction) -> Path:
     (folder / "crates.sdf").write_bytes(fake_run.world_text())
     (folder / "robot.sdf").write_bytes(fake_run.ROBOT_SDF)
     data = fake_run.scenario(name=name)
-    data["reduction"] |= reduction
+    data["reduction"] |= {"slice": False} | reduction
     number = len(list(folder.glob("*.yaml")))
     path = folder / f"scenario-{number}.yaml"
     path.write_text(yaml.safe_dump(data))
@@ -44,7 +44,7 @@ def wall(folder: Path, name: str = "wall", oracle: str = "", **reduction) -> Pat
     scenario = load_scenario(DATA / "wall.yaml")
     data = json.loads(scenario.model_dump_json(exclude_unset=True))
     data |= {"name": name, "folder": str(folder), **({"oracle": {"command": oracle}} if oracle else {})}
-    data["reduction"] |= reduction
+    data["reduction"] |= {"slice": False} | reduction
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(data))
     return path

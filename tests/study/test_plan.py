@@ -19,7 +19,7 @@ LONGEST_FILE_NAME = 255
 
 
 def test_by_default_it_is_the_papers_three_by_three_in_its_order():
-    cells = make_plan().cells
+    cells, sliced = make_plan().cells[::2], make_plan().cells[1::2]
     assert [(cell.scenario.name, cell.method.pair) for cell in cells] == [
         (scenario, pair) for scenario in ("ditch", "rubble", "friction") for pair in PAIRS
     ]
@@ -29,6 +29,10 @@ def test_by_default_it_is_the_papers_three_by_three_in_its_order():
         "timeseg/avg-trajectory-proximal",
     )
     assert {cell.method.algorithm for cell in cells} == {"ddenv"}
+    # Each is made with slices, too, which the paper does not have.
+    assert [cell.label for cell in sliced] == [f"{cell.label} with slices" for cell in cells]
+    assert not any(cell.slices for cell in cells)
+    assert {theirs(cell) for cell in sliced} == {None}
     # Tests, % reduction and minutes of each row of Tables II to IV.
     paper = [theirs(cell) for cell in cells]
     assert [(each.tests, round(100 * each.smaller), each.minutes) for each in paper] == [

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from ddenv.page.blocks import Strong, Table
+from ddenv.page.blocks import Paragraph, Strong, Table
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.study.figures import chart
@@ -14,7 +14,7 @@ from ddenv.study.plan import PAIRS, make_plan
 from ddenv.study.results import Found
 from ddenv.study.rows import groups, spread
 from ddenv.study.study_page import content
-from ddenv.study.tables import behind, best, numbers
+from ddenv.study.tables import behind, best, numbers, section
 from tests.study.made import crates, plan_of
 
 MODELS = tuple(f"m{number}" for number in range(16))
@@ -69,13 +69,19 @@ def cells(tmp_path, *tests, pairs=FIVE, seeds=1):
     return plan, made, groups(plan, made)
 
 
+def page(folder, group):
+    """All words of a scenario's section."""
+    blocks = (block for block in section(folder, group).blocks if isinstance(block, Paragraph))
+    return " ".join(part for block in blocks for part in block.parts if isinstance(part, str))
+
+
 def uncertified(each, verdict="not shown"):
     """The same cell with a certificate that does not show that the rate is kept."""
     return replace(each, minimal=False, problem="it is not shown", certificate=certificate(len(each.left), verdict))
 
 
 def test_the_papers_numbers_stand_beside_ours():
-    plan = make_plan(("ditch",))
+    plan = make_plan(("ditch",), slice=False)
     (group,) = groups(plan, [found(cell, 60, left=2) for cell in plan.cells])
     table = numbers(group)
     assert table.head == (
@@ -86,15 +92,32 @@ def test_the_papers_numbers_stand_beside_ours():
     assert table.rows[1] == (PAIRS[1], "yes", "60", "82", "40", "88 %", "95 %", "3.0", "108", "2.0")
 
 
+def test_what_slices_save_stands_beside_the_papers_way():
+    plan = make_plan(("ditch",), PAIRS[0], seeds=2)
+    numbers_of = {False: {"simulated": 60}, True: {"simulated": 21, "certificate_simulated": 12}}
+    made = [found(cell, 60, left=2, **numbers_of[cell.slices]) for cell in plan.cells]
+    made[-1] = replace(made[-1], left=MODELS[:3], minimal=False, problem="it is not shown")
+    (group,) = groups(plan, made)
+    table = numbers(group)
+    assert table.head == (
+        *("partitioning, prioritization", "certified", "search tests", "paper", "with slices"),
+        *("certificate tests", "with slices", "% reduction", "paper", "search minutes", "paper", "certificate minutes"),
+    )
+    assert table.rows[0][1:8] == ("2 of 2", "60", "268", "21", "40", "12", "88 %")
+    told = page(Path("nowhere"), group)
+    assert "With slices 1 of 2 cells end at the same models as without them, and 1 are certified." in told
+    assert f"Not certified: {PAIRS[0]}, seed 100000, with slices: it is not shown." in told
+
+
 def test_what_the_paper_does_not_have_stands_alone():
-    plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin")
+    plan = make_plan(("ditch",), f"timeseg/random,{PAIRS[0]}", "ddenv,ddmin", slice=False)
     (group,) = groups(plan, [found(cell, 60) for cell in plan.cells])
     table = numbers(group)
     assert [(row[0], row[3]) for row in table.rows] == [("timeseg/random", "–"), (PAIRS[0], "268"), ("ddmin", "–")]
 
 
 def test_the_claim_counts_what_is_better_than_the_paper():
-    plan = make_plan(("ditch",))
+    plan = make_plan(("ditch",), slice=False)
     # Of 84, 95 and 84 % and of 268, 82 and 359 tests.
     made = [found(cell, tests, left=2) for cell, tests in zip(plan.cells, (269, 82, 30), strict=True)]
     report = content(plan, made, (), Path("nowhere"))
@@ -222,7 +245,7 @@ def test_the_figure_has_a_line_for_each_method(tmp_path):
 
 
 def test_of_many_methods_the_figure_names_the_papers_and_the_best(tmp_path):
-    plan = make_plan(("ditch",), "all")
+    plan = make_plan(("ditch",), "all", slice=False)
     (group,) = groups(plan, [found(cell, 100 - number) for number, cell in enumerate(plan.cells)])
     words = [text.text for text in ElementTree.fromstring(chart(group)).iter(f"{SVG}text")]
     named = [word.partition(":")[0] for word in words if "left after" in word]

@@ -14,7 +14,7 @@ from ddenv.study.study_folder import RUNS, Sitting
 from ddenv.world.scenario import Scenario
 
 # These differ between cells.
-OF_A_CELL = ("algorithm", "pair", "seed", "budget")
+OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
 COLUMNS = (
     (
         "search tests",
@@ -25,6 +25,11 @@ COLUMNS = (
         "certificate tests",
         "runs with fresh seeds that the certificate rests on: of what is left, of that without each of its models, and of the "
         "whole world; with steps back, those of all certificates.",
+    ),
+    (
+        "with slices",
+        "the tests of another reduction, which makes no test that a finished run implies: those that were simulated, with the "
+        "audits. All other columns are without slices, as the paper's.",
     ),
     ("% reduction", "the part of the models that was removed."),
     ("search minutes, certificate minutes", "the time of these tests, one after another, as the paper made its tests."),

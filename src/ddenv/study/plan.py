@@ -67,13 +67,18 @@ class Cell:
     @property
     def name(self) -> str:
         """The name of its run file, without the ending."""
-        words = (self.method.algorithm, *self.method.used, f"seed-{self.seed}")
+        words = (self.method.algorithm, *self.method.used, f"seed-{self.seed}", *(["slices"] if self.slices else []))
         return "_".join((file_name(self.scenario), *(NO_NAME.sub("-", word) for word in words)))
+
+    @property
+    def slices(self) -> bool:
+        """Whether it removes what took no part without a test; the paper's way is without."""
+        return self.scenario.reduction.slice
 
     @property
     def label(self) -> str:
         """Its name for people, without its seed."""
-        return f"{self.scenario.name} {self.method.label}"
+        return f"{self.scenario.name} {self.method.label}{' with slices' if self.slices else ''}"
 
 
 def file_name(scenario: Scenario) -> str:
@@ -91,12 +96,14 @@ class Plan:
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """All cells in the order of the tables."""
+        """All cells in the order of the tables: without slices, and then with them if the scenario uses them."""
         return tuple(
-            _cell(scenario, method, number)
+            _cell(scenario, method, number, slices)
             for scenario in self.scenarios
             for method in self.methods
             for number in range(self.seeds)
+            for slices in (False, True)
+            if scenario.reduction.slice or not slices
         )
 
 
@@ -168,13 +175,14 @@ def _methods(algorithms: Iterable[str], pairs: Sequence[str]) -> Iterator[Method
                 yield method
 
 
-def _cell(scenario: Scenario, method: Method, number: int) -> Cell:
+def _cell(scenario: Scenario, method: Method, number: int, slices: bool) -> Cell:
     """The seeds of a scenario are so far apart that two cells share either all runs or none."""
     reduction = scenario.reduction
     seed = reduction.seed + number * SEEDS_APART
     if seed >= MOST_SEED:
         raise UserError(f"--seeds: the last seed of {scenario.name} would be {seed}; the maximum is {MOST_SEED - 1}")
-    asked = reduction.model_copy(update={"algorithm": method.algorithm, "pair": method.pair, "seed": seed})
+    of_cell = {"algorithm": method.algorithm, "pair": method.pair, "seed": seed, "slice": slices}
+    asked = reduction.model_copy(update=of_cell)
     return Cell(scenario.model_copy(update={"reduction": asked}), method, seed)
 
 

@@ -52,6 +52,8 @@ class Found:
     the end of the baseline on. `seconds` and `certificate_seconds` are the times of these tests, one after another. `taken` of all
     tests were reused from other cells. `whole_shown` of `whole_runs` of the counted runs of the whole world showed f. A candidate
     without f cost `misses` tests at least. `steps_back`: how often the run went back because the rate of f was lost.
+
+    `simulated` and `certificate_simulated` are those of them that no other run implied, with the audits of slices.
     """
 
     cell: Cell
@@ -63,6 +65,8 @@ class Found:
     tests: int = 0
     reruns: int = 0
     certificate_tests: int = 0
+    simulated: int = 0
+    certificate_simulated: int = 0
     ahead: int = 0
     taken: int = 0
     seconds: float = 0.0
@@ -116,7 +120,9 @@ def read_cell(folder: Path, cell: Cell) -> Found:
         tests=len(tests),
         reruns=sum(test.is_deflake_run for test in tests),
         certificate_tests=len(fresh),
-        ahead=state.tests_done - len(tests) - len(fresh),
+        simulated=sum(test.implied_by is None for test in tests) + state.audits,
+        certificate_simulated=sum(test.implied_by is None for test in fresh),
+        ahead=state.tests_done - state.audits - len(tests) - len(fresh),
         taken=sum(test.taken for test in state.tests),
         seconds=sum(test.wall_seconds for test in tests),
         certificate_seconds=sum(test.wall_seconds for test in fresh),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from statistics import median
 
 from ddenv.study.plan import Cell, Method, Plan
@@ -42,18 +43,19 @@ _ROWS = {
 
 
 def theirs(cell: Cell) -> Theirs | None:
-    """The paper's numbers for a cell; None if it has none."""
-    if cell.method.algorithm != "ddenv":
+    """The paper's numbers for a cell; None if it has none. It knows no slices."""
+    if cell.method.algorithm != "ddenv" or cell.slices:
         return None
     return _ROWS.get(cell.scenario.name, {}).get(cell.method.pair)
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The results of a method's cells, in the order of their seeds."""
+    """The results of a method's cells, in the order of their seeds: `found` without slices, and `sliced` with them."""
 
     method: Method
     found: tuple[Found, ...]
+    sliced: tuple[Found, ...] = ()
 
     @property
     def over(self) -> tuple[Found, ...]:
@@ -108,9 +110,17 @@ class Group:
 def groups(plan: Plan, found: Sequence[Found]) -> tuple[Group, ...]:
     """The cells of `plan`, in its order, as rows of its scenarios."""
     cells = iter(found)
+
+    def row(scenario: Scenario, method: Method) -> Row:
+        every = tuple(islice(cells, plan.seeds * (2 if scenario.reduction.slice else 1)))
+        return Row(
+            method,
+            tuple(each for each in every if not each.cell.slices),
+            tuple(each for each in every if each.cell.slices),
+        )
+
     return tuple(
-        Group(scenario, tuple(Row(method, tuple(next(cells) for _ in range(plan.seeds))) for method in plan.methods))
-        for scenario in plan.scenarios
+        Group(scenario, tuple(row(scenario, method) for method in plan.methods)) for scenario in plan.scenarios
     )
 
 

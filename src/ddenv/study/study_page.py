@@ -94,8 +94,8 @@ def _figures(
     figures = [(f"{len(minimal)} of {len(found)}", "certified")]
     if minimal:
         figures.append((percent(mean(each.smaller for each in minimal)), "smaller, mean"))
-    figures.append((thousands(sum(each.tests for each in found)), "search tests"))
-    figures.append((thousands(sum(each.certificate_tests for each in found)), "certificate tests"))
+    figures.append((thousands(sum(each.simulated for each in found)), "search tests"))
+    figures.append((thousands(sum(each.certificate_simulated for each in found)), "certificate tests"))
     if sittings:
         workers = count(jobs[0], "worker") if len(jobs) == 1 else f"{jobs[0]} to {jobs[-1]} workers"
         made = thousands(sum(each.tests for each in sittings))
@@ -106,8 +106,9 @@ def _figures(
 STEM = "study"
 # The columns of `study.csv`.
 HEADER = (
-    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "certified", "problem"),
-    *("models", "left", "reduction", "names", "tests", "reruns", "certificate_tests", "ahead", "taken_over"),
+    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "slices", "certified", "problem"),
+    *("models", "left", "reduction", "names", "tests", "simulated", "reruns"),
+    *("certificate_tests", "certificate_simulated", "ahead", "taken_over"),
     *("seconds", "certificate_seconds", "steps_back", "baseline_runs", "baseline_f", "least_to_show", "least_to_find"),
     *("keep_rate", "whole_runs", "whole_f", "left_runs", "left_f", "left_low", "left_high", "without_most"),
     *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
@@ -138,9 +139,18 @@ def _row(folder: Path, each: Found) -> tuple[object, ...]:
     cell, base, paper = each.cell, each.baseline, theirs(each.cell)
     used = dict(zip(("partitioning", "prioritization"), cell.method.parts, strict=True))
     return (
-        *(cell.scenario.name, cell.method.algorithm, *used.values(), cell.seed, each.minimal, each.problem),
+        *(
+            cell.scenario.name,
+            cell.method.algorithm,
+            *used.values(),
+            cell.seed,
+            cell.slices,
+            each.minimal,
+            each.problem,
+        ),
         *(len(each.elements), len(each.left), round(each.smaller, 4), " ".join(each.left)),
-        *(each.tests, each.reruns, each.certificate_tests, each.ahead, each.taken),
+        *(each.tests, each.simulated, each.reruns),
+        *(each.certificate_tests, each.certificate_simulated, each.ahead, each.taken),
         *(round(each.seconds, 2), round(each.certificate_seconds, 2), each.steps_back),
         *(("", "") if base is None else (base.runs, base.failures)),
         *((least_of(each, least_to_show), least_of(each, least_to_find)) if each.minimal else ("", "")),

@@ -30,7 +30,7 @@ def section(folder: Path, group: Group) -> Section:
     models = f", {count(group.models, 'model')}" if group.models else ""
     title = f"{name}{models}" + (f" (Table {number} of the paper)" if number and _has_theirs(group) else "")
     blocks: list[Block] = [say(plain(group.scenario.description))] if group.scenario.description else []
-    blocks.append(numbers(group))
+    blocks += [numbers(group), *_slices(group)]
     blocks += _problems(group)
     if group.over:
         blocks += [behind(group)] if len(group.rows) <= MOST_ROWS else _in_short(group)
@@ -42,35 +42,43 @@ def section(folder: Path, group: Group) -> Section:
 
 def numbers(group: Group) -> Table:
     """Whether the result is certified; tests, reduction and minutes, beside the paper's if it has them."""
-    beside = _has_theirs(group)
-    head: tuple[str, ...] = (
-        "search tests",
-        "certificate tests",
-        "% reduction",
-        "search minutes",
-        "certificate minutes",
+    beside, slices = _has_theirs(group), any(row.sliced for row in group.rows)
+    paper, sliced = ["paper"] if beside else [], ["with slices"] if slices else []
+    head = (
+        *("partitioning, prioritization", "certified", "search tests", *paper, *sliced),
+        *("certificate tests", *sliced, "% reduction", *paper, "search minutes", *paper, "certificate minutes"),
     )
-    if beside:
-        head = (head[0], "paper", *head[1:3], "paper", head[3], "paper", head[4])
-    head = ("partitioning, prioritization", "certified", *head)
-    return Table(head, tuple(_numbers(row, beside) for row in group.rows), frozenset(range(2, len(head))))
+    rows = tuple(_numbers(row, beside, slices) for row in group.rows)
+    return Table(head, rows, frozenset(range(2, len(head))))
 
 
-def _numbers(row: Row, beside: bool) -> tuple[Cell, ...]:
-    over = row.over
+def _numbers(row: Row, beside: bool, slices: bool) -> tuple[Cell, ...]:
+    over, sliced = row.over, [each for each in row.sliced if each.certificate is not None]
     tests = spread([each.tests for each in over], _whole)
     fresh = spread([each.certificate_tests for each in over], _whole)
     smaller = spread([each.smaller for each in over], percent)
     minutes = spread([each.seconds / 60 for each in over], _minutes)
     more = spread([each.certificate_seconds / 60 for each in over], _minutes)
     name = row.method.label, _certified(row)
-    if not beside:
-        return *name, tests, fresh, smaller, minutes, more
     paper = theirs(row.found[0].cell)
-    one, two, three = (
-        ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
-    )
-    return *name, tests, one, fresh, smaller, two, minutes, three, more
+    said = ("–", "–", "–") if paper is None else (str(paper.tests), percent(paper.smaller), str(paper.minutes))
+    one, two, three = ([each] if beside else [] for each in said)
+    search = [spread([each.simulated for each in sliced], _whole)] if slices else []
+    proof = [spread([each.certificate_simulated for each in sliced], _whole)] if slices else []
+    return *name, tests, *one, *search, fresh, *proof, smaller, *two, minutes, *three, more
+
+
+def _slices(group: Group) -> Iterator[Paragraph]:
+    """What the cells with slices came to, beside those without."""
+    pairs = [pair for row in group.rows if row.sliced for pair in zip(row.found, row.sliced, strict=True)]
+    over = [(without, sliced) for without, sliced in pairs if without.certificate and sliced.certificate]
+    if over:
+        alike = sum(frozenset(without.left) == frozenset(sliced.left) for without, sliced in over)
+        certified = sum(sliced.minimal for _, sliced in over)
+        yield say(
+            f"With slices {alike} of {count(len(over), 'cell')} end at the same models as without them, and {certified} are "
+            "certified."
+        )
 
 
 def _certified(row: Row) -> str:
@@ -182,9 +190,10 @@ def _problems(group: Group) -> Iterator[Paragraph]:
     """The cells that are not certified, and why."""
     cells: dict[str, list[str]] = {}
     for row in group.rows:
-        for each in row.found:
+        for each in (*row.found, *row.sliced):
             if problem := plain(each.problem).rstrip("."):
-                cells.setdefault(problem, []).append(f"{row.method.label}, seed {each.cell.seed}")
+                slices = ", with slices" if each.cell.slices else ""
+                cells.setdefault(problem, []).append(f"{row.method.label}, seed {each.cell.seed}{slices}")
     for problem, names in cells.items():
         which = "; ".join(names) if len(names) <= MOST_CELLS else count(len(names), "cell")
         yield say(f"Not certified: {which}: {problem}.", notice=True)
