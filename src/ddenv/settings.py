@@ -149,7 +149,7 @@ class Reduction:
     )
     budget: int | None = setting(
         None,
-        "maximum number of simulated tests, the baseline included",
+        "maximum number of simulated tests, with the baseline",
         least=1,
         most=10_000_000,
         shown="basic",

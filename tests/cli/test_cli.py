@@ -94,7 +94,7 @@ def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
 @pytest.mark.programs
 def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     # Long enough that a robot at the wall can be ended early.
-    done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop")
+    done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop", "--no-slice")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert (summary["kept"], summary["minimal"], summary["failure"]) == (reduced[1]["kept"], True, "stuck")

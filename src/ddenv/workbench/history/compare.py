@@ -91,7 +91,7 @@ class Compare(ModalScreen[None]):
     def _facts(self, name: str, node: Node) -> Text:
         words = branches.words(node, self._state.node)
         text = Text(f"{name}  {place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
-        after = f"\nafter {count(node.own_tests, 'test')} of its own"
+        after = f"\n{count(node.own_tests, 'own test')}"
         return text.append(after + (f"; {words}" if words else ""), "not bold dim")
 
 

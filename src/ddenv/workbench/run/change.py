@@ -65,7 +65,7 @@ class Change(ModalScreen[course.Change | None]):
                     with Horizontal(classes="row"):
                         yield Static(one.label, classes="label", markup=False)
                         yield Entry(self._texts[one.name], id=one.name)
-                    empty = "; empty for no limit" if one.none else ""
+                    empty = "; empty: no limit" if one.none else ""
                     yield Static(f"{one.summary}{empty}", classes="meaning", markup=False)
             yield Static("", id="wrong", classes="wrong", markup=False)
             with Horizontal(classes="buttons"):

@@ -17,7 +17,7 @@ from ddenv.workbench.run.run_keys import GUIDING
 
 # These ask for models if none are selected.
 TITLES = {
-    "pin": "Pin or unpin models: pinned ones always stay, and a new search begins",
+    "pin": "Pin or unpin models: pinned ones stay; a new search begins",
     "without": "Try without these models",
     "only": "Try only these models",
 }
