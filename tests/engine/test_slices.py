@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
+from ddenv.runfile.state import FRESH
 from ddenv.runfile.store import RunFile
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
@@ -82,6 +83,17 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
             assert state.refuted is None
             assert wanted or not (state.implied or state.audits)
         assert ends[0] == ends[1] == (tuple(name for name in MODELS if name in made_by.needed), True)
+
+
+@pytest.mark.parametrize(("share", "simulated"), [(0.1, 1), (-1.0, 0)])
+def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, monkeypatch, share, simulated):
+    """One of the fresh runs of this simulator follows from another one."""
+    monkeypatch.setattr("ddenv.engine.auditing.CHEAP", share)
+    made_by = Participation(salt=2, needed=(MODELS[0], MODELS[3]))
+    state = drive(sliced_run(tmp_path, accept_rate="kept", audit=1_000_000), made_by.pool())
+    fresh = [test for test in state.finished_tests if test.phase in FRESH]
+    audits, implied = (sum(getattr(test, kind) is not None for test in fresh) for kind in ("audits", "implied_by"))
+    assert (audits, implied) == (simulated, 1 - simulated)
 
 
 @given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), algorithm=st.sampled_from(["ddenv", "splitting"]))
