@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,3 +139,20 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
 def announce(line: str) -> None:
     """Announces a slow step on stderr, so that programs can read stdout."""
     print(printable(line), file=sys.stderr, flush=True)
+
+
+@contextmanager
+def announced(line: str) -> Iterator[None]:
+    """Announces a slow step that cannot say how far it is; on a terminal, with the time it has taken so far."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        announce(line)
+        yield
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
+        progress.add_task(printable(line), total=None)
+        yield

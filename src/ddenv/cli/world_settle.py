@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ddenv.cli.options import announce
+from ddenv.cli.options import announce, announced
 from ddenv.errors import UserError
 from ddenv.words import count, first_of
 from ddenv.world.model import World
@@ -27,10 +27,10 @@ def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     if output.resolve() == world.path.resolve():
         raise UserError(f"{output}: is the world itself; choose another file")
     able = sum(bool(model.links) and not model.static for model in world.models)
-    announce(f"settling {count(able, 'model')} that can move")
     # Drake's plant needs a robot; piles settle as if there were none.
     scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
-    settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    with announced(f"settling {count(able, 'model')} that can move"):
+        settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
     for about, words in (*note_inside(world), *notes_on(world, settled)):
         if about != "unrest":
             announce(words)
