@@ -1,9 +1,10 @@
 """Writes the results of studies into the pages: tables between marks in docs/study.md and README.md, and the first study's figures.
 
-    python -m docs.study_page STUDY AS_PRINTED ALL SEEDS
+    python -m docs.study_page SEEDS [AS_PRINTED [ALL]]
 
-These are folders of `ddenv study`: the nine cells; the same as printed in the paper; --pairs all --algorithms all; and --seeds.
-A mark is <!-- NAME --> ... <!-- end -->. The README's `headline` has the ranges of the table `nine`.
+These are folders of `ddenv study`: with --seeds 3; as printed in the paper; and with --pairs all --algorithms all. The tables of a
+folder that is not given stay as they are. A mark is <!-- NAME --> ... <!-- end -->. The README's `headline` has the ranges of the
+table `nine`.
 """
 
 from __future__ import annotations
@@ -18,23 +19,24 @@ FIGURES = DOCS / "study"
 # The tables of a scenario: tests, reduction and time; what is behind them.
 NUMBERS, BEHIND = 0, 1
 CERTIFIED = "certified"
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 
 
 def main() -> None:
-    if len(sys.argv) != 5:
+    if not 2 <= len(sys.argv) <= 4:
         sys.exit(__doc__)
-    nine, printed, every, seeds = (Path(name) for name in sys.argv[1:])
+    nine, *others = (Path(name) for name in sys.argv[1:])
     tables = {
         "nine": _scenarios(nine, NUMBERS),
         "behind": _scenarios(nine, BEHIND),
         "made": _table(nine, "How it was made", 1),
-        "printed": _scenarios(printed, NUMBERS),
-        "seeds": _scenarios(seeds, NUMBERS),
-        "seeds behind": _scenarios(seeds, BEHIND),
-        "best": _table(every, "Which is best where", 0),
     }
     tables["headline"] = headline(tables["nine"])
+    if others:
+        tables["printed"] = _scenarios(others[0], NUMBERS)
+    if len(others) > 1:
+        tables["best"] = _table(others[1], "Which is best where", 0)
     for page in (STUDY, README):
         page.write_text(filled(page.read_text(), tables))
     FIGURES.mkdir(exist_ok=True)
@@ -78,9 +80,10 @@ def _is_certified(cell: str) -> bool:
 
 
 def _range(column: tuple[str, ...]) -> str:
-    """Such as "40 to 64", or "95 %" where all are the same."""
-    low, *_, high = sorted((*column, *column), key=lambda cell: float(cell.split()[0]))
-    return low if low == high else f"{low.split()[0]} to {high}"
+    """Such as "40 to 78" of "45 (40 to 54)" and "64 (60 to 78)", or "95 %" where all are the same."""
+    numbers = sorted((number for cell in column for number in NUMBER.findall(cell)), key=float)
+    low, high = numbers[0], numbers[-1]
+    return (low if low == high else f"{low} to {high}") + (" %" if "%" in column[0] else "")
 
 
 def _tables(text: str) -> list[str]:

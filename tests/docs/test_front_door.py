@@ -38,7 +38,7 @@ def test_the_headline_has_no_numbers_of_what_is_not_certified():
         headline(nine)
         == """| scenario | certified | search tests | paper |
 | --- | --- | ---: | ---: |
-| ditch | 2 of 3 | 40 to 60 | 268 to 359 |
+| ditch | 2 of 3 | 30 to 60 | 268 to 359 |
 | rubble | 0 of 2 | – | – |
 """
     )

@@ -130,4 +130,4 @@ async def test_both_maps_have_one_scale_and_one_frame(run, size):
         assert first.viewport.view == second.viewport.view
         assert first.region.y == second.region.y
         words = session.dialog()
-        assert "after 6 tests of its own" in words and "after 5 tests of its own" in words
+        assert "6 own tests" in words and "5 own tests" in words
