@@ -24,6 +24,7 @@ from textual.pilot import Pilot
 from textual.widgets import Select
 
 from ddenv.guiding.selections import nearest_other
+from ddenv.learn.shelf import bundled
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
@@ -31,7 +32,9 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.messages import ShowLessons
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.world.load import SDF, find_scenario, load_scenario
 
@@ -97,6 +100,9 @@ PICTURES = {
     "export": Picture("ExportScreen", "Writing what is left"),
     "runs": Picture("RunsScreen", "The list of runs"),
     "runs-compared": Picture("CompareRuns", "Two runs side by side"),
+    "lessons": Picture("LessonsScreen", "The list of lessons"),
+    "lesson": Picture("LessonScreen", "A lesson"),
+    "lesson-small": Picture("LessonScreen", "A lesson at 80x24"),
 }
 
 
@@ -138,6 +144,28 @@ async def make_all() -> None:
         await branch(pilot)
     await list_runs()
     await set_up()
+    await teach()
+
+
+async def teach() -> None:
+    """The list of lessons, and a prediction in the first one."""
+    for name, size in (("lesson-small", SMALL), ("lesson", MIDDLE)):
+        app = Workbench(config=Config(), first=ShowLessons(bundled()[0]))
+        async with app.run_test(size=size) as pilot:
+            await drawn(pilot)
+            screen = pilot.app.screen
+            assert isinstance(screen, LessonScreen)
+            while screen.course.step < 5 or screen.course.page.chosen is None:
+                await press(pilot, "c" if screen.course.step == 5 else "s", *["enter"] * (screen.course.step < 5))
+            await take(pilot, name)
+            if name == "lesson":
+                await press(pilot, "escape")
+                await take(pilot, "lessons")
+
+
+async def drawn(pilot: Pilot[int]) -> None:
+    """Waits for the map."""
+    await until(pilot, lambda: any(each.picture is not None for each in pilot.app.screen.query(WorldMap)))
 
 
 # The run of the ditch.

@@ -16,6 +16,7 @@ import click
 from ddenv.cli.certify_command import certify_command
 from ddenv.cli.config_command import config_command
 from ddenv.cli.export_command import export_command
+from ddenv.cli.learn_command import learn_command
 from ddenv.cli.open_command import open_command
 from ddenv.cli.options import given_reading, reading_options
 from ddenv.cli.report_command import report_command
@@ -99,6 +100,7 @@ for command in (
     test_command,
     export_command,
     report_command,
+    learn_command,
     study_command,
     schemas_command,
     serve_command,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import time
 from collections.abc import Iterator
@@ -10,6 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ddenv.errors import UserError
+
+try:
+    import fcntl
+except ImportError:
+    # Windows: runs can be viewed there, but no engine works.
+    fcntl = None  # type: ignore[assignment]
 
 
 def _lock_path(run: Path) -> Path:
@@ -29,6 +34,8 @@ def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
     """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made."""
+    if fcntl is None:
+        raise UserError(f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows")
     try:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
@@ -47,6 +54,8 @@ def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
 
 def engine_is_alive(run: Path) -> bool:
     """Whether an engine is working on the run now."""
+    if fcntl is None:
+        return False
     try:
         handle = os.open(_lock_path(run), os.O_RDONLY)
     except OSError:

@@ -126,6 +126,11 @@ class Position:
         return self.end if self.at is None else self.state(self.at)
 
     @property
+    def ids(self) -> Sequence[int]:
+        """The ids of all events, in order."""
+        return self._ids[1:]
+
+    @property
     def place(self) -> tuple[int, int]:
         """The number of the position's moment, and of how many."""
         moments = self._stops["moment"]

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ddenv.amounts import first_of
+from ddenv.runfile.position import Moment
 from ddenv.runfile.state import FRESH, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
+
+OF_TESTS = ("test_started", "test_finished", "test_lost", "implied")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,3 +48,15 @@ def made_for(state: RunState, test: Test) -> Candidate | Trial | None:
     if current is None or test.round != current.number or test.candidate is None:
         return None
     return current.candidates[test.candidate] if 0 <= test.candidate < len(current.candidates) else None
+
+
+def pointed(moment: Moment) -> Candidate | None:
+    """The candidate that a moment is about; None if it is about none."""
+    state, data = moment.after, moment.event.data
+    if state.round is None:
+        return None
+    if moment.event.kind in OF_TESTS:
+        row = made_for(state, state.tests[data["test"] - 1])
+        return row if isinstance(row, Candidate) else None
+    index = data.get("candidate")
+    return state.round.candidates[index] if type(index) is int else None

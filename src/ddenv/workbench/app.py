@@ -18,7 +18,7 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.messages import Attention, ShowRun, ShowSetup
+from ddenv.workbench.messages import Attention, ShowLesson, ShowLessons, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 from ddenv.workbench.wording import plain
@@ -46,7 +46,7 @@ class Workbench(App[int]):
     """Starts at the setup screen, or attached to a run. Raises UserError for a file that is not a run.
 
     `reading` holds the command line's options on how to read worlds, `file` is a scenario or world to start
-    with. With `watch` the run is only watched, never guided.
+    with. With `watch` the run is only watched, never guided. `first` is another screen to start at.
     """
 
     TITLE = "ddenv"
@@ -101,6 +101,7 @@ class Workbench(App[int]):
         watch: bool = False,
         config: Config | None = None,
         file: Path | None = None,
+        first: ShowLessons | ShowLesson | None = None,
     ) -> None:
         super().__init__()
         self._written = Written()
@@ -110,7 +111,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
-        self._first = ShowSetup(file=file) if run is None else ShowRun(run, watch)
+        self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.run.observed import Observed
 
@@ -146,11 +147,19 @@ class Workbench(App[int]):
 
     # The screens.
 
-    def _screen_for(self, asked: ShowRun | ShowSetup) -> Screen[Any]:
+    def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson) -> Screen[Any]:
         if isinstance(asked, ShowRun):
             from ddenv.workbench.run.run_screen import RunScreen
 
             return RunScreen(asked.run, asked.engine, asked.watch)
+        if isinstance(asked, ShowLessons):
+            from ddenv.workbench.learn.lessons_screen import LessonsScreen
+
+            return LessonsScreen(asked.opens)
+        if isinstance(asked, ShowLesson):
+            from ddenv.workbench.learn.lesson_screen import LessonScreen
+
+            return LessonScreen(asked.run)
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
         return SetupScreen(self._reading, asked.like, asked.file)
@@ -188,6 +197,13 @@ class Workbench(App[int]):
 
         if not any(isinstance(screen, RunsScreen) for screen in self.screen_stack):
             self.push_screen(RunsScreen())
+
+    def action_lessons(self) -> None:
+        """The list of lessons, above the screen that asks for it."""
+        from ddenv.workbench.learn.lessons_screen import LessonsScreen
+
+        if not any(isinstance(screen, LessonsScreen) for screen in self.screen_stack):
+            self.push_screen(LessonsScreen())
 
     def action_leave(self) -> None:
         """Quits at once. An engine keeps running, and the terminal shows how to attach again."""

@@ -11,6 +11,7 @@ from typing import Any
 from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.config import read_config
+from ddenv.workbench.messages import ShowLesson, ShowLessons
 from ddenv.workbench.terminal.themes import fitting
 
 # One character of each kind that is drawn.
@@ -23,13 +24,14 @@ def run_workbench(
     *,
     watch: bool = False,
     file: Path | None = None,
+    first: ShowLessons | ShowLesson | None = None,
 ) -> int:
     """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal.
 
-    It opens on `run`, on the setup screen with a scenario's or a world's `file`, or else on the setup screen.
+    It opens on the screen `first`, on `run`, on the setup screen with a scenario's or a world's `file`, or on the setup screen.
     """
     config = read_config()
-    app = Workbench(run, reading, watch=watch, config=config, file=file)
+    app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
     check_terminal()
     if not config.theme:
         app.theme = fitting(app.console.color_system)

@@ -7,8 +7,9 @@ from array import array
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Moment, Position, Step
-from ddenv.runfile.state import Candidate, RunState, Test
-from ddenv.runfile.tested import made_for, purpose
+from ddenv.runfile.state import RunState, Test
+from ddenv.runfile.store import RunFile
+from ddenv.runfile.tested import OF_TESTS, pointed, purpose
 from ddenv.runfile.working import spent
 from ddenv.words import news
 from ddenv.workbench.run.poll import Poll, Snapshot
@@ -22,7 +23,6 @@ NO_MORE = {
     "reduction": "there is no reduction before this moment",
     "decision": "there is no verdict before this moment",
 }
-OF_TESTS = ("test_started", "test_finished", "test_lost", "implied")
 # Paths of tests that are kept.
 PATHS = 16
 
@@ -33,7 +33,7 @@ class Browsing:
     def __init__(self, poll: Poll) -> None:
         self._poll = poll
         self.position = Position(poll.file.events)
-        self._paths: dict[int, array[float] | None] = {}
+        self._moments = Moments(poll.file)
         self._shown: tuple[int | None, Snapshot] = (None, Snapshot())
 
     @property
@@ -60,10 +60,19 @@ class Browsing:
             return self._poll.snapshot
         if self._shown[0] != at:
             moment = self.position.moment(at)
-            self._shown = at, Snapshot() if moment is None else self._of(moment)
+            self._shown = at, Snapshot() if moment is None else self._moments.of(moment, happened(moment))
         return self._shown[1]
 
-    def _of(self, moment: Moment) -> Snapshot:
+
+class Moments:
+    """Snapshots of moments of a run, with the paths that their maps show."""
+
+    def __init__(self, file: RunFile) -> None:
+        self._file = file
+        self._paths: dict[int, array[float] | None] = {}
+
+    def of(self, moment: Moment, words: str) -> Snapshot:
+        """The snapshot of a moment in which happened what the `words` say."""
         state = moment.after
         first = state.f_test.id if state.f_test is not None else None
         return Snapshot(
@@ -72,8 +81,8 @@ class Browsing:
             spent=_spent(state),
             original=self._path(first),
             past=True,
-            pointed=_pointed(moment),
-            happened=happened(moment),
+            pointed=pointed(moment),
+            happened=words,
         )
 
     def _path(self, test: int | None) -> array[float] | None:
@@ -83,7 +92,7 @@ class Browsing:
             while len(self._paths) >= PATHS:
                 del self._paths[next(iter(self._paths))]
             try:
-                self._paths[test] = self._poll.file.motion(test)
+                self._paths[test] = self._file.motion(test)
             except UserError:
                 # The map is good for much without it.
                 return None
@@ -95,25 +104,14 @@ def _spent(state: RunState) -> int:
     return int(spent(state, state.updated_at))
 
 
-def _pointed(moment: Moment) -> Candidate | None:
-    """The candidate that a moment is about."""
-    state, data = moment.after, moment.event.data
-    if state.round is None:
-        return None
-    if moment.event.kind in OF_TESTS:
-        row = made_for(state, state.tests[data["test"] - 1])
-        return row if isinstance(row, Candidate) else None
-    index = data.get("candidate")
-    return state.round.candidates[index] if type(index) is int else None
-
-
 def happened(moment: Moment) -> str:
     """What happened in a moment, with its time of day."""
     at = time.strftime("%H:%M:%S", time.localtime(moment.event.time))
-    return f"{at}, after {count(moment.after.tests_done, 'test')}: {_words(moment)}."
+    return f"{at}, after {count(moment.after.tests_done, 'test')}: {what_happened(moment)}."
 
 
-def _words(moment: Moment) -> str:
+def what_happened(moment: Moment) -> str:
+    """The same in a few words, without the time."""
     kind, state = moment.event.kind, moment.after
     if kind in OF_TESTS:
         return _of_test(state, state.tests[moment.event.data["test"] - 1])

@@ -205,6 +205,9 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     candidate = snapshot.focus
     if candidate is None or candidate.verdict:
         candidate = next((each for each in current.candidates if not each.verdict), None)
+    if shown := next((each for each in current.candidates if each.verdict == "similar"), None):
+        words = f"{shown.label} shows f: {_ended(state, shown, options)}"
+        return "waiting", (words, "The first candidate that shows f becomes E, and the round ends.")
     if candidate is None:
         return "nothing", _nothing_found(state, current, options)
     running = [test for test in snapshot.running if test.round == current.number and test.candidate == candidate.index]
@@ -222,9 +225,13 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
 
 def _next(state: RunState, candidate: Candidate, place: str, options: Settings) -> str:
     if shown := _shown_of(state, candidate):
+        if options.accept_rate == "first" and _last(state, candidate) == _last(state, candidate, "similar"):
+            return f"{place}: {shown}, and the first time decides."
         return f"Next is one more run of {place}: {shown}."
-    if not 0 < len(candidate.tests) <= options.iterations:
+    if not candidate.tests:
         return f"Next is {place}."
+    if len(candidate.tests) > options.iterations:
+        return f"f did not show in {count(len(candidate.tests), 'test')} of {place}."
     again = _why_again(_last(state, candidate))
     return f"Next is re-run {len(candidate.tests)} of {options.iterations} of {place}: {again}"
 

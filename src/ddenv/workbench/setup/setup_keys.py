@@ -42,6 +42,7 @@ KEYS: list[BindingType] = [
     Binding("f3", "pane('map')", "map", id="setup.map", tooltip="to the map", show=False),
     Binding("f4", "pane('settings')", "settings", id="setup.settings", tooltip="to the settings", show=False),
     Binding("R", "app.runs", "runs", id="setup.runs", tooltip="the list of all runs", show=False),
+    Binding("L", "app.lessons", "lessons", id="setup.lessons", tooltip="lessons on delta debugging", show=False),
     Binding("f1,question_mark", "app.help", "help", id="setup.help", tooltip="show every key", key_display="?"),
     Binding("escape", "home", "back", id="setup.home", tooltip="stop picking; back to the list of files", show=False),
     Binding("q", "app.leave", "quit", id="setup.quit", tooltip="leave"),

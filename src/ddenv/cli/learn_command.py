@@ -1,0 +1,113 @@
+"""`ddenv learn`: lessons, and any run step by step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ddenv.errors import UserError
+
+
+@click.command("learn")
+@click.argument("lesson", metavar="[LESSON_OR_RUN]", required=False)
+@click.option("--list", "listed", is_flag=True, help="Print the lessons, with how far you are.")
+@click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own; prints what is wrong with it.")
+@click.option("--new", type=Path, metavar="FILE", help="Write a lesson to start from; --run is the run it shows.")
+@click.option("--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson.")
+@click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
+def learn_command(
+    lesson: str | None, listed: bool, check: Path | None, new: Path | None, run: str | None, page: Path | None
+) -> int:
+    """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions. They need no Drake.
+
+    LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn' alone shows the list.
+    """
+    asked = [
+        name for name, value in (("--list", listed), ("--check", check), ("--new", new), ("--page", page)) if value
+    ]
+    if len(asked) > 1:
+        raise UserError(f"{' and '.join(asked)}: give one of them")
+    if run is not None and new is None:
+        raise UserError("--run: only with --new")
+    if listed:
+        return _list()
+    if check is not None:
+        return _check(check)
+    if new is not None:
+        return _new(new, run)
+    if page is not None:
+        return _page(lesson, page)
+    return _open(lesson)
+
+
+def _list() -> int:
+    from ddenv.learn.shelf import bundled, open_lesson
+    from ddenv.workbench.learn.progress import all_scores, in_words
+
+    scores = all_scores()
+    for number, file in enumerate(bundled(), 1):
+        lesson = open_lesson(file).lesson
+        print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name), lesson.asked)}")
+    return 0
+
+
+def _check(file: Path) -> int:
+    from ddenv.learn.shelf import open_lesson
+
+    lesson = open_lesson(file).lesson
+    print(f"{file}: {len(lesson.steps)} steps, {lesson.asked} questions, no mistake found")
+    return 0
+
+
+def _new(file: Path, run: str | None) -> int:
+    from ddenv.learn.template import write_template
+    from ddenv.runs.folder import find_run
+
+    if run is None:
+        raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
+    for path in write_template(file, find_run(run)):
+        print(f"wrote {path}")
+    return 0
+
+
+def _page(name: str | None, file: Path) -> int:
+    from ddenv.learn.handout import handout
+    from ddenv.learn.shelf import open_lesson
+    from ddenv.page.html import html
+    from ddenv.world.files.access import write_file
+
+    if file.suffix.lower() not in (".html", ".htm"):
+        raise UserError(f"--page: {file}: must end in .html")
+    if file.exists():
+        raise UserError(f"--page: {file}: exists already; choose another name")
+    write_file(file, html(handout(open_lesson(_lesson(name or "")))).encode())
+    print(f"wrote {file}")
+    return 0
+
+
+def _lesson(name: str) -> Path:
+    from ddenv.learn.shelf import find_lesson
+
+    file = find_lesson(name)
+    if file is None:
+        raise UserError(f"no lesson {name!r}; 'ddenv learn --list' shows them")
+    return file
+
+
+def _open(name: str | None) -> int:
+    from ddenv.learn.shelf import find_lesson, open_lesson
+    from ddenv.runs.folder import find_run
+    from ddenv.workbench.launch import run_workbench
+    from ddenv.workbench.messages import ShowLesson, ShowLessons
+
+    if name is None:
+        return run_workbench(first=ShowLessons())
+    if (lesson := find_lesson(name)) is not None:
+        # Opened before the screen, so that a mistake in it is one line in the terminal.
+        open_lesson(lesson)
+        return run_workbench(first=ShowLessons(lesson))
+    path = find_run(name)
+    if not path.is_file():
+        raise UserError(f"no lesson or run {name!r}; 'ddenv learn --list' and 'ddenv runs' list them")
+    return run_workbench(first=ShowLesson(path))

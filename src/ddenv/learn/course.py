@@ -1,0 +1,199 @@
+"""A student's way through a lesson, or freely through a run: what is shown, asked, answered and skipped. No screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from ddenv.learn.foretelling import Foretelling, at_hand, foretelling
+from ddenv.learn.lesson import Answer, Question
+from ddenv.learn.markup import Block, blocks
+from ddenv.learn.score import Score, summary
+from ddenv.learn.shelf import Opened
+from ddenv.runfile.position import Position, Step
+
+FREE = (
+    "Step through the run: forward, back, to the next decision, to the next reduction. The marked line of the algorithm acts; "
+    "the variables have the values of this moment. Press `p` to predict what comes next."
+)
+LETTERS = "abcdef"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """An open question. Its `key` is for the score; once it is answered, the event `until` is shown, and `then` is asked."""
+
+    key: str
+    question: Question
+    until: int | None = None
+    then: Question | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None while it is open."""
+
+    text: tuple[Block, ...]
+    question: Question | None = None
+    chosen: int | None = None
+    hint: bool = False
+
+    @property
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """What is right or wrong about the answers, once one is given: (letter and answer, why)."""
+        if self.question is None or self.chosen is None:
+            return ()
+        order = [self.chosen, *range(len(self.question.answers))]
+        found: dict[str, str] = {}
+        for place in dict.fromkeys(each for each in order if each >= 0):
+            answer = self.question.answers[place]
+            found.setdefault(answer.why, f"{LETTERS[place]} {'✓' if answer.right else '✗'}")
+        return tuple((mark, why) for why, mark in found.items())
+
+
+class Course:
+    """At a step of the lesson `opened`, or anywhere in a run without one. The event `at` is shown."""
+
+    def __init__(self, position: Position, opened: Opened | None = None, score: Score | None = None) -> None:
+        self.position, self._opened = position, opened
+        self.score = score or Score()
+        self.step = 0
+        self._asked: Asked | None = None
+        self._chosen: int | None = None
+        self._hint = False
+        position.go(position.ids[0])
+        if opened is None:
+            position.step("moment", 1)
+        else:
+            self._come(min(self.score.step, self.last))
+
+    @property
+    def at(self) -> int:
+        """The event that is shown."""
+        return self.position.end.revision if self.position.at is None else self.position.at
+
+    @property
+    def last(self) -> int:
+        """The number of the last step: after all of the lesson's own comes the summary."""
+        return 0 if self._opened is None else len(self._opened.lesson.steps)
+
+    @property
+    def page(self) -> Page:
+        """What is shown beside the run."""
+        question = None if self._asked is None else self._asked.question
+        return Page(blocks(self._text()), question, self._chosen, self._hint)
+
+    def _text(self) -> str:
+        if self._opened is None:
+            return FREE
+        if self.step == self.last:
+            return "\n\n".join(summary(self._opened.lesson, self.score))
+        return self._said(self._opened.lesson.steps[self.step].text)
+
+    def _said(self, words: str) -> str:
+        if self._opened is None:
+            return words
+        return self._opened.text(words, self._opened.places[min(self.step, self.last - 1)])
+
+    # Moves in the lesson.
+
+    def go_on(self) -> bool:
+        """To what comes next. False at the end, or while a question is open that should be answered or skipped."""
+        if self._asked is not None and self._chosen is None:
+            return False
+        if self._asked is not None and self._asked.then is not None:
+            self._asked, self._chosen, self._hint = Asked(f"{self._asked.key}.reason", self._asked.then), None, False
+            return True
+        if self._asked is not None and self._opened is None:
+            self._asked = self._chosen = None
+            return True
+        if self.step >= self.last:
+            return False
+        self._come(self.step + 1)
+        return True
+
+    def back(self) -> bool:
+        """To the step before; False at the first one."""
+        if self.step == 0:
+            return False
+        self._come(self.step - 1)
+        return True
+
+    def answer(self, place: int) -> Answer | None:
+        """Gives an answer; None if no question is open or it has no such answer."""
+        if self._asked is None or self._chosen is not None or not 0 <= place < len(self._asked.question.answers):
+            return None
+        answer = self._asked.question.answers[place]
+        self.score = self.score.with_answer(self._asked.key, answer)
+        self._settle(place)
+        return answer
+
+    def skip(self) -> bool:
+        """Shows the answer of an open question without a score; False if none is open."""
+        if self._asked is None or self._chosen is not None:
+            return False
+        # A skipped prediction has no reason to give.
+        self._asked = replace(self._asked, then=None)
+        self._settle(-1)
+        return True
+
+    def hint(self) -> bool:
+        """Shows the hint of an open question; False if there is none."""
+        if self._asked is None or self._chosen is not None or not self._asked.question.hint:
+            return False
+        self._hint = True
+        return True
+
+    def _settle(self, place: int) -> None:
+        self._chosen = place
+        if self._asked is not None and self._asked.until is not None:
+            self.position.go(self._asked.until)
+
+    def _come(self, step: int) -> None:
+        self.step, self._asked, self._chosen, self._hint = step, None, None, False
+        self.score = self.score.at(step, self.last)
+        if self._opened is None or step == self.last:
+            return
+        here = self._opened.lesson.steps[step]
+        self.position.go(self._opened.places[step])
+        if here.question is not None:
+            self._asked = Asked(str(step), _filled(here.question, self._said))
+        elif here.foretell is not None:
+            found = foretelling(self.position, self._opened.places[step], here.foretell)
+            if found is not None:
+                self._asked = _asked(str(step), found)
+
+    # Moves in the run.
+
+    def move(self, what: Step, by: int) -> bool:
+        """To another moment of the run; False if there is none. In a free walk it closes an answered question."""
+        if not self.position.step(what, by):
+            return False
+        if self._opened is None:
+            self._asked, self._chosen, self._hint = None, None, False
+        return True
+
+    def foretell(self) -> bool:
+        """Asks for a prediction of what comes next in the run; False if nothing is left to foretell."""
+        for id in self._ahead():
+            moment = self.position.moment(id)
+            what = None if moment is None else at_hand(moment)
+            found = None if what is None else foretelling(self.position, id, what)
+            if found is not None:
+                self.position.go(id)
+                self._asked, self._chosen, self._hint = _asked(f"free.{id}", found), None, False
+                return True
+        return False
+
+    def _ahead(self) -> Iterator[int]:
+        return (id for id in self.position.ids if id >= self.at)
+
+
+def _asked(key: str, found: Foretelling) -> Asked:
+    return Asked(key, found.question, found.until, found.reason)
+
+
+def _filled(question: Question, said: Callable[[str], str]) -> Question:
+    """The question with its figures; `said` fills them in."""
+    answers = tuple(replace(each, text=said(each.text), why=said(each.why)) for each in question.answers)
+    return Question(said(question.text), answers, said(question.hint))

@@ -1,0 +1,199 @@
+"""Reads a lesson from its YAML file: plain data, checked key by key, with the line of what is wrong. Nothing in it is ever run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import yaml
+
+from ddenv.errors import UserError
+from ddenv.learn import figures
+from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Foretold, Lesson, Question, Step
+from ddenv.learn.places import Places
+from ddenv.schemas import nearest
+from ddenv.world.files.access import read_bytes
+
+LONGEST = 1_000_000  # bytes of a lesson's file
+ANSWERS = (2, 6)
+_KEYS = ("title", "aim", "minutes", "run", "oracle", "steps")
+_STEP = ("text", "at", "ask", "hint", "answers", "foretell")
+_ANSWER = ("say", "why", "right", "misconception")
+
+
+def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
+    """The lesson in `file`; `places` opens its run. Raises UserError: file, line, key, what is wrong."""
+    content = read_bytes(file)
+    if len(content) > LONGEST:
+        raise UserError(f"{file}: is larger than {LONGEST // 1000} kB")
+    try:
+        root = yaml.compose(content, Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise UserError(f"{file}{line}: not valid YAML: {getattr(error, 'problem', None) or 'not text'}") from None
+    except RecursionError:
+        raise UserError(f"{file}: not valid YAML: nested too deeply") from None
+    top = _Node(file, root, "").keys(_KEYS)
+    for key in ("title", "aim", "run", "steps"):
+        top.need(key)
+    run = _beside(top.at["run"])
+    oracle = _beside(top.at["oracle"]) if "oracle" in top.at else None
+    found = top.at["run"].tried(lambda: places(run))
+    return Lesson(
+        file,
+        top.at["title"].words(),
+        top.at["aim"].words(),
+        top.at["minutes"].whole() if "minutes" in top.at else 10,
+        run,
+        oracle,
+        tuple(_step(each, found) for each in top.at["steps"].entries()),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A value of the file, with the key that leads to it."""
+
+    file: Path
+    node: Any
+    key: str
+
+    @property
+    def line(self) -> int:
+        return 1 if self.node is None else int(self.node.start_mark.line) + 1
+
+    def wrong(self, why: str) -> UserError:
+        key = f" {self.key}:" if self.key else ""
+        return UserError(f"{self.file}:{self.line}:{key} {why}")
+
+    def tried(self, call: Callable[[], Any]) -> Any:
+        """What `call` returns; an error gets the file, the line and the key."""
+        try:
+            return call()
+        except UserError as error:
+            raise self.wrong(str(error)) from None
+
+    def keys(self, known: tuple[str, ...]) -> _Keys:
+        if not isinstance(self.node, yaml.MappingNode):
+            raise self.wrong(f"expected keys such as {', '.join(known[:3])}")
+        found: dict[str, _Node] = {}
+        for key, value in self.node.value:
+            name = str(key.value)
+            path = f"{self.key}.{name}" if self.key else name
+            one = _Node(self.file, value, path)
+            if name not in known:
+                mine = _Node(self.file, key, path[:80])
+                raise mine.wrong(f"unknown key{nearest(name, known)}; allowed are {', '.join(known)}")
+            if name in found:
+                raise _Node(self.file, key, path).wrong("stands twice")
+            found[name] = one
+        return _Keys(self, found)
+
+    def entries(self) -> list[_Node]:
+        if not isinstance(self.node, yaml.SequenceNode) or not self.node.value:
+            raise self.wrong("expected a list with at least one entry")
+        return [_Node(self.file, each, f"{self.key}[{place}]") for place, each in enumerate(self.node.value, 1)]
+
+    def raw(self) -> str:
+        if not isinstance(self.node, yaml.ScalarNode) or not self.node.value.strip():
+            raise self.wrong("expected a text")
+        return str(self.node.value)
+
+    def words(self) -> str:
+        """A text for readers."""
+        text = self.raw()
+        self.tried(lambda: figures.check(text))
+        return text
+
+    def whole(self) -> int:
+        text = self.raw()
+        if not text.isascii() or not text.isdigit() or not 0 < int(text[:9]) <= 600:
+            raise self.wrong(f"expected a number from 1 to 600, found {text[:20]!r}")
+        return int(text)
+
+    def flag(self) -> bool:
+        text = self.raw().lower()
+        if text not in ("true", "false"):
+            raise self.wrong(f"expected true or false, found {text[:20]!r}")
+        return text == "true"
+
+    def one_of(self, known: tuple[str, ...]) -> str:
+        text = self.raw()
+        if text not in known:
+            raise self.wrong(f"{text[:40]!r} is not allowed{nearest(text, known)}; use one of {', '.join(known)}")
+        return text
+
+
+@dataclass(frozen=True, slots=True)
+class _Keys:
+    node: _Node
+    at: Mapping[str, _Node]
+
+    def need(self, key: str) -> _Node:
+        if key not in self.at:
+            raise self.node.wrong(f"the key '{key}' is missing")
+        return self.at[key]
+
+
+def _beside(node: _Node) -> Path:
+    """A file in the lesson's own folder."""
+    name = node.raw()
+    if Path(name).name != name or name in (".", ".."):
+        raise node.wrong(f"{name[:60]!r} is not in the lesson's folder; give the name of a file beside the lesson")
+    path = node.file.parent / name
+    if not path.is_file():
+        raise node.wrong(f"there is no file {name[:60]!r} beside the lesson")
+    return path
+
+
+def _step(node: _Node, places: Places) -> Step:
+    keys = node.keys(_STEP)
+    at = keys.at.get("at")
+    if "ask" in keys.at and "foretell" in keys.at:
+        raise keys.at["ask"].wrong("a step asks or foretells, not both")
+    for key in ("answers", "hint"):
+        if key in keys.at and "ask" not in keys.at:
+            raise keys.at[key].wrong("belongs to a question; the key 'ask' is missing")
+    foretell: Foretold | None = None
+    if "foretell" in keys.at:
+        foretell = _foretold(keys.at["foretell"])
+        if at is None:
+            raise keys.at["foretell"].wrong("needs the key 'at': the place before it happens")
+        wanted = "test" if foretell == "outcome" else "round"
+        if not at.raw().startswith(wanted):
+            raise at.wrong(f"to foretell the {foretell} it must be a {wanted}")
+    return Step(
+        keys.need("text").words(),
+        None if at is None else int(at.tried(lambda: places.event(at.raw()))),
+        _question(keys) if "ask" in keys.at else None,
+        foretell,
+        node.line,
+    )
+
+
+def _foretold(node: _Node) -> Foretold:
+    known: tuple[Foretold, ...] = get_args(Foretold)
+    text = node.one_of(known)
+    return next(each for each in known if each == text)
+
+
+def _question(keys: _Keys) -> Question:
+    entries = keys.need("answers").entries()
+    answers = tuple(_answer(each) for each in entries)
+    if not ANSWERS[0] <= len(answers) <= ANSWERS[1]:
+        raise keys.at["answers"].wrong(f"expected {ANSWERS[0]} to {ANSWERS[1]} answers, found {len(answers)}")
+    if (right := sum(answer.right for answer in answers)) != 1:
+        raise keys.at["answers"].wrong(f"expected exactly one answer that is right, found {right}")
+    return Question(keys.at["ask"].words(), answers, keys.at["hint"].words() if "hint" in keys.at else "")
+
+
+def _answer(node: _Node) -> Answer:
+    keys = node.keys(_ANSWER)
+    right = keys.at["right"].flag() if "right" in keys.at else False
+    belief = keys.at["misconception"].one_of(tuple(MISCONCEPTIONS)) if "misconception" in keys.at else ""
+    if right and belief:
+        raise keys.at["misconception"].wrong("the right answer has none")
+    return Answer(keys.need("say").words(), right, keys.need("why").words(), belief)

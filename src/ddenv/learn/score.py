@@ -1,0 +1,78 @@
+"""A student's answers in a lesson: what was right, the streak, and the misconceptions seen. Plain data, kept as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Lesson
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """`step` is where the student is. `answered` has for each question, by a key such as "3.reason", whether it was right."""
+
+    step: int = 0
+    done: bool = False
+    answered: Mapping[str, bool] = field(default_factory=dict)
+    streak: int = 0
+    best: int = 0
+    misconceptions: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def right(self) -> int:
+        """How many answers were right."""
+        return sum(self.answered.values())
+
+    def with_answer(self, key: str, answer: Answer) -> Score:
+        """After an answer. Only the first answer to a question counts."""
+        if key in self.answered:
+            return self
+        streak = self.streak + 1 if answer.right else 0
+        beliefs = dict(self.misconceptions)
+        if answer.misconception:
+            beliefs[answer.misconception] = beliefs.get(answer.misconception, 0) + 1
+        return replace(
+            self,
+            answered={**self.answered, key: answer.right},
+            streak=streak,
+            best=max(self.best, streak),
+            misconceptions=beliefs,
+        )
+
+    def at(self, step: int, last: int) -> Score:
+        """At a step of a lesson whose last step is `last`."""
+        return replace(self, step=step, done=self.done or step >= last)
+
+
+def data_of(score: Score) -> dict[str, Any]:
+    """As JSON."""
+    return asdict(score) | {"answered": dict(score.answered), "misconceptions": dict(score.misconceptions)}
+
+
+def score_of(data: Any) -> Score:
+    """What was kept; an empty score for anything else."""
+    if not isinstance(data, dict):
+        return Score()
+    try:
+        answered = {str(key)[:40]: value is True for key, value in dict(data["answered"]).items()}
+        beliefs = {key: int(number) for key, number in dict(data["misconceptions"]).items() if key in MISCONCEPTIONS}
+        step, streak, best = (max(0, int(data[key])) for key in ("step", "streak", "best"))
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return Score()
+    return Score(step, data.get("done") is True, answered, streak, best, beliefs)
+
+
+def summary(lesson: Lesson, score: Score) -> list[str]:
+    """The end of a lesson, in sentences."""
+    skipped = max(0, lesson.asked - len(score.answered))
+    lines = [f"You answered {score.right} of {lesson.asked} questions right; {skipped} skipped."]
+    if score.best > 1:
+        lines.append(f"Your longest streak: {score.best} right answers in a row.")
+    if not score.misconceptions and score.answered:
+        lines.append("No typical misconception was seen.")
+    for name, _ in sorted(score.misconceptions.items(), key=lambda item: -item[1]):
+        belief, instead = MISCONCEPTIONS[name]
+        lines.append(f"One of your answers {belief}. {instead}")
+    return lines

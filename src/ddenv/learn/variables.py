@@ -1,0 +1,84 @@
+"""The variables of Algorithm 1 at a moment of a run, with their values, and which of them just changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ddenv.amounts import count
+from ddenv.runfile.events import DEEDS
+from ddenv.runfile.position import Moment
+from ddenv.runfile.state import REFUSED, Candidate, RunState, Test
+from ddenv.runfile.tested import pointed
+
+SIGNS = {"similar": "●", "other": "◇", "pass": "○", "error": "✗", "timeout": "◷", "running": "▶"}
+VERDICTS = {"similar": "●", "dissimilar": "○", "missed": "○", "unknown": "✗"} | dict.fromkeys(REFUSED, "⊘")
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """`value` is "" as long as it has none."""
+
+    name: str
+    value: str
+    changed: bool = False
+
+
+def variables(moment: Moment) -> tuple[Variable, ...]:
+    """E, n_partitions, subenvironments, s, result, results, in the order of the algorithm."""
+    candidate = pointed(moment)
+    now = _values(moment.after, candidate)
+    earlier = None if candidate is None or moment.before.round is None else _same(moment.before, candidate)
+    before = _values(moment.before, earlier)
+    return tuple(Variable(name, value, value != before[name]) for name, value in now.items())
+
+
+def _same(before: RunState, candidate: Candidate) -> Candidate | None:
+    """The candidate as it was before, if it is one of the same round."""
+    round = before.round
+    if round is None or round.split is not candidate.split or candidate.index >= len(round.candidates):
+        return None
+    return round.candidates[candidate.index]
+
+
+def _values(state: RunState, candidate: Candidate | None) -> dict[str, str]:
+    round = state.round
+    tests = () if candidate is None else _tests(state, candidate)
+    finished = [test for test in tests if test.is_finished]
+    return {
+        "E": f"{count(len(state.environment), 'model')}: {_names(state.environment)}" if state.nodes else "",
+        "n_partitions": "" if round is None else str(round.n_partitions),
+        "subenvironments": "" if round is None else _line(round.candidates, candidate),
+        "s": "" if candidate is None else f"{candidate.label} = {_names(candidate.models)}",
+        "result": "" if not tests else _result(tests[-1]),
+        "results": " ".join(SIGNS.get(test.outcome, "?") for test in finished),
+    }
+
+
+def _tests(state: RunState, candidate: Candidate) -> Sequence[Test]:
+    return [state.tests[id - 1] for id in candidate.tests if 0 < id <= len(state.tests)]
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(names) or "no models"
+
+
+def _line(candidates: Sequence[Candidate], current: Candidate | None) -> str:
+    """All candidates in short, with their verdicts; the current one between brackets. `-A` is all without A."""
+    said = []
+    for one in candidates:
+        letter = one.label.rpartition(" ")[2]
+        words = f"{letter if one.kind == 'partition' else f'-{letter}'}{VERDICTS.get(one.verdict, '')}"
+        said.append(f"[{words}]" if current is not None and one.index == current.index else words)
+    return " ".join(said)
+
+
+def _result(test: Test) -> str:
+    """How a test ended, in words; `result` is empty while it runs."""
+    if test.outcome in ("running", "lost"):
+        return "..."
+    if test.outcome == "pass":
+        return "the goal was reached"
+    how = test.failure if test.failure in DEEDS else test.outcome
+    away = "" if test.distance is None else f", {test.distance:.1f} m from f's end"
+    return f"{'f again' if test.outcome == 'similar' else 'not f'}: {how}{away}"

@@ -1,0 +1,279 @@
+"""A lesson on the screen: the map and Algorithm 1 of a recorded run, its variables, and the lesson's texts and questions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual import work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Container, Vertical
+from textual.screen import Screen
+from textual.widgets import Static
+
+from ddenv.errors import UserError
+from ddenv.learn.course import Course
+from ddenv.learn.shelf import Opened
+from ddenv.learn.variables import variables
+from ddenv.runfile.position import Position, Step
+from ddenv.workbench.background import call_if_open
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.learn.lesson_pane import LessonPane
+from ddenv.workbench.learn.progress import all_scores, keep_score
+from ddenv.workbench.learn.variables_pane import Variables
+from ddenv.workbench.map.map_words import MapLines
+from ddenv.workbench.map.place import Place, place_of_run
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.browsing import Moments, what_happened
+from ddenv.workbench.run.happening import Happening
+from ddenv.workbench.run.observed import Observed
+from ddenv.workbench.wording import plain
+
+SMALLEST = (64, 20)
+SHOWN = (
+    *(
+        "lesson.on",
+        "lesson.back",
+        "lesson.skip",
+        "lesson.hint",
+        "lesson.run_back",
+        "lesson.run_on",
+        "lesson.next_decision",
+    ),
+    *("lesson.next_reduction", "lesson.predict", "lesson.variables", "lesson.help", "lesson.close"),
+)
+FIRST = (
+    *("lesson.help", "lesson.close", "lesson.on", "lesson.skip", "lesson.run_back", "lesson.run_on", "lesson.predict"),
+    *("lesson.hint", "lesson.variables", "lesson.next_reduction", "lesson.next_decision", "lesson.back"),
+)
+
+
+def _answer(place: int) -> Binding:
+    letter = "abcdef"[place]
+    return Binding(
+        letter, f"answer({place})", letter, id=f"lesson.{letter}", tooltip=f"give answer {letter}", show=False
+    )
+
+
+class LessonScreen(Screen[None]):
+    """A lesson from where the student left it; or any run step by step. Leaving it keeps the student's place and answers."""
+
+    CSS_PATH = "learn.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
+    AUTO_FOCUS = "LessonPane"
+    BINDINGS: ClassVar = [
+        Binding(
+            "enter,space",
+            "on",
+            "go on",
+            id="lesson.on",
+            tooltip="on to what comes next in the lesson",
+            key_display="enter",
+        ),
+        Binding("backspace", "back", "step back", id="lesson.back", tooltip="back to the step before"),
+        Binding("s", "skip", "skip", id="lesson.skip", tooltip="skip the question: shows the answer, without a score"),
+        Binding("h", "hint", "hint", id="lesson.hint", tooltip="show a hint for the question"),
+        Binding(
+            "left", "move('moment', -1)", "run back", id="lesson.run_back", tooltip="the run: one moment back"
+        ),
+        Binding("right", "move('moment', 1)", "run on", id="lesson.run_on", tooltip="the run: one moment on"),
+        Binding(
+            "right_parenthesis",
+            "move('decision', 1)",
+            "verdict",
+            id="lesson.next_decision",
+            tooltip="the run: to the next verdict",
+        ),
+        Binding(
+            "left_parenthesis",
+            "move('decision', -1)",
+            id="lesson.decision_before",
+            tooltip="the run: to the verdict before",
+            show=False,
+        ),
+        Binding(
+            "right_curly_bracket",
+            "move('reduction', 1)",
+            "reduction",
+            id="lesson.next_reduction",
+            tooltip="the run: to the next reduction",
+        ),
+        Binding(
+            "left_curly_bracket",
+            "move('reduction', -1)",
+            id="lesson.reduction_before",
+            tooltip="the run: to the reduction before",
+            show=False,
+        ),
+        Binding("p", "predict", "predict", id="lesson.predict", tooltip="predict what comes next in the run"),
+        Binding(
+            "v",
+            "variables",
+            "variables",
+            id="lesson.variables",
+            tooltip="the variables in place of the map (80 columns)",
+        ),
+        *(_answer(place) for place in range(6)),
+        Binding("question_mark,f1", "app.help", "help", id="lesson.help", tooltip="show every key", key_display="?"),
+        Binding(
+            "escape,q", "close", "leave", id="lesson.close", tooltip="leave; your place is kept", key_display="esc"
+        ),
+    ]
+
+    def __init__(self, run: Path, opened: Opened | None = None) -> None:
+        """The lesson `opened`, whose run is `run`; without one the run alone. Raises UserError for a damaged run."""
+        super().__init__()
+        self._run, self._opened = run, opened
+        self._file = Observed(run)
+        self._moments = Moments(self._file)
+        if opened is None:
+            position, score = Position(self._file.events), None
+            position.catch_up()
+            if not position.ids:
+                raise UserError(f"{run}: has no events yet")
+        else:
+            position, score = opened.position, all_scores().get(opened.lesson.name)
+        self.course = Course(position, opened, score)
+        self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
+
+    def compose(self) -> ComposeResult:
+        yield Static("", id="lesson-header", markup=False)
+        with Container(id="lesson-body"):
+            with _panel("lesson-world", "World"):
+                yield self._map
+                yield self._legend
+            with _panel("lesson-now", "Algorithm"):
+                yield Happening(id="lesson-happening")
+            with _panel("lesson-variables-panel", "Variables now"):
+                yield Variables(id="lesson-variables")
+            with _panel("lesson-panel", "Lesson" if self._opened else "This run"):
+                yield LessonPane()
+        yield KeyFooter(SHOWN, FIRST)
+        yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
+
+    def on_mount(self) -> None:
+        self._show()
+        # What it needs takes long to load: the first paint comes before.
+        self.call_after_refresh(self._read_world)
+
+    def on_unmount(self) -> None:
+        self._file.close()
+
+    @work(thread=True, group="world", exclusive=True)
+    def _read_world(self) -> None:
+        try:
+            place, notice = place_of_run(self._run), ""
+        except UserError as error:
+            place, notice = Place(), str(error)
+        call_if_open(self, self._map.set_place, place, notice)
+
+    # What is shown.
+
+    def _show(self) -> None:
+        self._show_run()
+        self.query_one(LessonPane).show(self.course.page)
+        self.query_one("#lesson-header", Static).update(self._heading())
+        if self._opened is not None:
+            keep_score(self._opened.lesson.name, self.course.score)
+
+    def _show_run(self) -> None:
+        try:
+            moment = self.course.position.moment(self.course.at)
+        except UserError as error:
+            self.notify(str(error), severity="warning", markup=False)
+            return
+        if moment is None:
+            return
+        words = what_happened(moment)
+        snapshot = self._moments.of(moment, f"{words[:1].upper()}{words[1:].rstrip('.')}.")
+        self.query_one(Happening).show(snapshot)
+        self.query_one(Variables).show(variables(moment))
+        self._map.show(snapshot, snapshot.pointed)
+        self._legend.show(0, snapshot.pointed, (), self._map.legend)
+        number, all_moments = self.course.position.place
+        self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
+
+    def _heading(self) -> Text:
+        course, score = self.course, self.course.score
+        left = f" {plain(self._run.stem)}, step by step"
+        if self._opened is not None:
+            last = course.step == course.last
+            place = "summary" if last else f"step {course.step + 1} of {course.last}"
+            left = f" {plain(self._opened.lesson.title)} · {place}"
+        right = f"{score.right} of {len(score.answered)} right"
+        right += f" · {score.streak} in a row" if score.streak > 1 else ""
+        right = right if score.answered else ""
+        room = max(1, self.size.width - len(right) - 2)
+        text = Text(left, "bold", no_wrap=True)
+        text.truncate(room, overflow="ellipsis", pad=True)
+        return text.append(f" {right} ", "not bold")
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._show)
+
+    # What is done.
+
+    def action_on(self) -> None:
+        if self.course.go_on():
+            self._show()
+        elif self.course.page.question is not None and self.course.page.chosen is None:
+            self._say("choose an answer by its letter, or skip the question with s")
+        elif self._opened is None:
+            self.action_move("moment", 1)
+        else:
+            self._say("this is the end of the lesson: escape leaves it, backspace goes back")
+
+    def action_back(self) -> None:
+        if self.course.back():
+            self._show()
+        else:
+            self._say("the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run")
+
+    def action_answer(self, place: int) -> None:
+        if self.course.answer(place) is not None:
+            self._show()
+
+    def action_skip(self) -> None:
+        if self.course.skip():
+            self._show()
+        else:
+            self._say("no question is open")
+
+    def action_hint(self) -> None:
+        if self.course.hint():
+            self._show()
+        else:
+            self._say("there is no hint here")
+
+    def action_move(self, what: Step, by: int) -> None:
+        if self.course.move(what, by):
+            self._show()
+        else:
+            self._say("this is the end of the run" if by > 0 else "there is none before this moment")
+
+    def action_predict(self) -> None:
+        if self.course.foretell():
+            self._show()
+        else:
+            self._say("nothing is left to predict: go back in the run first")
+
+    def action_variables(self) -> None:
+        self.toggle_class("-variables")
+
+    def action_close(self) -> None:
+        if len(self.app.screen_stack) > 2:
+            self.dismiss(None)
+        else:
+            self.app.exit(0)
+
+    def _say(self, why: str) -> None:
+        self.notify(why, timeout=3, markup=False)
+
+
+def _panel(id: str, title: str) -> Vertical:
+    panel = Vertical(id=id, classes="panel")
+    panel.border_title = title
+    return panel

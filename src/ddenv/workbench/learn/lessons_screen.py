@@ -1,0 +1,108 @@
+"""The list of lessons, with how far the student is in each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.screen import Screen
+from textual.widgets import OptionList, Static
+
+from ddenv.errors import UserError
+from ddenv.learn.lesson import Lesson
+from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.learn.progress import all_scores, in_words
+from ddenv.workbench.wording import plain, shorten
+
+SHOWN = ("lessons.open", "lessons.help", "lessons.back")
+
+
+class LessonsScreen(Screen[None]):
+    """Enter opens a lesson where it was left."""
+
+    CSS_PATH = "learn.tcss"
+    BINDINGS: ClassVar = [
+        Binding("enter", "open", "open", id="lessons.open", tooltip="open the lesson where you left it", priority=True),
+        Binding("question_mark,f1", "app.help", "help", id="lessons.help", tooltip="show every key", key_display="?"),
+        Binding("escape,q", "back", "back", id="lessons.back", tooltip="back, or leave", key_display="esc"),
+    ]
+
+    def __init__(self, opens: Path | None = None) -> None:
+        """`opens` is the file of the lesson to begin with."""
+        super().__init__()
+        self._opens = opens
+        self._lessons: list[Lesson] = []
+
+    def compose(self) -> ComposeResult:
+        heading = Text(" Lessons", "bold").append("  each with a recorded run: no Drake, no internet", "not bold")
+        yield Static(heading, id="lessons-header")
+        with Vertical(id="lessons-panel", classes="panel") as panel:
+            panel.border_title = "Lessons"
+            yield OptionList(id="lessons-list")
+        with Vertical(classes="panel", id="lesson-about-panel") as panel:
+            panel.styles.height = 8
+            panel.border_title = "Its aim"
+            yield Static("", id="lesson-about", markup=False)
+        yield KeyFooter(SHOWN, SHOWN)
+
+    def on_mount(self) -> None:
+        for file in bundled():
+            try:
+                self._lessons.append(open_lesson(file).lesson)
+            except UserError as error:
+                self.notify(str(error), severity="warning", markup=False)
+        self._fill()
+        self.query_one(OptionList).focus()
+        if self._opens is not None:
+            self._open(self._opens)
+
+    def on_screen_resume(self) -> None:
+        if self._lessons:
+            self._fill()
+
+    def on_resize(self) -> None:
+        self._fill()
+
+    def _fill(self) -> None:
+        options, scores = self.query_one(OptionList), all_scores()
+        at = options.highlighted or 0
+        width = max(30, self.size.width - 40)
+        options.clear_options()
+        for number, lesson in enumerate(self._lessons, 1):
+            row = f"{number}  {shorten(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name), lesson.asked)}"
+            options.add_option(Text(row, no_wrap=True))
+        if self._lessons:
+            options.highlighted = min(at, len(self._lessons) - 1)
+
+    def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
+        lesson = self._lessons[event.option_index]
+        about = Text(f"{plain(lesson.aim)}\n", "").append(f"About {lesson.minutes} minutes.", "dim")
+        self.query_one("#lesson-about", Static).update(about)
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        self._open(self._lessons[event.option_index].file)
+
+    def action_open(self) -> None:
+        place = self.query_one(OptionList).highlighted
+        if place is not None:
+            self._open(self._lessons[place].file)
+
+    def _open(self, file: Path) -> None:
+        from ddenv.workbench.learn.lesson_screen import LessonScreen
+
+        try:
+            opened = open_lesson(file)
+            self.app.push_screen(LessonScreen(opened.lesson.run, opened))
+        except UserError as error:
+            self.notify(str(error), severity="warning", markup=False)
+
+    def action_back(self) -> None:
+        if len(self.app.screen_stack) > 2:
+            self.dismiss(None)
+        else:
+            self.app.exit(0)

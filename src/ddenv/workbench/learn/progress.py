@@ -1,0 +1,30 @@
+"""What a student did in each lesson, as the workbench remembers it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ddenv.learn.score import Score, data_of, score_of
+from ddenv.workbench.setup.remembered import read_state, write_state
+
+FILE = "lessons.json"
+
+
+def all_scores() -> dict[str, Score]:
+    """The scores by the lessons' names."""
+    kept = read_state(FILE)
+    return {str(name): score_of(data) for name, data in kept.items()} if isinstance(kept, dict) else {}
+
+
+def keep_score(lesson: str, score: Score) -> None:
+    """Remembers it, if it can be written."""
+    scores: Mapping[str, Score] = {**all_scores(), lesson: score}
+    write_state(FILE, {name: data_of(each) for name, each in scores.items()})
+
+
+def in_words(score: Score | None, asked: int) -> str:
+    """How far a student is, for a list."""
+    if score is None or not (score.step or score.answered):
+        return "not begun"
+    state = "done" if score.done else f"at step {score.step + 1}"
+    return f"{state}, {score.right} of {asked} right"

@@ -1,0 +1,35 @@
+"""The lessons that come with ddenv, for tests of all of them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from ddenv.learn.course import Course
+from ddenv.learn.score import Score
+from ddenv.learn.shelf import LESSONS, Opened, bundled, open_lesson
+
+FILES = bundled()
+RUNS = sorted(LESSONS.glob("*.ddenv"))
+
+
+@cache
+def opened(number: int) -> Opened:
+    return open_lesson(FILES[number])
+
+
+def course(number: int, score: Score | None = None) -> Course:
+    lesson = opened(number)
+    return Course(lesson.position, lesson, score)
+
+
+def through(walk: Course, answer) -> Course:
+    """Goes to the end; `answer(question)` returns the place of an answer, or None to skip."""
+    for _ in range(500):
+        if walk.step == walk.last:
+            return walk
+        question = walk.page.question
+        if question is not None and walk.page.chosen is None:
+            place = answer(question)
+            assert walk.skip() if place is None else walk.answer(place)
+        assert walk.go_on()
+    raise AssertionError("the lesson has no end")

@@ -1,0 +1,128 @@
+"""The lessons that come with ddenv: whole, true, small, and free of everything that only some systems have."""
+
+import os
+import subprocess
+import sys
+import zipfile
+
+import pytest
+from docs.lessons import delivery
+
+from ddenv.learn.handout import handout
+from ddenv.learn.oracle import read_oracle
+from ddenv.learn.score import Score, data_of, score_of, summary
+from ddenv.learn.shelf import LESSONS
+from ddenv.page.html import html
+from ddenv.runfile.position import position_in
+from ddenv.runfile.store import RunFile
+from ddenv.runfile.tested import purpose
+from tests.learn.lessons import FILES, course, opened, through
+
+NUMBERS = range(len(FILES))
+by_stem = lambda number: FILES[number].stem  # noqa: E731
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
+def test_right_answers_lead_to_the_end_with_all_points(number):
+    end = through(course(number), lambda question: question.right)
+    assert end.score.done
+    assert end.score.right == len(end.score.answered) == opened(number).lesson.asked == end.score.best
+    assert summary(opened(number).lesson, end.score)[-1] == "No typical misconception was seen."
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
+def test_wrong_answers_lead_there_too_and_name_what_was_mixed_up(number):
+    def wrong(question):
+        return next(place for place in range(len(question.answers)) if place != question.right)
+
+    end = through(course(number), wrong)
+    assert end.score.done and end.score.right == 0 and end.score.best == 0
+    assert len(end.score.misconceptions) >= 3
+    assert len([line for line in summary(opened(number).lesson, end.score) if "One of your answers" in line]) >= 3
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
+def test_everything_can_be_skipped(number):
+    end = through(course(number), lambda question: None)
+    assert end.score.done and not end.score.answered
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
+def test_every_wrong_answer_says_what_is_wrong_with_it(number):
+    walk = course(number)
+    while walk.step < walk.last:
+        if walk.page.question is not None and walk.page.chosen is None:
+            question = walk.page.question
+            assert sum(each.right for each in question.answers) == 1
+            assert all(each.why and each.text and "{" not in each.text + each.why for each in question.answers)
+            walk.answer(question.right)
+            assert walk.page.remarks
+        walk.go_on()
+
+
+def test_answers_are_kept_and_count_once():
+    walk = course(0)
+    walk.score = Score()
+    while walk.page.question is None:
+        walk.go_on()
+    question = walk.page.question
+    walk.answer((question.right + 1) % len(question.answers))
+    again = course(0, score_of(data_of(walk.score)))
+    assert again.step == walk.step
+    again.answer(question.right)
+    assert again.score.right == 0 and len(again.score.answered) == 1
+    assert score_of({"step": "x"}) == score_of(None) == Score()
+
+
+def test_the_oracle_of_the_toy_world_knows_every_part_and_agrees_with_the_run():
+    oracle = read_oracle(LESSONS / "delivery.oracle.json")
+    with RunFile(LESSONS / "delivery.ddenv") as file:
+        position = position_in(file.events())
+    tests = [test for test in position.end.tests if test.outcome in ("similar", "other", "pass")]
+    assert len(tests) > 100
+    for test in tests:
+        models = purpose(position.start_of(test.id).after, test).models
+        assert oracle.outcome(models) == delivery.outcome(models) == test.outcome
+    assert {frozenset(kept) for kept in oracle.minimal} == {
+        frozenset({"sign", "crate"}),
+        frozenset({"sign", "barrel", "cone"}),
+    }
+    assert len(oracle.showing) == sum(
+        delivery.outcome([name for bit, name in enumerate(oracle.models) if number >> bit & 1]) == "similar"
+        for number in range(2 ** len(oracle.models))
+    )
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
+def test_a_lesson_has_a_page_to_hand_out(number):
+    page = html(handout(opened(number)))
+    assert opened(number).lesson.title in page
+    assert "<svg" in page and "{" not in page.partition("</style>")[2]
+
+
+def test_all_lessons_together_are_small(tmp_path):
+    with zipfile.ZipFile(tmp_path / "wheel.zip", "w", zipfile.ZIP_DEFLATED) as wheel:
+        for file in LESSONS.iterdir():
+            wheel.write(file, file.name)
+    assert (tmp_path / "wheel.zip").stat().st_size < 2_000_000
+
+
+def test_lessons_and_runs_need_neither_drake_nor_what_windows_lacks(tmp_path):
+    code = """
+import sys, asyncio
+for name in ("pydrake", "fcntl", "termios", "sklearn"):
+    sys.modules[name] = None
+import tests.learn.without_drake as tried
+asyncio.run(tried.main())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={
+            **os.environ,
+            "DDENV_HOME": str(tmp_path),
+            "TEXTUAL_DRIVER": "textual.drivers.headless_driver:HeadlessDriver",
+        },
+    )
+    assert done.stdout.strip().endswith("all shown"), done.stdout + done.stderr

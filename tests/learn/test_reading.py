@@ -1,0 +1,93 @@
+"""A broken lesson: file, line, key, and what is wrong, in one line."""
+
+import re
+import shutil
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.errors import UserError
+from ddenv.learn import figures
+from ddenv.learn.shelf import LESSONS, open_lesson
+from ddenv.learn.template import write_template
+
+GOOD = """\
+title: A title
+aim: An aim.
+run: delivery.ddenv
+steps:
+  - at: test 4
+    text: There are {models} models.
+    foretell: outcome
+  - text: Now.
+    ask: What?
+    answers:
+      - say: this
+        right: true
+        why: because
+      - say: that
+        why: because not
+        misconception: part
+"""
+WRONG = [
+    ("title: A title\n", "", 1, "the key 'title' is missing"),
+    ("aim: An aim.", "aims: An aim.", 2, "aims: unknown key (did you mean aim?)"),
+    ("There are {models} models", "There are 8 models", 6, "steps[1].text: '8' is a bare figure"),
+    ("{models}", "{model}", 6, "unknown figure '{model}'"),
+    ("{models}", "{__import__('os')}", 6, "unknown figure"),
+    ("test 4", "test 999", 5, "steps[1].at: the run has no test 999; the last one is test"),
+    ("- at: test 4", "- at: test four", 5, "'test four' is no place in a run; expected start"),
+    ("test 4", "round 1", 5, "to foretell the outcome it must be a test"),
+    ("foretell: outcome", "foretell: all", 7, "use one of outcome, winner, parts"),
+    ("right: true", "right: maybe", 12, "steps[2].answers[1].right: expected true or false"),
+    ("        right: true\n", "", 11, "expected exactly one answer that is right, found 0"),
+    ("misconception: part", "misconception: parts", 16, "use one of part, proof"),
+    ("run: delivery.ddenv", "run: ../delivery.ddenv", 3, "is not in the lesson's folder"),
+    ("run: delivery.ddenv", "run: nothing.ddenv", 3, "there is no file 'nothing.ddenv' beside the lesson"),
+    ("steps:", "steps: {}\nmore:", 5, "more: unknown key"),
+    ("    ask: What?\n", "", 10, "belongs to a question; the key 'ask' is missing"),
+    ("Now.", "The {smallest} of all.", 8, "needs an oracle"),
+    ("title: A title", "title: [", 3, "not valid YAML"),
+    ("title: A title", "title: !!python/object/apply:os.system [ls]", 1, "title: expected a text"),
+]
+
+
+def lesson(folder, text):
+    shutil.copy(LESSONS / "delivery.ddenv", folder)
+    file = folder / "mine.yaml"
+    file.write_text(text)
+    return file
+
+
+def test_a_good_lesson_is_read(tmp_path):
+    assert len(open_lesson(lesson(tmp_path, GOOD)).lesson.steps) == 2
+
+
+@pytest.mark.parametrize(("old", "new", "line", "words"), WRONG, ids=[each[3][:40] for each in WRONG])
+def test_a_mistake_is_one_line_with_its_place(tmp_path, old, new, line, words):
+    assert old in GOOD
+    file = lesson(tmp_path, GOOD.replace(old, new, 1))
+    with pytest.raises(UserError) as error:
+        open_lesson(file)
+    assert str(error.value).startswith(f"{file}:{line}"), error.value
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@given(st.text(alphabet="ab{}_.()[]'1 models\n:-", max_size=40))
+def test_a_text_is_never_more_than_a_text(text):
+    try:
+        figures.check(text)
+    except UserError:
+        return
+    filled = figures.filled(text, {"models": "8"})
+    assert re.sub("8", "", filled) == text.replace("{models}", "")
+
+
+def test_a_new_lesson_is_whole(tmp_path):
+    file, run = write_template(tmp_path / "mine.yaml", LESSONS / "delivery.ddenv")
+    assert run.is_file()
+    assert open_lesson(file).lesson.asked == 4
+    with pytest.raises(UserError, match="exists already"):
+        write_template(file, LESSONS / "delivery.ddenv")
