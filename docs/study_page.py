@@ -1,10 +1,10 @@
 """Writes the results of studies into the pages: tables between marks in docs/study.md and README.md, and the first study's figures.
 
-    python -m docs.study_page SEEDS [AS_PRINTED [ALL]]
+    python -m docs.study_page SEEDS[,SEEDS...] [AS_PRINTED [ALL]]
 
-These are folders of `ddenv study`: with --seeds 3; as printed in the paper; and with --pairs all --algorithms all. The tables of a
-folder that is not given stay as they are. A mark is <!-- NAME --> ... <!-- end -->. The README's `headline` has the ranges of the
-table `nine`.
+These are folders of `ddenv study`: with --seeds, several for several scenarios; as printed in the paper; and with --pairs all
+--algorithms all. The tables of a folder that is not given stay as they are. A mark is <!-- NAME --> ... <!-- end -->. The README's
+`headline` has the ranges of the table `nine`.
 """
 
 from __future__ import annotations
@@ -26,21 +26,22 @@ TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 def main() -> None:
     if not 2 <= len(sys.argv) <= 4:
         sys.exit(__doc__)
-    nine, *others = (Path(name) for name in sys.argv[1:])
+    nine = [Path(name) for name in sys.argv[1].split(",")]
+    others = [Path(name) for name in sys.argv[2:]]
     tables = {
         "nine": _scenarios(nine, NUMBERS),
         "behind": _scenarios(nine, BEHIND),
-        "made": _table(nine, "How it was made", 1),
+        "made": _table(nine[-1], "How it was made", 1),
     }
     tables["headline"] = headline(tables["nine"])
     if others:
-        tables["printed"] = _scenarios(others[0], NUMBERS)
+        tables["printed"] = _scenarios([others[0]], NUMBERS)
     if len(others) > 1:
         tables["best"] = _table(others[1], "Which is best where", 0)
     for page in (STUDY, README):
         page.write_text(filled(page.read_text(), tables))
     FIGURES.mkdir(exist_ok=True)
-    for picture in sorted(nine.glob("study.figure-*.svg")):
+    for picture in sorted(path for study in nine for path in study.glob("study.figure-*.svg")):
         (FIGURES / picture.name.removeprefix("study.")).write_text(picture.read_text())
 
 
@@ -100,10 +101,10 @@ def _table(study: Path, title: str, number: int) -> str:
     return _tables(_sections(study)[title])[number]
 
 
-def _scenarios(study: Path, number: int) -> str:
+def _scenarios(studies: list[Path], number: int) -> str:
     """The tables of all scenarios as one, with a column that names them."""
     lines: list[str] = []
-    for name, part in _sections(study).items():
+    for name, part in (section for study in studies for section in _sections(study).items()):
         if " models" not in part.partition("\n")[0]:
             continue
         head, sides, *rows = _tables(part)[number].splitlines()
