@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
+from ddenv.runfile.store import Event
 
 EXPECTED = "expected start, baseline, round N, test N, result N, reduction N or end"
 
@@ -13,35 +15,29 @@ EXPECTED = "expected start, baseline, round N, test N, result N, reduction N or 
 class Places:
     """Finds the events of a run by the words of a lesson."""
 
-    def __init__(self, position: Position) -> None:
-        self._position = position
-        self._found: dict[tuple[str, int], int] = {}
-        self._note()
-
-    def _note(self) -> None:
-        """Goes through the run once."""
-        position, reductions = self._position, 0
-        for id in position.ids:
-            moment = position.moment(id)
-            if moment is None:
-                continue
-            kind, data = moment.event.kind, moment.event.data
-            if kind in ("test_started", "implied"):
-                self._found["test", len(moment.after.tests)] = id
-            if kind == "implied":
-                self._found["result", len(moment.after.tests)] = id
-            if kind == "test_finished":
-                self._found["result", int(data["test"])] = id
-            if kind == "round_started" and moment.after.round is not None:
-                self._found["round", moment.after.round.number] = id
-            if kind == "baseline_finished":
-                self._found["baseline", 0] = id
-            if kind == "engine_started":
-                self._found.setdefault(("start", 0), id)
-            if len(moment.after.environment) < len(moment.before.environment):
-                reductions += 1
-                self._found["reduction", reductions] = id
-            self._found["end", 0] = id
+    def __init__(self, position: Position, events: Sequence[Event]) -> None:
+        """`events` are all of those that the position was made of."""
+        found: dict[tuple[str, int], int] = {}
+        tests = 0
+        for event in events:
+            if event.kind in ("test_started", "implied"):
+                tests += 1
+                found["test", tests] = event.id
+            if event.kind == "implied":
+                found["result", tests] = event.id
+            elif event.kind == "test_finished":
+                found["result", int(event.data["test"])] = event.id
+            elif event.kind == "baseline_finished":
+                found["baseline", 0] = event.id
+            elif event.kind == "engine_started":
+                found.setdefault(("start", 0), event.id)
+        for chapter in position.chapters:
+            if chapter.kind == "round":
+                found["round", chapter.number] = chapter.first
+        for number, id in enumerate(position.stops("reduction"), 1):
+            found["reduction", number] = id
+        found["end", 0] = position.end.revision
+        self._found = found
 
     def event(self, words: str) -> int:
         """The event that `words` name. Raises UserError."""

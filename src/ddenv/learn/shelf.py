@@ -60,8 +60,9 @@ def open_lesson(file: Path) -> Opened:
 
     def places(run: Path) -> Places:
         with RunFile(run) as content:
-            opened.append(position_in(content.events()))
-        return Places(opened[0])
+            events = content.events()
+        opened.append(position_in(events))
+        return Places(opened[0], events)
 
     lesson = read_lesson(file, places)
     oracle = None if lesson.oracle is None else read_oracle(lesson.oracle)

@@ -125,6 +125,10 @@ class Position:
         """The state at the position."""
         return self.end if self.at is None else self.state(self.at)
 
+    def stops(self, what: Step) -> Sequence[int]:
+        """The events that a step of this kind goes to, but for the end."""
+        return [each.last for each in self.chapters] if what == "round" else self._stops[what]
+
     @property
     def ids(self) -> Sequence[int]:
         """The ids of all events, in order."""
@@ -175,7 +179,7 @@ class Position:
 
     def step(self, what: Step, by: int) -> bool:
         """Goes to the next of these (`by` 1) or to the one before (-1); False if there is none. After the last comes the end."""
-        stops = array("q", (each.last for each in self.chapters)) if what == "round" else self._stops[what]
+        stops = self.stops(what)
         here = self._ids[-1] if self.at is None else self.at
         if by < 0:
             place = bisect_left(stops, here) - 1

@@ -76,9 +76,7 @@ class LessonScreen(Screen[None]):
         Binding("backspace", "back", "step back", id="lesson.back", tooltip="back to the step before"),
         Binding("s", "skip", "skip", id="lesson.skip", tooltip="skip the question: shows the answer, without a score"),
         Binding("h", "hint", "hint", id="lesson.hint", tooltip="show a hint for the question"),
-        Binding(
-            "left", "move('moment', -1)", "run back", id="lesson.run_back", tooltip="the run: one moment back"
-        ),
+        Binding("left", "move('moment', -1)", "run back", id="lesson.run_back", tooltip="the run: one moment back"),
         Binding("right", "move('moment', 1)", "run on", id="lesson.run_on", tooltip="the run: one moment on"),
         Binding(
             "right_parenthesis",
@@ -230,7 +228,9 @@ class LessonScreen(Screen[None]):
         if self.course.back():
             self._show()
         else:
-            self._say("the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run")
+            self._say(
+                "the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run"
+            )
 
     def action_answer(self, place: int) -> None:
         if self.course.answer(place) is not None:
