@@ -24,7 +24,8 @@ from textual.pilot import Pilot
 from textual.widgets import Select
 
 from ddenv.guiding.selections import nearest_other
-from ddenv.learn.shelf import bundled
+from ddenv.learn.score import Score
+from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import RunState
@@ -32,6 +33,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
 from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.messages import ShowLessons
@@ -103,6 +105,10 @@ PICTURES = {
     "lessons": Picture("LessonsScreen", "The list of lessons"),
     "lesson": Picture("LessonScreen", "A lesson"),
     "lesson-small": Picture("LessonScreen", "A lesson at 80x24"),
+    "try": Picture("TryScreen", "A search of one's own, half done"),
+    "try-end": Picture("TryScreen", "Its end: the verdict, side by side with the algorithms"),
+    "race": Picture("RaceScreen", "A race of four algorithms"),
+    "race-small": Picture("RaceScreen", "The end of a race at 80x24"),
 }
 
 
@@ -155,17 +161,55 @@ async def teach() -> None:
             await drawn(pilot)
             screen = pilot.app.screen
             assert isinstance(screen, LessonScreen)
-            while screen.course.step < 5 or screen.course.page.chosen is None:
-                await press(pilot, "c" if screen.course.step == 5 else "s", *["enter"] * (screen.course.step < 5))
+            while screen.course.step < 6 or screen.course.page.chosen is None:
+                await press(pilot, "c" if screen.course.step == 6 else "s", *["enter"] * (screen.course.step < 6))
             await take(pilot, name)
             if name == "lesson":
                 await press(pilot, "escape")
                 await take(pilot, "lessons")
+    await search_and_race()
+
+
+async def search_and_race() -> None:
+    """A student's own search in the first lesson, and its race."""
+    steps = open_lesson(bundled()[0]).lesson.steps
+    alone = next(number for number, step in enumerate(steps) if step.budget)
+    race = next(number for number, step in enumerate(steps) if step.race)
+    async with in_lesson(alone, MIDDLE) as pilot:
+        await press(pilot, "enter")
+        await drawn(pilot)
+        world = pilot.app.screen.query_one(WorldMap)
+        for models in ({"bench", "plant"}, {"sign"}, {"crate"}):
+            world.select(models)
+            await press(pilot, "w")
+        world.go_to("pallet")
+        world.select({"pallet", "bin"})
+        await take(pilot, "try")
+        await press(pilot, "w", "m", "m")
+        await take(pilot, "try-end")
+    for name, size, keys in (("race", MIDDLE, ["right"] * 5), ("race-small", SMALL, ["end"])):
+        async with in_lesson(race, size) as pilot:
+            await press(pilot, "d", "enter")
+            await drawn(pilot)
+            await press(pilot, *keys)
+            await take(pilot, name)
+
+
+@asynccontextmanager
+async def in_lesson(step: int, size: tuple[int, int]) -> AsyncIterator[Pilot[int]]:
+    """The first lesson at one of its steps."""
+    lesson = open_lesson(bundled()[0]).lesson
+    keep_score(lesson.name, Score(step=step))
+    app = Workbench(config=Config(), first=ShowLessons(lesson.file))
+    async with app.run_test(size=size) as pilot:
+        await drawn(pilot)
+        yield pilot
 
 
 async def drawn(pilot: Pilot[int]) -> None:
-    """Waits for the map."""
-    await until(pilot, lambda: any(each.picture is not None for each in pilot.app.screen.query(WorldMap)))
+    """Waits for the maps, if there is room for them."""
+    maps = pilot.app.screen.query(WorldMap)
+    await until(pilot, lambda: all(each.picture is not None or not each.display for each in maps))
 
 
 # The run of the ditch.

@@ -13,9 +13,16 @@ from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.workbench import fake_run
+from tests.workbench import fake_moments, fake_run
 
-SCENES = (fake_run.mid_round, fake_run.waiting, fake_run.guided, fake_run.certifying, fake_run.finished, fake_run.piled)
+SCENES = (
+    fake_moments.mid_round,
+    fake_moments.waiting,
+    fake_moments.guided,
+    fake_moments.certifying,
+    fake_moments.finished,
+    fake_moments.piled,
+)
 NUMBERS = (
     *(1e300, -1e300, 1e18, -1e18, 1e9, 1e-300, -0.0, 0, -1, 2, 2**31, 2**63, 10**30, 10**400),
     *(math.nan, math.inf, -math.inf),

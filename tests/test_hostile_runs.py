@@ -1,9 +1,12 @@
 """Whatever values a stored run has, it opens in every viewer, or says in a line that it is damaged."""
 
 import os
+import shutil
+from contextlib import suppress
 
 import pytest
 from rich.cells import cell_len
+from textual.worker import WorkerCancelled
 
 from ddenv.errors import UserError
 from ddenv.page.html import html
@@ -15,13 +18,14 @@ from ddenv.runfile.store import RunFile
 from ddenv.scene.player import Player
 from ddenv.scene.stage import Stage
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.learn.race_screen import race_of_runs
 from ddenv.workbench.messages import ShowRun
 from tests.hostile_runs import hostile_run, templates
 from tests.tiers import slow
 
 # A batch of runs is one test.
-SIZE = 20
-BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "5"))), but=[0])
+SIZE = 5
+BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0])
 KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape")
 
 
@@ -89,3 +93,30 @@ async def test_the_workbench_stands(hostile, batch):
                     assert all(cell_len(line) == size[0] for line in lines), seed
     except Exception as error:
         raise AssertionError(f"run {now}") from error
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+async def test_races_stand(hostile, batch):
+    size = (120, 36) if batch % 2 else (80, 24)
+    app = Workbench()
+    async with app.run_test(size=size) as pilot:
+        for seed, path in hostile(batch):
+            copy = path.with_name(f"[b]{path.name}")
+            shutil.copy(path, copy)
+            try:
+                race = race_of_runs([path, copy])
+            except UserError as error:
+                assert "\n" not in str(error)
+                continue
+            except Exception as error:
+                raise AssertionError(f"run {seed}") from error
+            app.push_screen(race)
+            await pilot.pause()
+            # The setup screen below replaces its workers while it reads.
+            with suppress(WorkerCancelled):
+                await app.workers.wait_for_complete()
+            await pilot.press("right", "end", "home")
+            lines = ["".join(each.text for each in strip) for strip in app.screen._compositor.render_strips()]
+            assert all(cell_len(line) == size[0] for line in lines), seed
+            await pilot.press("escape")
+            assert app.is_running, seed

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from collections import Counter
 
 from tests.conftest import ROOT
 
@@ -35,3 +36,8 @@ def test_the_first_paint_of_a_run_waits_for_no_slow_import():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_no_two_files_have_one_name():
+    names = Counter(path.name for path in (ROOT / "src").rglob("*.py") if not path.name.startswith("__"))
+    assert not {name: count for name, count in names.items() if count > 1}

@@ -1,5 +1,6 @@
-"""How many cores a process may use: its affinity, and the limits of its control groups."""
+"""How many cores and how much memory a process may use: its affinity, and the limits of its control groups."""
 
+import math
 import os
 
 import pytest
@@ -57,3 +58,24 @@ def test_the_limit_of_a_group_of_version_1(usable, folder, quota, cores):
 def test_on_this_machine_there_are_cores_and_a_name():
     assert 1 <= processor.usable_cores() <= (os.cpu_count() or 1)
     assert processor.name() == " ".join(processor.name().split())
+
+
+MEMORY = "MemTotal:  16000 kB\nMemFree:  1 kB\nMemAvailable:   9000 kB\nHugePages_Total:       0"
+
+
+@pytest.mark.parametrize(
+    ("group", "limits", "found"),
+    [
+        ("0::/", {}, (16000, 9000)),
+        ("0::/a/b", {"a/memory.max": "4096000", "a/memory.current": "1024000", "a/b/memory.max": "max"}, (4000, 3000)),
+        ("0::/", {"memory.max": "99999999999", "memory.current": "1"}, (16000, 9000)),
+        (VERSION_1, {"memory/memory.limit_in_bytes": "2048000", "memory/memory.usage_in_bytes": "4096000"}, (2000, 0)),
+    ],
+)
+def test_the_memory_is_that_of_the_smallest_group(usable, tmp_path, group, limits, found):
+    usable(group, {"proc/meminfo": MEMORY} | {f"sys/fs/cgroup/{name}": text for name, text in limits.items()})
+    assert (processor.usable_memory(tmp_path), processor.free_memory(tmp_path)) == tuple(1024 * kb for kb in found)
+
+
+def test_a_system_that_does_not_tell_its_memory(tmp_path):
+    assert processor.usable_memory(tmp_path) == processor.free_memory(tmp_path) == math.inf

@@ -15,7 +15,7 @@ settings.register_profile(
     "quick", max_examples=10, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 # The examples are always the same: what fails here fails again, and a change is judged by what it changes.
-settings.register_profile("thorough", settings.get_profile("quick"), max_examples=60)
+settings.register_profile("thorough", settings.get_profile("quick"), max_examples=40)
 # New examples each time: finds what the others miss.
 settings.register_profile("random", settings.get_profile("thorough"), derandomize=False)
 

@@ -1,7 +1,7 @@
-"""Records the runs that the lessons show, and the outcome of every part of the first lesson's world.
+"""Records the runs that the lessons show, and what is known of every part of two toy worlds.
 
-    python -m docs.lessons.record delivery          the toy world: two minutes
-    python -m docs.lessons.record ditch             with Drake: half an hour
+    python -m docs.lessons.record             all of them: an hour, of it half an hour for `ditch`
+    python -m docs.lessons.record quay-kept   one of them, by the name of its file
 
 Of the trajectories only those are kept that a map shows, so that all lessons fit in the package.
 """
@@ -14,98 +14,169 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
+import yaml
 from docs.lessons.delivery import outcome
+from docs.lessons.quay import rate
+from docs.lessons.toys import DELIVERY, QUAY, TOYS, Box, Toy
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 
 HERE = Path(__file__).resolve().parent
 LESSONS = HERE.parents[1] / "src/ddenv/learn/lessons"
-# Name, x, y, size along x and y, m. Walls and island always stay.
-WALLS = (("wall_left", 0, 2.6, 14, 0.3), ("wall_right", 0, -2.6, 14, 0.3), ("island", 1, 0, 4.6, 0.5))
-MODELS = (
-    ("bench", -5.2, 1.6, 1.2, 0.6),
-    ("sign", -2.9, 1.9, 0.4, 0.4),
-    ("plant", -3.9, -1.9, 0.7, 0.7),
-    ("crate", 0.75, 1.4, 0.5, 1.8),
-    ("barrel", 1.5, 1.85, 0.9, 0.9),
-    ("cone", 1.5, 0.85, 0.7, 0.7),
-    ("pallet", 1.9, -1.4, 1.2, 1.8),
-    ("bin", 5.2, -1.7, 0.8, 0.8),
-)
-SCENARIO = {
-    "name": "delivery",
-    "description": "A delivery robot drives from one end of a yard to the other. It gets stuck in the left lane.",
-    "world": "world.sdf",
-    "robot": {"model": "robot.sdf", "spawn": {"x": -6.0, "y": 0.0, "z": 0.2}},
-    "goal": {"x": 6.0, "y": 0.0, "tolerance": 0.3},
-    "oracle": {"command": "./delivery.py {world}"},
-    "failure": {"timeout": 40, "epsilon": 0.5},
-    "reduction": {"as_printed": True, "baseline_runs": 3, "iterations": 1},
-    "protected": [name for name, *_ in WALLS],
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run in a toy `world` or a bundled scenario. `reduction` has settings over those of the toy's scenario.
+
+    `shown`: a lesson shows it on the map; of the others only figures are shown.
+    """
+
+    world: str
+    options: tuple[str, ...] = ()
+    reduction: Mapping[str, Any] = field(default_factory=dict)
+    shown: bool = True
+
+
+_FROM_END = {"pair": "model2model/failure-proximal"}
+_PRINTED = {"growth": "paper", "skip": "known"}
+_FAR_FIRST = {"complement_order": "far-first"}
+RUNS = {
+    "delivery": Recorded("delivery"),
+    "ditch": Recorded("ditch", ("--as-printed",)),
+    "yard-near": Recorded("yard", reduction=_FROM_END | _PRINTED),
+    "yard-far": Recorded("yard", reduction=_FROM_END | _PRINTED | _FAR_FIRST, shown=False),
+    "yard-random": Recorded("yard", reduction=_PRINTED | {"pair": "model2model/random"}, shown=False),
+    "yard-file": Recorded("yard", reduction=_PRINTED | {"pair": "model2model/sequential"}, shown=False),
+    "nailed-near": Recorded("nailed", reduction=_FROM_END | _PRINTED, shown=False),
+    "quay-first": Recorded("quay", ("--as-printed", "--seed", "4")),
+    "quay-kept": Recorded("quay", ("--seed", "4")),
+    "ditch-sliced": Recorded("ditch"),
+    "ditch-whole": Recorded("ditch", ("--no-slice",), shown=False),
+    "yard-splitting": Recorded("yard", ("--algorithm", "splitting")),
+    "yard-ddmin": Recorded("yard", ("--algorithm", "ddmin"), shown=False),
+    "yard-ddenv": Recorded("yard", shown=False),
 }
 
 
-def main(name: str) -> None:
+def main(wanted: list[str]) -> None:
+    if unknown := set(wanted) - RUNS.keys():
+        sys.exit(f"{min(unknown)}: expected {', '.join(RUNS)}")
+    for name in wanted or RUNS:
+        record(name)
+
+
+def record(name: str) -> None:
+    """Makes a run, and puts it beside the lessons."""
+    recorded = RUNS[name]
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / f"{name}.ddenv"
-        what = str(delivery(Path(folder))) if name == "delivery" else name
-        options = () if name == "delivery" else ("--as-printed",)
-        command = (sys.executable, "-m", "ddenv", "run", what, "--jobs", "1", "--output", str(run), *options)
+        toy = TOYS.get(recorded.world)
+        what = recorded.world if toy is None else str(written(toy, Path(folder), recorded.reduction))
+        command = (sys.executable, "-m", "ddenv", "run", what, "--jobs", "1", "--output", str(run), *recorded.options)
         if subprocess.run(command, check=False).returncode == 2:
             sys.exit(2)
-        slim(run)
-        LESSONS.mkdir(exist_ok=True)
+        slim(run, recorded.shown, told(f"{name}.ddenv"))
         shutil.copy(run, LESSONS / run.name)
+    if name in ORACLES:
+        (LESSONS / f"{recorded.world}.oracle.json").write_text(ORACLES[name](), encoding="utf-8")
+    if name == "delivery":
+        lesson = LESSONS / "1-what-delta-debugging-is.yaml"
+        subprocess.run((sys.executable, "-m", "ddenv", "learn", "--record", str(lesson)), check=True)
 
 
-def delivery(folder: Path) -> Path:
-    """Writes the toy world, its robot and its simulator; returns the scenario's file. Writes also the complete oracle."""
-    for file in ("robot.sdf", "delivery.py"):
+def written(toy: Toy, folder: Path, reduction: Mapping[str, Any]) -> Path:
+    """Writes a toy world, its robot, its simulator and its scenario with these settings; returns the scenario's file."""
+    for file in ("robot.sdf", toy.simulator):
         shutil.copy(HERE / file, folder / file)
-    (folder / "delivery.py").chmod(0o755)
-    (folder / "world.sdf").write_text(world(), encoding="utf-8")
-    scenario = folder / "delivery.yaml"
-    scenario.write_text(json.dumps(SCENARIO), encoding="utf-8")
-    names = [name for name, *_ in MODELS]
-    subsets = [kept for size in range(len(names) + 1) for kept in combinations(names, size)]
-    outcomes = {" ".join(kept): outcome(kept) for kept in subsets if outcome(kept) != "pass"}
-    oracle = {"models": names, "otherwise": "pass", "outcomes": outcomes}
-    (LESSONS / "delivery.oracle.json").write_text(json.dumps(oracle, indent=0) + "\n", encoding="utf-8")
+    (folder / toy.simulator).chmod(0o755)
+    (folder / "world.sdf").write_text(world_of(toy), encoding="utf-8")
+    walls = [name for name, *_ in toy.walls]
+    scenario = folder / "scenario.yaml"
+    settings = {"reduction": {**toy.scenario.get("reduction", {}), **reduction}, "protected": walls}
+    scenario.write_text(json.dumps(toy.scenario | settings), encoding="utf-8")
     return scenario
 
 
-def world() -> str:
-    """The yard as SDF."""
-    boxes = "\n".join(
-        f'<model name="{name}"><static>true</static><pose>{x} {y} 0.5 0 0 0</pose><link name="link"><collision name="box">'
-        f"<geometry><box><size>{length} {width} 1</size></box></geometry></collision></link></model>"
-        for name, x, y, length, width in (*WALLS, *MODELS)
+def world_of(toy: Toy) -> str:
+    """A toy world as SDF."""
+    boxes: dict[str, list[Box]] = {}
+    for box in (*toy.walls, *toy.models):
+        boxes.setdefault(box[0], []).append(box)
+    models = "\n".join(
+        f'<model name="{name}"><static>true</static><link name="link">{"".join(map(_collision, range(9), each))}</link></model>'
+        for name, each in boxes.items()
     )
     ground = (
         '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry><plane>'
         "<normal>0 0 1</normal></plane></geometry></collision></link></model>"
     )
-    return f'<sdf version="1.9"><world name="yard">\n{ground}\n{boxes}\n</world></sdf>\n'
+    return f'<sdf version="1.9"><world name="toy">\n{ground}\n{models}\n</world></sdf>\n'
 
 
-def slim(run: Path) -> None:
-    """Removes the trajectories that no map shows."""
+def _collision(number: int, box: Box) -> str:
+    _, x, y, length, width = box
+    return (
+        f'<collision name="box_{number}"><pose>{x} {y} 0.5 0 0 0</pose>'
+        f"<geometry><box><size>{length} {width} 1</size></box></geometry></collision>"
+    )
+
+
+def delivery_oracle() -> str:
+    """The outcome of every part of the first lesson's world."""
+    outcomes = {" ".join(kept): outcome(kept) for kept in _subsets(DELIVERY.names) if outcome(kept) != "pass"}
+    return json.dumps({"models": DELIVERY.names, "otherwise": "pass", "outcomes": outcomes}, indent=0) + "\n"
+
+
+def quay_oracle() -> str:
+    """The rate of f in every part of the quay's world."""
+    rates = {" ".join(kept): round(rate(kept), 3) for kept in _subsets(QUAY.names) if rate(kept)}
+    return json.dumps({"models": QUAY.names, "otherwise": "pass", "outcomes": {}, "rates": rates}, indent=0) + "\n"
+
+
+# What is known of the whole world of a run.
+ORACLES = {"delivery": delivery_oracle, "quay-kept": quay_oracle}
+
+
+def _subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    return [kept for size in range(len(names) + 1) for kept in combinations(names, size)]
+
+
+def told(run: str) -> set[int]:
+    """The tests of a run whose ends a lesson tells."""
+    lessons = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in LESSONS.glob("*.yaml")]
+    places = [str(step.get("at", "")) for lesson in lessons if lesson["run"] == run for step in lesson["steps"]]
+    return {int(place.removeprefix("test ")) for place in places if place.startswith("test ")}
+
+
+def slim(run: Path, shown: bool, told: set[int]) -> None:
+    """Removes the trajectories that no map shows; of a run that is not `shown` all of them.
+
+    Those of `told` tests stay, with the other tests of the same candidates: their verdicts are told, too.
+    """
     with RunFile(run) as file:
         state = fold(file.events())
         events = file.events()
-    shown = {event.data["evidence_test"] for event in events if event.data.get("evidence_test")}
-    shown |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
+    kept = {event.data["evidence_test"] for event in events if event.data.get("evidence_test")}
+    kept |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
+    made_for = {(test.round, test.candidate) for test in state.tests if test.id in told}
+    kept |= {test.id for test in state.tests if (test.round, test.candidate) in made_for}
     database = sqlite3.connect(run)
-    database.execute(f"DELETE FROM motion WHERE model != '' OR test NOT IN ({','.join(map(str, sorted(shown)))})")
-    database.execute("PRAGMA journal_mode = DELETE")
+    tests = ",".join(map(str, sorted(kept))) if shown else ""
+    database.execute(f"DELETE FROM motion WHERE model != '' OR test NOT IN ({tests})")
     database.commit()
+    # Within a transaction this would change nothing, and readers would write files beside the lesson.
+    database.execute("PRAGMA journal_mode = DELETE")
     database.execute("VACUUM")
     database.close()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1:])

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Protocol
 
 from ddenv.amounts import count, first_of, percent
+from ddenv.certificate_cost import certificate_tests
 from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim
@@ -99,10 +101,57 @@ def _whole_rate(certificate: Certificate) -> str:
     return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
 
 
+def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:
+    """What is known of an environment that shows f where it is known of every part of the world; without a full stop.
+
+    `could_go` are its models without which f still shows; `smaller` is a smaller set that shows f, somewhere in the world.
+    """
+    if could_go:
+        any_one = "any one of " if len(could_go) > 1 else ""
+        return f"not 1-minimal: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
+    if not left:
+        return "nothing is left that can be removed"
+    known = f"1-minimal: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    if smaller:
+        return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
+    return f"{known}. No smaller set shows f, either, which 1-minimal alone does not promise"
+
+
 def current(state: RunState) -> Certificate | None:
     """The finished certificate of the current environment, if there is one."""
     last = state.certificate
     return last if last is not None and last.claims else None
+
+
+def in_the_making(state: RunState) -> Certificate | None:
+    """The certificate that is being made, if there is one."""
+    now = state.certificate
+    return now if now is not None and state.confirming and not now.claims else None
+
+
+def fresh_runs_made(state: RunState, now: Certificate) -> int:
+    """How many runs of the last certificate are finished."""
+    return sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+
+
+def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
+    """How many runs a certificate of the current environment takes, as (low, likely, high)."""
+    left = len(state.environment) - len(state.pinned.intersection(state.environment))
+    return certificate_tests(now.rate, now.keep_rate, left, now.at_least)
+
+
+def usual_runs(state: RunState, now: Certificate) -> str:
+    """How many runs a certificate usually takes, such as "32 to 145 runs"."""
+    low, _, high = expected_fresh_runs(state, now)
+    return f"{low} to {high:,} runs"
+
+
+def made_of_usual(state: RunState, now: Certificate) -> str:
+    """How far a certificate is: "23 of usually 32 to 145 runs"; it says so where it takes more."""
+    made, usual = fresh_runs_made(state, now), usual_runs(state, now)
+    if made < expected_fresh_runs(state, now)[2]:
+        return f"{made} of usually {usual}"
+    return f"{count(made, 'run')}, more than the usual {usual.removesuffix(' runs')}"
 
 
 def short(claim: Claim) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 Z_95 = 1.959963984540054
 
@@ -28,3 +29,18 @@ def iterations_needed(rate: float, confidence: float = 0.95) -> int:
     if rate >= 1.0:
         return 0
     return max(0, math.ceil(math.log(1.0 - confidence) / math.log(1.0 - rate) - 1e-9) - 1)
+
+
+def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool | None:
+    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or None if they do not decide yet.
+
+    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): at either rate it is wrong with a probability of
+    at most about `error`, although it may be asked after each run.
+    """
+    rate = min(rate, 0.99)
+    ratio, enough = 0.0, math.log((1.0 - error) / error)
+    for shown in outcomes:
+        ratio += math.log(2.0) if shown else math.log((1.0 - rate) / (1.0 - rate / 2))
+        if abs(ratio) >= enough:
+            return ratio > 0
+    return None

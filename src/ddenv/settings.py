@@ -85,6 +85,14 @@ class Setting:
         above = "any number" if self.above is None else f"more than {self.above:g}"
         return above if self.most is None else f"{above}, at most {self.most:g}"
 
+    @property
+    def wanted(self) -> str:
+        """What kind of number it is, and the allowed ones, in words."""
+        kind = "a whole number" if self.kind is int else "a number"
+        if self.least is not None and self.most is not None:
+            return f"{kind} from {self.range}"
+        return kind if self.range == "any number" else f"{kind}, {self.range}"
+
     def words(self, value: Value) -> list[str]:
         """The option with `value`, as typed on the command line."""
         if self.kind is bool:
@@ -227,6 +235,13 @@ class Reduction:
         shown="option",
         cost="Lower is surer, and simulates more.",
     )
+    cluster: str = setting(
+        "here",
+        "where the tests are made: here, or by the workers of a Dask cluster",
+        shown="more",
+        more="tcp://HOST:PORT or tls://HOST:PORT of a scheduler, the path of its file, or ssh:HOST1,HOST2 to start one.",
+        cost="Costs no tests: the results are those of this machine.",
+    )
     growth: Literal["paper", "steady"] = setting(
         "steady",
         "when n grows: after every round (paper), or only after a round without success (steady)",
@@ -287,7 +302,9 @@ class Failure:
 
 
 class Simulation:
-    """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that follows the speed."""
+    """How Drake simulates. `wall_timeout` bounds one test in real time; None for a limit that follows the speed. `memory_limit`
+    bounds the memory of one worker; None for its share of what the machine allows.
+    """
 
     time_step: float = setting(0.005, "time step of the simulation", unit="s", least=0.0001, most=0.05)
     contact: Literal["lagged", "sap", "similar"] = setting("lagged", "Drake's approximation of contact")
@@ -298,6 +315,14 @@ class Simulation:
         least=0.01,
         most=1_000_000,
         none="by speed",
+    )
+    memory_limit: float | None = setting(
+        None,
+        "maximum memory of one worker; unless given, its share of 90 % of the memory that the machine or the container allows",
+        unit="GB",
+        least=0.01,
+        most=1_000_000,
+        none="by machine",
     )
 
 

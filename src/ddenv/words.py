@@ -9,7 +9,7 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import missed, never_left_out, smaller_known, verdict_on
+from ddenv.claims import in_the_making, made_of_usual, missed, never_left_out, smaller_known, usual_runs, verdict_on
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.run_settings import settings
@@ -38,7 +38,8 @@ def headline(state: RunState, simulated: float | None = None) -> str:
     """The state in one line, cut to the terminal's width. The running test that is farthest has `simulated` so much time, s."""
     models = f"{len(state.environment)} of {len(state.elements)} models"
     running = state.tally["running"]
-    line = f"{state.status} · {_where(state)} · {models} · {state.tests_done} tests, {running} running"
+    status = "waits for room on the disk" if state.needs_room and not state.ended else state.status
+    line = f"{status} · {_where(state)} · {models} · {state.tests_done} tests, {running} running"
     if running and simulated is not None:
         line += f", {simulated:.1f} s simulated"
     return line[: shutil.get_terminal_size().columns - 1]
@@ -46,7 +47,8 @@ def headline(state: RunState, simulated: float | None = None) -> str:
 
 def _where(state: RunState) -> str:
     if state.confirming and not state.ended:
-        return CONFIRMING
+        now = in_the_making(state)
+        return CONFIRMING if now is None else f"certificate: {made_of_usual(state, now)}"
     if state.settling and not state.ended:
         return SETTLING
     return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
@@ -79,12 +81,12 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
             return _slices(kind, after)
         case "certificate_started" | "certificate_finished" | "rate_lost" | "left_out":
             return _certificate(kind, after)
-        case "engine_started" | "comparing" | "compared":
+        case "engine_started" | "comparing" | "compared" | "cluster":
             return _engine(kind, before, after)
         case "finished" | "engine_stopped" | "engine_failed":
             known = smaller_known(after)
             return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
-    return _news_by_hand(kind, before, after)
+    return _night(kind, before, after) or _news_by_hand(kind, before, after)
 
 
 def _slices(kind: str, after: RunState) -> str:
@@ -100,8 +102,11 @@ def _engine(kind: str, before: RunState, after: RunState) -> str:
     match kind:
         case "engine_started":
             resumed = " again" if before.tests else ""
-            workers, models = count(after.jobs, "worker"), count(len(after.elements), "model")
-            return f"engine started{resumed} with {workers}; {models} can be removed"
+            # A cluster says later how many there are.
+            workers = f" with {count(after.jobs, 'worker')}" if after.jobs else ""
+            return f"engine started{resumed}{workers}; {count(len(after.elements), 'model')} can be removed"
+        case "cluster":
+            return after.cluster
         case "comparing":
             return (
                 f"made with {after.physics.before}, now {after.physics.after}: the first run is made again and compared"
@@ -112,12 +117,22 @@ def _engine(kind: str, before: RunState, after: RunState) -> str:
     return ""
 
 
+def _night(kind: str, before: RunState, after: RunState) -> str:
+    """What came to an engine from outside."""
+    if kind == "clock_jumped":
+        return "  the machine slept, or its clock was set: that time does not count"
+    if kind == "room" and after.needs_room:
+        return f"  no room on the disk: waits until {after.needs_room / 1e6:.0f} MB are free"
+    return "  there is room on the disk again" if kind == "room" and before.needs_room else ""
+
+
 def _certificate(kind: str, after: RunState) -> str:
     """What a certificate does, and what follows from it."""
     last, models = after.certificates[-1], count(len(after.environment), "model")
     match kind:
         case "certificate_started":
-            return f"certificate {last.number}: fresh runs of what is left ({models}), without each model, and of the whole world"
+            what = f"fresh runs of what is left ({models}), without each model, and of the whole world"
+            return f"certificate {last.number}: {what}; usually {usual_runs(after, last)}"
         case "certificate_finished":
             return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
         case "rate_lost":

@@ -5,7 +5,7 @@ import pytest
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.runfile.fold import fold
 from tests.command import in_process
-from tests.workbench import fake_run
+from tests.workbench import fake_moments, fake_run
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def told(run) -> tuple[dict, str]:
 
 
 def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
-    found, lines = told(fake_run.finished(run))
+    found, lines = told(fake_moments.finished(run))
     assert (found["minimal"], found["kept"]) == (True, ["crate_00", "crate_01"])
     assert (found["rate_left"]["shown"], found["rate_left"]["runs"]) == (24, 24)
     assert (found["rate_whole_world"]["shown"], found["rate_whole_world"]["runs"]) == (25, 27)
@@ -36,14 +36,14 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
 
 
 def test_what_is_not_shown_is_not_called_minimal(run):
-    found, lines = told(fake_run.not_shown(run))
+    found, lines = told(fake_moments.not_shown(run))
     assert (found["minimal"], found["certificate"]["minimal"]) == (False, False)
     assert "environment, not shown to be minimal: 2 of 11 models" in lines
     assert "without crate_01: f in 1 of 2 fresh runs (9 % to 91 %): tests broke" in lines
 
 
 def test_files_without_a_certificate_claim_nothing(run):
-    found, lines = told(fake_run.uncertified(run))
+    found, lines = told(fake_moments.uncertified(run))
     assert (found["minimal"], found["certificate"]) == (False, None)
     assert "f in 1 of 1 here, 3 of 4 in the whole world; no fresh runs were made" in lines
 
@@ -52,7 +52,7 @@ def test_an_engine_makes_at_least_so_many_runs(run, monkeypatch, capsys):
     started = []
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: started.append((*words, more)))
     monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, None))
-    fake_run.finished(run)
+    fake_moments.finished(run)
     in_process(monkeypatch, capsys, "certify", run.path, "--runs", 40, "--jobs", 1)
     in_process(monkeypatch, capsys, "certify", run.path, "--jobs", 1)
     # As often as the baseline, if not said otherwise.

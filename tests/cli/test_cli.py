@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import SCHEMA_VERSION, RunFile
+from ddenv.runfile.store import COLUMNS, SCHEMA_VERSION, RunFile
 from tests.command import ddenv, in_process
 from tests.conftest import DATA
 from tests.waiting import PATIENCE, wait_until
@@ -92,6 +94,26 @@ def test_export_writes_a_world_and_a_scenario_that_run(reduced, tmp_path):
 
 
 @pytest.mark.programs
+def test_the_streams_of_runs_are_those_of_their_trajectories(reduced, tmp_path):
+    _, summary = reduced
+    done = ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap")
+    assert done.returncode == 0, done.stderr
+    assert [line.split(":")[0].strip() for line in done.stdout.splitlines()[1:]] == ["/whole", "/left", "/passing"]
+    places = {}
+    with (tmp_path / "one.mcap").open("rb") as file:
+        for _, _, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(["/tf"]):
+            for one in message.transforms:
+                places.setdefault(one.child_frame_id, []).append(
+                    (one.transform.translation.x, one.transform.translation.y)
+                )
+    with RunFile(Path(summary["run_file"])) as run:
+        state = fold(run.events())
+        trajectory = run.trajectory(state.f_test.id)
+    assert places["whole/base_link"] == list(zip(trajectory[1::COLUMNS], trajectory[2::COLUMNS], strict=True))
+    assert ddenv("export", summary["run_file"], "--mcap", tmp_path / "one.mcap").returncode == 2
+
+
+@pytest.mark.programs
 def test_with_early_stop_full_runs_confirm_the_same_end(home, reduced):
     # Long enough that a robot at the wall can be ended early.
     done = ddenv("run", WALL, "--json", "--jobs", 2, "--timeout", 14, "--early-stop", "--no-slice")
@@ -140,7 +162,7 @@ def test_a_world_in_which_the_robot_does_not_fail_ends_with_1(home):
 @pytest.mark.programs
 def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     process = subprocess.Popen(
-        [sys.executable, "-m", "ddenv", "run", WALL, "--json"],
+        [sys.executable, "-m", "ddenv", "run", WALL, "--json", "--budget", "12"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -154,7 +176,7 @@ def test_interrupted_it_stops_the_engine_and_can_be_resumed(home):
     assert "ddenv resume" in err
     assert not engine_is_alive(path)
     done = ddenv("resume", "wall-1", "--json")
-    assert json.loads(done.stdout)["kept"] == ["deck", "wall"]
+    assert json.loads(done.stdout)["tests"] == 12
 
 
 @pytest.mark.programs
@@ -216,24 +238,24 @@ def _is_one_line(done, words):
 MISTAKES = {
     "no scenario": (["run", "dich"], "did you mean ditch?"),
     "no file": (["run", "nothing.yaml"], "no such file"),
-    "pair": (["run", WALL, "--pair", "model2model/nearest"], "reduction.pair: 'model2model/nearest' is not allowed"),
-    "no pair": (["run", WALL, "--pair", "model2model"], "reduction.pair: 'model2model' is not allowed (did you mean"),
+    "pair": (["run", WALL, "--pair", "model2model/nearest"], "ddenv: --pair: 'model2model/nearest' is not allowed"),
+    "no pair": (["run", WALL, "--pair", "model2model"], "--pair: 'model2model' is not allowed (did you mean"),
     "algorithm": (
         ["run", WALL, "--algorithm", "ddmn"],
-        "reduction.algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
+        "ddenv: --algorithm: 'ddmn' is not allowed (did you mean ddmin?); use one of ddenv, ddmin, probdd, splitting",
     ),
     "epsilon": (["run", WALL, "--epsilon", "0"], "--epsilon: expected 0.001 to 1000, found 0"),
     "similarity": (
         ["run", WALL, "--similarity", "end"],
-        "failure.similarity: 'end' is not allowed",
+        "ddenv: --similarity: 'end' is not allowed",
     ),
     "iterations": (["run", WALL, "--iterations", "-1"], "--iterations: expected 0 to 1000, found -1"),
     "timeout": (["run", WALL, "--timeout", "0"], "--timeout: expected 0.01 to 100000, found 0"),
-    "not a number": (["run", WALL, "--seed", "x"], "'x' is not a valid integer"),
-    "jobs": (["run", WALL, "--jobs", "0"], "--jobs"),
+    "not a number": (["run", WALL, "--seed", "x"], "'--seed': expected a whole number from 0 to 2147483647, found 'x'"),
+    "jobs": (["run", WALL, "--jobs", "0"], "'--jobs': expected a whole number from 1 to 1024, found 0"),
     "unknown option": (["run", WALL, "--fast"], "No such option"),
     "endless": (["run", WALL, "--timeout", "1e300"], "--timeout: expected 0.01 to 100000, found 1e+300"),
-    "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "expected x,y,z,yaw"),
+    "far away": (["run", WALL, "--spawn", "1e300,0,0,0"], "no number may be beyond"),
     "unknown command": (["certfy"], "no command, run, scenario or world 'certfy' (did you mean certify?)"),
     "folder to run": (["run", DATA], "is a folder; expected a scenario's name or file"),
     "folder to open": (["open", DATA], "is a folder; expected a run, a scenario or a world"),
@@ -244,12 +266,16 @@ MISTAKES = {
     "name": (["run", WALL, "--name", "../x"], "is not a valid file name"),
     "no run": (["open", "nothing"], "no such run file"),
     "no run to certify": (["certify", "nothing"], "no such run file"),
-    "no runs": (["certify", "nothing", "--runs", "0"], "0 is not in the range"),
+    "no runs": (["certify", "nothing", "--runs", "0"], "expected a whole number, 1 or more, found 0"),
     "not a run": (["resume", __file__], "is not a ddenv run file"),
     "keep": (["test", WALL, "--keep", "nobody"], "no removable model 'nobody'"),
     "minimal": (["test", WALL, "--minimal"], "needs a run"),
     "test": (["test", WALL, "--test", 1], "--test: needs a run"),
     "export": (["export", "nothing", "--sdf", "x.sdf"], "no such run file"),
+    "export of no run": (["export", "nothing"], "no such run file"),
+    "report of no run": (["report", "nothing"], "no such run file"),
+    "no file to run": (["run", "x.world"], "x.world: no such file"),
+    "accept rate": (["run", WALL, "--accept-rate", "all"], "ddenv: --accept-rate: 'all' is not allowed"),
     "world twice": (
         ["test", DATA / "wall.sdf", "--spawn", "0,0,0.5", "--goal", "4,0", "--world", "x.sdf"],
         "--world: only for a scenario",
@@ -293,11 +319,10 @@ def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
 
 
 @pytest.mark.programs
-def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home):
+def test_an_engine_that_cannot_start_is_told_and_not_the_old_end(home, reduced):
     import sqlite3
 
-    run = home / "broken.ddenv"
-    assert ddenv("run", WALL, "--output", run, "--jobs", 1).returncode == 0
+    run = shutil.copy(reduced[1]["run_file"], home / "broken.ddenv")
     with sqlite3.connect(run) as database:
         database.execute("UPDATE document SET content = x'7b7d' WHERE name = 'scenario'")
     _is_one_line(ddenv("resume", run), "its scenario is not valid")
@@ -310,11 +335,12 @@ def test_without_a_screen_nobody_is_asked(home):
     from ddenv.runs.creation import create_run
     from ddenv.world.load import load_scenario
 
-    create_run(load_scenario(DATA / "wall.yaml"), run)
+    scenario = load_scenario(DATA / "wall.yaml")
+    create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update={"budget": 25})}), run)
     with RunFile(run) as viewer:
         viewer.send("accept_mode", mode="ask")
     done = ddenv("resume", run, "--json")
-    assert json.loads(done.stdout)["minimal"]
+    assert json.loads(done.stdout)["kept"] == ["deck", "wall"]
 
 
 @pytest.mark.programs
@@ -324,7 +350,7 @@ def test_a_scenario_cannot_name_a_run_out_of_its_folder(home):
     data["robot"]["model"] = str(DATA.parents[1] / "sdf" / "robots" / "husky.sdf")
     (home / "s.yaml").write_text(yaml.safe_dump(data))
     (home / "in").mkdir()
-    summary = json.loads(ddenv("run", home / "s.yaml", "--output", home / "in", "--json").stdout)
+    summary = json.loads(ddenv("run", home / "s.yaml", "--output", home / "in", "--budget", 3, "--json").stdout)
     assert summary["run_file"] == str(home / "in" / "---esc-1.ddenv")
 
 

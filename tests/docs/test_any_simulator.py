@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import pytest
 import yaml
@@ -43,6 +45,18 @@ def test_the_command_of_the_page_reduces_the_example_as_the_page_says(reduced):
 def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(reduced, tmp_path):
     done = ddenv("test", reduced[0], "--minimal", "--leave-each-out", "--json", cwd=tmp_path)
     assert [run["outcome"] for run in json.loads(done.stdout)["runs"]] == ["similar", "pass", "pass"]
+
+
+@pytest.mark.examples
+def test_a_test_for_pytest_fails_as_long_as_the_robot_fails(reduced, tmp_path):
+    done = ddenv("export", reduced[0], "--pytest", tmp_path, cwd=tmp_path)
+    assert done.stdout.splitlines() == [f"wrote {tmp_path / 'test_run.py'}", f"wrote {tmp_path / 'run.ddenv'}"]
+    test = tmp_path / "test_run.py"
+    pytest_ = [sys.executable, "-m", "pytest", "-p", "no:ddenv", "-p", "ddenv.pytest_plugin", "-c", "/dev/null", test]
+    said = subprocess.run(pytest_, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert said.returncode == 1 and "it fails as it did: f in 7 of 7 runs" in said.stdout, said.stdout
+    test.write_text(test.read_text().replace("is False", "is True"))
+    assert subprocess.run(pytest_, cwd=tmp_path, capture_output=True, check=False).returncode == 0
 
 
 @pytest.mark.examples

@@ -16,7 +16,7 @@ from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
 from ddenv.world.scenario import FailureSpec
 from tests.engine.fake import FakePool, drive, new_run
-from tests.engine.test_driver import Killed
+from tests.engine.killing import Killed
 
 SPEC = FailureSpec(epsilon=0.5)
 

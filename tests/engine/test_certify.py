@@ -20,7 +20,8 @@ from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import read_parts
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
-from tests.engine.test_driver import Killed, _kill, needs, story
+from tests.engine.killing import Killed, kill_after, story
+from tests.engine.oracles import needs
 from tests.tiers import examples
 
 METHODS = [{}, {"algorithm": "splitting"}, {"pair": "learner/timestep", "growth": "steady", "skip": "implied"}]
@@ -314,7 +315,7 @@ def _killed(path, pool, moments):
     for moment in moments:
         pool.running.clear()
         try:
-            drive(path, pool, prepare=lambda file, after=moment: _kill(file, after))
+            drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after))
         except Killed:
             continue
         return

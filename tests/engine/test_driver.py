@@ -1,16 +1,17 @@
 """The engine's promises, on a simulator that costs nothing."""
 
 import json
+import math
 import sqlite3
 import tempfile
 from itertools import pairwise
 from pathlib import Path
-from zlib import crc32
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.engine import thinking
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
@@ -19,23 +20,9 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.schemas import names, pairs
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.killing import Killed, finished_tests, kill_after, story
+from tests.engine.oracles import flaky, needs
 from tests.tiers import examples
-
-
-def needs(*names):
-    return lambda keep, seed: "similar" if set(names) <= keep else "pass"
-
-
-def flaky(salt, *names):
-    """Shows f in most runs that have the needed models, sometimes something else, always the same for the same run."""
-
-    def oracle(keep, seed):
-        luck = crc32(f"{salt} {sorted(keep)} {seed}".encode()) % 10
-        if not set(names) <= keep:
-            return "other" if luck < 3 else "pass"
-        return "similar" if luck < 8 else "pass"
-
-    return oracle
 
 
 @pytest.mark.parametrize("pair", pairs())
@@ -69,11 +56,6 @@ METHODS = [
     {"algorithm": "splitting"},
 ]
 every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: "-".join(method.values()))
-
-
-def story(state):
-    """What a run's rounds came to: all that must not depend on who worked on it."""
-    return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
 
 
 @pytest.mark.programs
@@ -118,7 +100,7 @@ def test_a_run_that_would_now_go_another_way_is_not_mixed_up(tmp_path, number):
     """Whichever round it is that differs: nothing is written to the file that would make no sense in it."""
     path = new_run(tmp_path)
     with pytest.raises(Killed):
-        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: _kill(file, 50))
+        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: kill_after(file, 50))
     with sqlite3.connect(path) as db:
         rounds = db.execute("SELECT id, data FROM event WHERE kind = 'round_started'").fetchall()
         assert len(rounds) >= 3
@@ -196,10 +178,6 @@ def test_seeds_are_common_to_all_candidates(tmp_path):
     assert {test.seed - test.run for test in state.tests} == {40}
 
 
-class Killed(Exception):
-    pass
-
-
 @every_method
 @given(salt=st.integers(0, 5), moments=st.lists(st.integers(1, 60), min_size=1, max_size=4), jobs=st.integers(1, 3))
 @examples(0.1)
@@ -211,9 +189,9 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, 
         for moment in moments:
             pool = FakePool(oracle, jobs, moment)
             try:
-                drive(path, pool, prepare=lambda file, after=moment: _kill(file, after))
+                drive(path, pool, prepare=lambda file, after=moment: kill_after(file, after))
             except Killed:
-                made += _finished(path)[len(made) :]
+                made += finished_tests(path)[len(made) :]
             else:
                 break
         pool = FakePool(oracle, jobs)
@@ -221,29 +199,9 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end(method, salt, moments, 
         if state.status != "finished":
             state = drive(path, pool)
         assert story(state) == story(undisturbed)
-        finished = _finished(path)
+        finished = finished_tests(path)
         assert len(finished) == len(set(finished))
         assert not any(test.outcome == "running" for test in state.tests)
-
-
-def _kill(file, after):
-    """The next `after` events are written; then the engine is gone."""
-    append, count = file.append, [0]
-
-    def limited(*values):
-        count[0] += 1
-        if count[0] > after:
-            raise Killed
-        return append(*values)
-
-    file.append = limited
-
-
-def _finished(path):
-    """Each finished test as (models, run)."""
-    with RunFile(path) as file:
-        journal = Journal(file)
-        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
 
 
 def test_a_robot_that_does_not_fail_ends_the_run(tmp_path):
@@ -406,7 +364,8 @@ def forecasts(path):
         return [event.data for event in file.events() if event.kind == "forecast"]
 
 
-def test_each_round_is_forecast_while_tests_run(tmp_path):
+def test_each_round_is_forecast_while_tests_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(thinking, "FIRST", math.inf)
     paths = [new_run(tmp_path) for _ in range(3)]
     for path, pool in zip(paths, (SlowPool, SlowPool, FakePool), strict=True):
         state = drive(path, pool(needs("wall", "beam"), 2))

@@ -6,8 +6,9 @@ from ddenv.engine.control import Stopped
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.test_driver import Killed, _kill, flaky, needs
-from tests.engine.test_steering import at_once, events, guided, numbers, until  # noqa: F401
+from tests.engine.guided import at_once, events, guided, numbers, until  # noqa: F401
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import flaky, needs
 
 
 def elsewhere(keep, _):
@@ -223,6 +224,6 @@ def test_a_decision_counts_once_whenever_the_engine_is_killed(tmp_path):
         with RunFile(path) as viewer:
             viewer.send("undo")
         with pytest.raises(Killed):
-            drive(path, FakePool(needs("wall"), 1), prepare=lambda file, after=after: _kill(file, after))
+            drive(path, FakePool(needs("wall"), 1), prepare=lambda file, after=after: kill_after(file, after))
         state = drive(path, FakePool(needs("wall"), 1))
         assert [one.kind for one in state.decisions] == ["undo"]

@@ -3,15 +3,13 @@
 import math
 import os
 import signal
-import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from pebble import ProcessFuture
 
-from ddenv.engine import worker
 from ddenv.engine.pool import PREPARATION, Broken, Pool
-from ddenv.engine.worker import REASON
+from ddenv.engine.worker import Run, Shared, answered
 from ddenv.errors import UserError
 from ddenv.runfile.store import COLUMNS
 from ddenv.runs.scenarios import load_parts
@@ -30,7 +28,7 @@ def parts(**simulation):
     return scenario, *load_parts(scenario)
 
 
-def test_a_run_that_starts_again_has_all_of_its_time(monkeypatch):
+def test_a_run_that_starts_again_has_all_of_its_time():
     begun = []
 
     class Again:
@@ -39,10 +37,8 @@ def test_a_run_that_starts_again_has_all_of_its_time(monkeypatch):
                 progress(time_s, (0.0,) * (COLUMNS - 1))
                 begun.append(shared.begun[0])
 
-    shared = worker.Shared([0.0] * COLUMNS, [0.0], bytearray(REASON))
-    monkeypatch.setattr(worker, "_shared", shared, raising=False)
-    monkeypatch.setattr(worker, "_simulator", Again(), raising=False)
-    worker.run_test(EVERYTHING, 1, True, 60.0, 0)
+    shared = Shared([0.0] * COLUMNS, [0.0])
+    answered(Run(EVERYTHING, 1, True, 60.0), Again(), shared, 0)
     assert 0.0 < begun[0] == begun[1] < begun[2] == begun[3]
 
 
@@ -60,7 +56,7 @@ def result(pool):
 
 
 def workers(pool):
-    return [int(pid) for pid in pool._pool._pool_manager.worker_manager.workers]
+    return [slot.worker.pid for slot in pool._slots]
 
 
 @pytest.mark.programs
@@ -80,8 +76,7 @@ def _test_a_dying_worker(pool):
     first = workers(pool)
     for pid in workers(pool):
         os.kill(pid, signal.SIGKILL)
-    # One that dies while it holds pebble's lock takes the whole pool along: then a new pool is made for the next test.
-    wait_until(lambda: not set(first) & set(workers(pool)) or not pool._pool.active)
+    wait_until(lambda: pool.finished(0.0) or not set(first) & set(workers(pool)))
     pool.submit(2, EVERYTHING, 0)
     assert result(pool)[1].outcome == "failed"
     assert not set(first) & set(workers(pool))
@@ -95,13 +90,10 @@ def _test_a_dying_worker(pool):
 
 def test_a_worker_that_dies_in_a_test_makes_it_an_error_and_the_next_one_works(pool):
     pool.submit(1, EVERYTHING, 0)
-    wait_until(pool.live)
-    for pid in workers(pool):
-        os.kill(pid, signal.SIGKILL)
-    test, broken = result(pool)
-    if isinstance(broken, Broken):
-        assert (test, broken.outcome) == (1, "error")
-        assert "process died" in broken.failure
+    wait_until(lambda: pool.finished(0.0) or pool.live())
+    os.kill(next(slot.worker.pid for slot in pool._slots if slot.job), signal.SIGKILL)
+    died = "the simulator's process died (SIGKILL, perhaps for lack of memory)"
+    assert result(pool) == (1, Broken("error", died))
     pool.submit(2, EVERYTHING, 0)
     test, after = result(pool)
     assert (test, after.outcome) == (2, "failed")
@@ -156,18 +148,30 @@ def test_a_test_that_takes_too_long_is_killed_and_the_next_one_works(tmp_path):
         pool.close()
 
 
+class Silent:
+    """A worker that never answers."""
+
+    handles: tuple[int, ...] = ()
+    killed = 0
+
+    def __init__(self, *_):
+        pass
+
+    def kill(self):
+        Silent.killed += 1
+
+    def memory(self):
+        return 0
+
+
 class Clock:
-    """The clock that a pool without processes looks at: `looks` for some seconds and returns what has ended by then."""
+    """The clock that a pool looks at: `looks` for some seconds and returns what has ended by then."""
 
     def __init__(self, pool, monkeypatch):
-        self.now, self.pool, self.futures = 1000.0, pool, []
-        monkeypatch.setattr(time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(pool, "_pool", self)
-
-    def schedule(self, *_, **__):
-        self.futures.append(ProcessFuture())
-        self.futures[-1].set_running_or_notify_cancel()
-        return self.futures[-1]
+        self.now, self.pool = 1000.0, pool
+        # Not the standard library's: it would wait for ever.
+        for module in ("ddenv.engine.pool", "ddenv.robot.deadline"):
+            monkeypatch.setattr(f"{module}.time", SimpleNamespace(monotonic=lambda: self.now))
 
     def looks(self, seconds, every=1.0):
         ended = []
@@ -178,6 +182,7 @@ class Clock:
 
 
 def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
+    monkeypatch.setattr("ddenv.engine.pool.WorkerProcess", Silent)
     pool = Pool(*parts(wall_timeout=60), 1)
     clock = Clock(pool, monkeypatch)
     pool.submit(1, EVERYTHING, 0)
@@ -188,7 +193,7 @@ def test_only_the_time_counts_in_which_the_robot_moves(monkeypatch):
     assert clock.looks(86400, every=86400) == []
     assert clock.looks(28, every=0.5) == []
     assert clock.looks(2, every=0.5) == [(1, Broken("timeout", "took longer than 60 s of wall clock"))]
-    assert clock.futures[0].cancelled()
+    assert Silent.killed == 1
     assert pool.idle == 1
     # Nothing of its time counts for the next one; and what never begins ends, too.
     pool.submit(2, EVERYTHING, 0)

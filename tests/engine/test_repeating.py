@@ -16,7 +16,8 @@ from tests.command import ddenv
 from tests.conftest import DATA
 from tests.engine import fake
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
-from tests.engine.test_driver import Killed, _kill, needs
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import needs
 
 FIRST = (frozenset(ELEMENTS), 0)
 
@@ -26,7 +27,7 @@ def begun(tmp_path):
     """A run whose engine was killed in the rounds."""
     path = new_run(tmp_path)
     with pytest.raises(Killed):
-        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: _kill(file, 60))
+        drive(path, FakePool(needs("wall", "beam"), 1), prepare=lambda file: kill_after(file, 60))
     assert state_of(path).round is not None
     return path
 
@@ -40,7 +41,7 @@ def resumed(path, kill=True, **options):
     """What an engine makes that goes on with the run, until it is killed, and the state after it."""
     pool = FakePool(needs("wall", "beam"), 1)
     with suppress(Killed):
-        drive(path, pool, prepare=(lambda file: _kill(file, 20)) if kill else None, **options)
+        drive(path, pool, prepare=(lambda file: kill_after(file, 20)) if kill else None, **options)
     return pool.made, state_of(path)
 
 
@@ -115,7 +116,7 @@ def test_where_the_first_run_breaks_now_it_says_why(begun, monkeypatch):
 def test_a_run_without_tests_belongs_to_the_engine_that_makes_the_first(tmp_path, monkeypatch):
     path = new_run(tmp_path)
     with pytest.raises(Killed):
-        drive(path, FakePool(needs("wall"), 1), prepare=lambda file: _kill(file, 1))
+        drive(path, FakePool(needs("wall"), 1), prepare=lambda file: kill_after(file, 1))
     another_drake(monkeypatch)
     made, state = resumed(path, kill=False)
     assert made.count(FIRST) == 1 and state.minimal

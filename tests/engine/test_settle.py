@@ -23,9 +23,10 @@ from ddenv.world.pose import Pose
 from ddenv.world.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.guided import Guided, numbers, until
+from tests.engine.killing import Killed, kill_after, story
+from tests.engine.oracles import needs
 from tests.engine.test_certify import DRIFTING, _killed, _resumed, at_rates, claims
-from tests.engine.test_driver import Killed, _kill, needs, story
-from tests.engine.test_steering import Guided, numbers, until
 from tests.tiers import examples
 
 PAIRS = [("ball", "post"), ("beam", "far_box")]
@@ -66,7 +67,7 @@ def test_what_is_wrong_with_the_start_is_told_once_each_before_the_first_test(tm
     made.settled = Settled(3.0, {"ball": (Pose((4.0, 4.0, 1.3)),)}, restless=("ball",))
     # The engine is killed after the first line.
     with pytest.raises(Killed):
-        drive(path, made, prepare=lambda file: _kill(file, 1))
+        drive(path, made, prepare=lambda file: kill_after(file, 1))
     with pytest.raises(Exception, match="budget"):
         drive(path, made)
     kinds = [event.kind for event in events(path)]

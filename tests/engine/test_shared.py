@@ -15,7 +15,7 @@ from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
-from tests.engine.test_driver import needs
+from tests.engine.oracles import needs
 
 METHOD = {"algorithm": "splitting"}
 

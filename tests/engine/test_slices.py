@@ -12,11 +12,12 @@ from ddenv.runfile.state import FRESH
 from ddenv.runfile.store import RunFile
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.guided import Guided, until
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.test_certify import _killed, _resumed
-from tests.engine.test_driver import Killed, _kill, needs
 from tests.engine.test_repeating import another_drake
-from tests.engine.test_steering import Guided, until
 from tests.tiers import examples
 
 NEEDED = st.sets(st.sampled_from(MODELS), min_size=1, max_size=3).map(lambda names: tuple(sorted(names)))
@@ -67,7 +68,7 @@ def test_an_old_run_file_has_no_slices():
 
 
 @given(made_by=SIMULATORS, accept=st.sampled_from(["first", "kept"]), seed=st.integers(0, 9))
-@examples(1)
+@examples(0.5)
 def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, accept, seed):
     with tempfile.TemporaryDirectory() as folder:
         ends = []
@@ -97,7 +98,7 @@ def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, 
 
 
 @given(made_by=FLAKY, jobs=st.integers(2, 4), seed=st.integers(0, 9), algorithm=st.sampled_from(["ddenv", "splitting"]))
-@examples(0.6)
+@examples(0.3)
 def test_workers_change_nothing(made_by, jobs, seed, algorithm):
     with tempfile.TemporaryDirectory() as folder:
         alone, together = (
@@ -113,7 +114,7 @@ def test_workers_change_nothing(made_by, jobs, seed, algorithm):
     jobs=st.integers(1, 3),
     accept=st.sampled_from(["first", "kept"]),
 )
-@examples(0.6)
+@examples(0.3)
 def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice(made_by, moments, jobs, accept):
     with tempfile.TemporaryDirectory() as folder:
         undisturbed = drive(sliced_run(Path(folder), accept_rate=accept), made_by.pool())
@@ -126,7 +127,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_end_and_makes_no_test_twice
 
 
 @given(made_by=SIMULATORS, jobs=st.integers(1, 3), data=st.data())
-@examples(0.6)
+@examples(0.3)
 def test_a_simulator_that_does_not_say_all_is_found_out(made_by, jobs, data):
     """Whatever it hides, the run ends as if it had never been asked."""
     liar = Participation(made_by.salt, made_by.needed, made_by.ties, hidden=frozenset(made_by.needed))
@@ -246,7 +247,7 @@ def test_implied_tests_do_not_count_for_the_budget(tmp_path):
 def test_what_was_made_with_other_software_implies_no_test_of_this(tmp_path, monkeypatch):
     path = sliced_run(tmp_path, accept_rate="kept", audit=1)
     with pytest.raises(Killed):
-        drive(path, HONEST.pool(), prepare=lambda file: _kill(file, 10))
+        drive(path, HONEST.pool(), prepare=lambda file: kill_after(file, 10))
     another_drake(monkeypatch)
     pool = HONEST.pool()
     pool.aside = lambda keep, seed: HONEST.run(keep, seed)[2] / 2**32 + 1e-9

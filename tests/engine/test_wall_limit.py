@@ -19,7 +19,8 @@ from ddenv.words import news
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
-from tests.engine.test_driver import Killed, _kill, needs, story
+from tests.engine.killing import Killed, kill_after, story
+from tests.engine.oracles import needs
 
 # Of the small world's scenario.
 BASELINE, TIMEOUT = 3, 5.0
@@ -47,7 +48,7 @@ def test_the_baseline_has_a_long_time_and_later_tests_a_multiple_of_what_it_took
     assert f"{GENEROUS:g} in the baseline" in SETTINGS["wall_timeout"].meaning
     path = new_run(tmp_path)
     with suppress(Killed):
-        drive(path, first := Timed(real), prepare=lambda file: _kill(file, 20))
+        drive(path, first := Timed(real), prepare=lambda file: kill_after(file, 20))
     assert first.limits[:BASELINE] == [GENEROUS] * BASELINE
     # The machine is another one now: the limit stays.
     drive(path, again := Timed(real / 7))

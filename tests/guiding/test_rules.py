@@ -20,8 +20,9 @@ from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.key_offers import KeyOffers
 from ddenv.workbench.run.run_keys import GUIDING
 from tests.engine.fake import ELEMENTS, drive, new_run
-from tests.engine.test_driver import Killed, _kill, flaky
-from tests.engine.test_steering import COMMANDS, Disturbed, at_once
+from tests.engine.guided import COMMANDS, Disturbed, at_once
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import flaky
 from tests.tiers import examples
 
 __all__ = ["at_once"]
@@ -87,7 +88,7 @@ def begun(folder, salt, plan, moment, mode):
     path, plan = new_run(Path(folder)), sorted(plan, key=lambda one: one[0])
     pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, plan, salt)
     try:
-        drive(path, pool, accept_mode=mode, prepare=lambda file: _kill(file, moment))
+        drive(path, pool, accept_mode=mode, prepare=lambda file: kill_after(file, moment))
     except Killed:
         pass
     finally:

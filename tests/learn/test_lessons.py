@@ -6,17 +6,19 @@ import sys
 import zipfile
 
 import pytest
-from docs.lessons import delivery
+from docs.lessons import delivery, quay, toys
 
 from ddenv.learn.handout import handout
-from ddenv.learn.oracle import read_oracle
+from ddenv.learn.lesson import Answer
+from ddenv.learn.recorded_oracle import read_oracle
 from ddenv.learn.score import Score, data_of, score_of, summary
 from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html
+from ddenv.rates import wilson_interval
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose
-from tests.learn.lessons import FILES, course, opened, through
+from tests.learn.lessons import FILES, RUNS, course, opened, through
 
 NUMBERS = range(len(FILES))
 by_stem = lambda number: FILES[number].stem  # noqa: E731
@@ -47,6 +49,36 @@ def test_everything_can_be_skipped(number):
     assert end.score.done and not end.score.answered
 
 
+def test_a_prediction_leaves_the_question_of_its_step_and_its_score_alone():
+    walk = course(0)
+    while walk.page.question is None:
+        assert walk.go_on()
+    assert walk.must_answer
+    walk.answer(walk.page.question.right)
+    score, page, at = walk.score, walk.page, walk.at
+    assert not walk.must_answer and walk.foretell()
+    assert walk.page.question != page.question and not walk.go_on()
+    walk.answer(0)
+    while walk.page != page:
+        assert walk.go_on() or walk.answer(0)
+    assert (walk.score, walk.at, walk.step) == (score, at, score.step)
+    assert walk.foretell() and walk.back() and walk.page == page
+    assert walk.go_on() and walk.step == score.step + 1
+
+
+def test_a_search_tells_nothing_of_a_race_before_the_bet_on_it():
+    lesson = opened(0).lesson
+    race = next(step for step in lesson.steps if step.race)
+    walk = course(0)
+    while walk.activity != "try":
+        walk.skip()
+        walk.go_on()
+    assert not {play.name for play in walk.plays} & set(race.race)
+    number = lesson.steps.index(race)
+    walk.score = walk.score.with_answer(str(number), Answer("", True, ""))
+    assert {play.name for play in walk.plays} >= set(race.race)
+
+
 @pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
 def test_every_wrong_answer_says_what_is_wrong_with_it(number):
     walk = course(number)
@@ -57,6 +89,8 @@ def test_every_wrong_answer_says_what_is_wrong_with_it(number):
             assert all(each.why and each.text and "{" not in each.text + each.why for each in question.answers)
             walk.answer(question.right)
             assert walk.page.remarks
+        if walk.due:
+            walk.skip()
         walk.go_on()
 
 
@@ -93,6 +127,28 @@ def test_the_oracle_of_the_toy_world_knows_every_part_and_agrees_with_the_run():
     )
 
 
+def test_the_oracle_of_the_quay_has_the_rates_by_which_its_robot_drives():
+    oracle = read_oracle(LESSONS / "quay.oracle.json")
+    there = (*toys.QUAY.names, *(name for name, *_ in toys.QUAY.walls), "ground_plane")
+    for gone in ((), ("ramp",), ("oil", "ramp"), ("gate",)):
+        models = [name for name in there if name not in gone]
+        stuck = sum(quay.way(models, seed)[0][-1] == (quay.GATE_STOP, quay.OFF) for seed in range(400))
+        low, high = wilson_interval(stuck, 400)
+        assert low <= oracle.rate(name for name in models if name in toys.QUAY.names) <= high
+
+
+@pytest.mark.parametrize("run", ["quay-first", "quay-kept"])
+def test_the_runs_on_the_quay_follow_the_rule_of_its_robot(run):
+    walls = {name for name, *_ in toys.QUAY.walls} | {"ground_plane"}
+    with RunFile(LESSONS / f"{run}.ddenv") as file:
+        position = position_in(file.events())
+    for test in position.end.tests:
+        models = {*purpose(position.start_of(test.id).after, test).models, *walls}
+        corners, reached = quay.way(models, test.seed)
+        stuck = "similar" if corners[-1] == (quay.GATE_STOP, quay.OFF) else "other"
+        assert test.outcome == ("pass" if reached else stuck)
+
+
 @pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
 def test_a_lesson_has_a_page_to_hand_out(number):
     page = html(handout(opened(number)))
@@ -105,6 +161,12 @@ def test_all_lessons_together_are_small(tmp_path):
         for file in LESSONS.iterdir():
             wheel.write(file, file.name)
     assert (tmp_path / "wheel.zip").stat().st_size < 2_000_000
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+def test_a_reader_writes_nothing_beside_a_lesson(run):
+    # The two bytes of SQLite's header that say that a reader makes no log of its own.
+    assert run.read_bytes()[18:20] == b"\x01\x01"
 
 
 def test_lessons_and_runs_need_neither_drake_nor_what_windows_lacks(tmp_path):

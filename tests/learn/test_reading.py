@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.errors import UserError
-from ddenv.learn import figures
+from ddenv.learn import lesson_figures
+from ddenv.learn.new_lesson import write_template
 from ddenv.learn.shelf import LESSONS, open_lesson
-from ddenv.learn.template import write_template
 
 GOOD = """\
 title: A title
@@ -48,13 +48,56 @@ WRONG = [
     ("steps:", "steps: {}\nmore:", 5, "more: unknown key"),
     ("    ask: What?\n", "", 10, "belongs to a question; the key 'ask' is missing"),
     ("Now.", "The {smallest} of all.", 8, "needs an oracle"),
+    ("{models}", "{other.tests}", 5, "has no run 'other' beside its own"),
+    ("{models}", "{without ramp}", 5, "the last certificate says nothing about 'ramp'"),
+    ("{models}", "{rate of sign}", 5, "needs an oracle"),
+    ("steps:", "beside: x\nsteps:", 4, "beside: expected names, each with a file"),
     ("title: A title", "title: [", 3, "not valid YAML"),
     ("title: A title", "title: !!python/object/apply:os.system [ls]", 1, "title: expected a text"),
+]
+
+ALONE = (
+    GOOD.replace("steps:", "oracle: delivery.oracle.json\nsteps:")
+    + """\
+  - text: Try it.
+    try:
+      budget: 12
+  - text: Look.
+    race: [ddmin, splitting]
+"""
+)
+WRONG_ALONE = [
+    ("oracle: delivery.oracle.json\n", "", 19, "steps[3].try: needs to know how every part of the world ends"),
+    ("budget: 12", "budget: 0", 20, "steps[3].try.budget: expected a number from 1 to 600, found '0'"),
+    ("budget: 12", "tests: 12", 20, "steps[3].try.tests: unknown key; allowed are budget"),
+    ("try:\n      budget: 12", "try: 12", 19, "steps[3].try: expected keys such as budget"),
+    (
+        "    try:\n",
+        "    foretell: outcome\n    try:\n",
+        21,
+        "a step has one of ask, foretell, try, race, found foretell and try",
+    ),
+    ("[ddmin, splitting]", "ddmin", 22, "steps[4].race: expected a list with at least one entry"),
+    ("[ddmin, splitting]", "[ddmin]", 22, "steps[4].race: expected 2 to 4 algorithms or pairs, found 1"),
+    ("[ddmin, splitting]", "[ddmin, ddmin]", 22, "steps[4].race[2]: 'ddmin' stands twice"),
+    (
+        "[ddmin, splitting]",
+        "[ddmin, spliting]",
+        22,
+        "steps[4].race[2]: 'spliting' is not allowed (did you mean splitting?)",
+    ),
+    (
+        "[ddmin, splitting]",
+        "[ddmin, timeseg/random]",
+        21,
+        "'timeseg/random' is not recorded yet; 'ddenv learn --record",
+    ),
 ]
 
 
 def lesson(folder, text):
     shutil.copy(LESSONS / "delivery.ddenv", folder)
+    shutil.copy(LESSONS / "delivery.oracle.json", folder)
     file = folder / "mine.yaml"
     file.write_text(text)
     return file
@@ -62,12 +105,18 @@ def lesson(folder, text):
 
 def test_a_good_lesson_is_read(tmp_path):
     assert len(open_lesson(lesson(tmp_path, GOOD)).lesson.steps) == 2
+    whole = open_lesson(lesson(tmp_path, ALONE))
+    assert whole.lesson.steps[2].budget == 12 and whole.lesson.asked == 5
+    assert [play.name for play in whole.racers(whole.lesson.steps[3])] == ["ddmin", "splitting"]
 
 
-@pytest.mark.parametrize(("old", "new", "line", "words"), WRONG, ids=[each[3][:40] for each in WRONG])
-def test_a_mistake_is_one_line_with_its_place(tmp_path, old, new, line, words):
-    assert old in GOOD
-    file = lesson(tmp_path, GOOD.replace(old, new, 1))
+MISTAKES = [(GOOD, *each) for each in WRONG] + [(ALONE, *each) for each in WRONG_ALONE]
+
+
+@pytest.mark.parametrize(("good", "old", "new", "line", "words"), MISTAKES, ids=[each[4][:40] for each in MISTAKES])
+def test_a_mistake_is_one_line_with_its_place(tmp_path, good, old, new, line, words):
+    assert old in good
+    file = lesson(tmp_path, good.replace(old, new, 1))
     with pytest.raises(UserError) as error:
         open_lesson(file)
     assert str(error.value).startswith(f"{file}:{line}"), error.value
@@ -78,11 +127,11 @@ def test_a_mistake_is_one_line_with_its_place(tmp_path, old, new, line, words):
 @given(st.text(alphabet="ab{}_.()[]'1 models\n:-", max_size=40))
 def test_a_text_is_never_more_than_a_text(text):
     try:
-        figures.check(text)
+        lesson_figures.check(text)
     except UserError:
         return
-    filled = figures.filled(text, {"models": "8"})
-    assert re.sub("8", "", filled) == text.replace("{models}", "")
+    filled = lesson_figures.filled(text, lambda name: "8")
+    assert re.sub("8", "", filled) == re.sub(r"\{[^{}]*\}", "", text)
 
 
 def test_a_new_lesson_is_whole(tmp_path):

@@ -3,29 +3,46 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copy
 from tempfile import mkdtemp
 
 from ddenv.learn.shelf import LESSONS, bundled
 from ddenv.report.report import write_report
+from ddenv.runfile.store import RunFile
+from ddenv.scene.player import Player
+from ddenv.scene.stage import Stage
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.lesson_screen import LessonScreen
+from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLesson, ShowLessons
+from ddenv.workbench.messages import ShowLesson, ShowLessons, ShowRace
 
 RUN = LESSONS / "delivery.ddenv"
 
 
 async def main() -> None:
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("enter", "enter", "s", "right")
         assert isinstance(pilot.app.screen, LessonScreen) and pilot.app.screen.course.step == 2
+        await pilot.press("s", "enter", "enter")
+        await shown(pilot)
+        assert isinstance(pilot.app.screen, TryScreen)
     async with Workbench(first=ShowLesson(RUN)).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("right_curly_bracket")
         assert len(pilot.app.screen.course.position.now.environment) == 6
+    copy(RUN, other := Path(mkdtemp()) / "other.ddenv")
+    async with Workbench(first=ShowRace((RUN, other))).run_test(size=(120, 36)) as pilot:
+        await shown(pilot)
+        await pilot.press("end")
+        assert pilot.app.screen.race.over
     async with Workbench(RUN, watch=True).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
+    sent = []
+    with RunFile(RUN) as run:
+        Player(run, Stage(lambda message, _: sent.append(message)), lambda **_: None).tick(0.0)
+    assert sent
     write_report(RUN, Path(mkdtemp()) / "report.html", False)
     print("all shown")
 

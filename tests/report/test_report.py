@@ -13,7 +13,7 @@ from ddenv.page.blocks import Picture, Table
 from ddenv.report.report import content, files_of, write_report
 from ddenv.report.rounds import MOST_ROUNDS
 from ddenv.report.run_data import read_run
-from tests.workbench import fake_run
+from tests.workbench import fake_moments, fake_run
 
 VOID = {"meta"}
 INLINE = {"strong", "bdi"}
@@ -88,7 +88,7 @@ def words(cell):
 
 
 def test_a_finished_run_in_a_few_words(run, tmp_path):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     text = page(run, tmp_path).text
     assert "2 of 11 models are enough to make the robot fail" in text
     assert "Minimal: no single model can be removed: f in 23 of 23 fresh runs (86 % to 100 %)" in text
@@ -101,21 +101,21 @@ def test_a_finished_run_in_a_few_words(run, tmp_path):
 
 
 def test_the_page_needs_nothing_else_and_runs_nothing(run, tmp_path):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     made = page(run, tmp_path)
     assert not made.tags & {"script", "link", "img", "iframe", "a", "object"}
     assert not made.attributes & {"src", "href", "onload", "onclick"}
 
 
 def test_models_that_are_left_have_place_and_size(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "model")]
     assert rows[0] == ("crate_00", "static", "-4.50, 0.00, 0.15", "1.20 × 0.80 × 0.30")
     assert [row[0] for row in rows] == ["crate_00", "crate_01"]
 
 
 def test_what_a_removal_drops_stands_in_the_table_of_models(run):
-    fake_run.piled(run)
+    fake_moments.piled(run)
     rows = {words(row[0]): words(row[-1]) for row in table(content(read_run(run.path)), "removing it drops")}
     assert {name: fallen for name, fallen in rows.items() if fallen} == {
         "crate_02": "crate_01",
@@ -125,7 +125,7 @@ def test_what_a_removal_drops_stands_in_the_table_of_models(run):
 
 
 def test_rounds_as_they_ended(run):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     rows = [tuple(map(words, row)) for row in table(content(read_run(run.path)), "round")]
     assert rows == [
         ("1", "2", "1 of 2", "part A", "6", "1"),
@@ -150,7 +150,7 @@ def test_other_failures_have_names_numbers_and_the_smallest_environment(run):
 
 
 def test_what_was_decided_by_hand(run):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     report = content(read_run(run.path))
     done = [words(row[-1]) for row in table(report, "what the user did")]
     assert done[:2] == ["took back without A: 6 models again", "pinned crate_00"]
@@ -206,21 +206,21 @@ def test_a_run_that_has_not_come_to_an_end_says_so(run, tmp_path, made, told):
 
 
 def test_a_run_that_is_still_on_says_so(run, tmp_path):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     text = page(run, tmp_path).text
     assert "This run has not ended. This report shows what was known at" in text
     assert "6 of 11 models are enough to make the robot fail so far" in text
 
 
 def test_of_a_damaged_run_what_makes_sense_is_told(run, tmp_path):
-    fake_run.finished(run).write("reduced", candidate=99, environment=[77], evidence_test=1)
+    fake_moments.finished(run).write("reduced", candidate=99, environment=[77], evidence_test=1)
     text = page(run, tmp_path).text
     assert "Parts of this run could not be read." in text and "is invalid here" in text
     assert "2 of 11 models" in text
 
 
 def test_without_a_world_there_is_no_map(run, tmp_path):
-    fake_run.finished(run).file._db.execute("UPDATE document SET content = ? WHERE name = 'world'", (b"<sdf",))
+    fake_moments.finished(run).file._db.execute("UPDATE document SET content = ? WHERE name = 'world'", (b"<sdf",))
     report = content(read_run(run.path))
     assert not any(isinstance(each, Picture) and each.name == "map" for each in report.sections[0].blocks)
     text = page(run, tmp_path).text
@@ -272,7 +272,7 @@ def test_markdown_is_the_same_with_pictures_beside_it(tmp_path):
 
 
 def test_nothing_is_overwritten_unless_asked(run, tmp_path):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     file = tmp_path / "report.md"
     (tmp_path / "report.chart.svg").write_text("mine")
     with pytest.raises(UserError, match=r"report\.chart\.svg: exists already; .*--force"):

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from ddenv.robot import reached
 from ddenv.robot.drake.template import Variants
-from ddenv.robot.hull import Hull
 from ddenv.robot.result import RunResult
+from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.slices import Ties
 from ddenv.world.model import Box, Model, Sphere

@@ -14,8 +14,9 @@ from ddenv.runfile.atlas import CHUNK, atlas, models_of
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import drive, new_run
-from tests.engine.test_driver import Killed, _kill, flaky
-from tests.engine.test_steering import COMMANDS, Disturbed
+from tests.engine.guided import COMMANDS, Disturbed
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import flaky
 from tests.tiers import examples
 
 Test.__test__ = False
@@ -33,7 +34,7 @@ def test_the_models_of_each_failed_test_are_known_from_the_state(salt, plan, mom
         path = new_run(Path(folder), early_stop=early_stop)
         pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, sorted(plan, key=lambda one: one[0]), salt)
         try:
-            drive(path, pool, prepare=lambda file: _kill(file, moment))
+            drive(path, pool, prepare=lambda file: kill_after(file, moment))
         except Killed:
             pass
         finally:

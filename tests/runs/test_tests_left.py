@@ -5,13 +5,14 @@ from statistics import median
 
 import pytest
 
+from ddenv.certificate_cost import certificate_tests
 from ddenv.reduction.certificate import Terms, error_of, falls, keeps, settle
 from ddenv.runfile.fold import fold
-from ddenv.runs.tests_left import certificate_tests, remaining, rough_run, rough_tests
+from ddenv.runs.tests_left import remaining, rough_run, rough_tests
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
-from tests.workbench import fake_run
+from tests.workbench import fake_moments, fake_run
 
 # Mean tests of random worlds (docs/benchmarks.md): models, with a failure that always shows, and with one in 80 % of the runs.
 MEASURED = (
@@ -81,6 +82,13 @@ def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, keep_r
     assert low < likely < high
 
 
+@pytest.mark.parametrize("keep_rate", [0.0, 1.0])
+@pytest.mark.parametrize("left", [0, 3])
+def test_terms_that_make_no_sense_have_a_number_too(keep_rate, left):
+    low, likely, high = certificate_tests(1.0, keep_rate, left, 0)
+    assert 0 <= low <= likely <= high
+
+
 def test_a_rough_run_has_its_certificate():
     asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10, "keep_rate": 0.8})
     kept, printed = rough_run(43, asked), rough_run(43, asked.model_copy(update=PRINTED))
@@ -92,7 +100,7 @@ def test_a_rough_run_has_its_certificate():
 
 
 def test_each_test_leaves_one_less(run):
-    before = left(fake_run.mid_round(run))
+    before = left(fake_moments.mid_round(run))
     run.finish(11, "pass")
     after = left(run)
     assert after.tests[1] == before.tests[1] - 1
@@ -105,13 +113,13 @@ CERTIFICATE = certificate_tests(3.5 / 5, 0.8, 3, 4)
 
 
 def test_the_certificate_is_left_after_the_search(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 9], tests_done=10)
     assert left(run).tests == tuple(a + b for a, b in zip((0, 1, 9), CERTIFICATE, strict=True))
 
 
 def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     terms = {"rate": 0.99, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
     run.write("certificate_started", certificate=1, run=10_000, **terms)
     low, likely, high = certificate_tests(0.99, 0.8, 6, 4)
@@ -135,7 +143,7 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
 
 
 def test_no_time_is_said_while_nothing_runs(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     assert left(run, at_work=False).seconds is None
     run.write("paused")
     assert left(run).seconds is None
@@ -143,14 +151,14 @@ def test_no_time_is_said_while_nothing_runs(run):
 
 def test_nothing_is_left_of_what_did_not_begin_or_has_ended(run):
     assert left(run) is None
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     assert left(run) is not None
     run.write("finished", minimal=True, reason="")
     assert left(run) is None
 
 
 def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.write("forecast", round=2, tests=[0, 1, 2], tests_done=1)
     assert left(run) is None
     run.write("forecast", round=2, tests=[1, 5, 9], tests_done=9)
@@ -160,19 +168,19 @@ def test_more_tests_than_expected_end_the_forecast_and_so_does_another_search(ru
 
 
 def test_a_run_file_without_forecasts_is_read(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     events = [event for event in run.file.events() if event.kind != "forecast"]
     assert remaining(fold(events), True) is None
 
 
 def test_a_budget_ends_it(run):
-    state = state_of(fake_run.mid_round(run))
+    state = state_of(fake_moments.mid_round(run))
     scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": 13}}
     assert max(remaining(state.changed(scenario=scenario), True).tests) <= 3
 
 
 @pytest.mark.parametrize("value", ["x", None, float("inf"), float("nan"), -3, 10**30, True])
 def test_settings_that_make_no_sense_do_no_harm(run, value):
-    state = state_of(fake_run.mid_round(run))
+    state = state_of(fake_moments.mid_round(run))
     low, likely, high = remaining(state.changed(scenario={"reduction": {"budget": value}}), True).tests
     assert low <= likely <= high

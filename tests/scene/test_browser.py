@@ -5,8 +5,11 @@ from __future__ import annotations
 import base64
 import io
 import json
+import re
 import shutil
+import socket
 import subprocess
+import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +20,7 @@ import pytest
 from PIL import Image
 from tornado.websocket import websocket_connect
 
+from ddenv.report.report import write_report
 from tests.waiting import PATIENCE, eventually, wait_until
 
 CHROMIUM = shutil.which("chromium")
@@ -91,6 +95,13 @@ class Page:
                     raise RuntimeError(answer["error"])
                 return answer["result"]
 
+    async def heed(self) -> None:
+        """From now on notes what a page's policy forbids; `forbidden` tells."""
+        note = "document.addEventListener('securitypolicyviolation', (event) => forbidden.push(event.violatedDirective + ' '"
+        source = f"window.forbidden = []; {note} + event.blockedURI))"
+        await self.do("Page.enable")
+        await self.do("Page.addScriptToEvaluateOnNewDocument", source=source)
+
     async def value(self, expression: str):
         """What a JavaScript expression gives, promises awaited."""
         result = await self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
@@ -121,6 +132,7 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
     url = process.stdout.readline().strip()
     with chromium((900, 600)) as port:
         page = await Page.open(port)
+        await page.heed()
         await page.do("Page.navigate", url=url)
         ready = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 5"
         await shows(page, ready)
@@ -129,6 +141,7 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
         await shows(page, "viewer.scene_tree.find(['world', 'models', '003 board']).object.visible === false")
         await shows(page, "viewer.scene_tree.find(['world', 'removed', '003 board']).object.visible === true")
         await page.value("document.querySelectorAll('.card').forEach((card) => card.style.opacity = 0)")
+        assert await page.value("forbidden") == []
         picture = np.asarray(Image.open(io.BytesIO(await page.screenshot())).convert("RGB"))
         process.terminate()
         process.wait(PATIENCE)
@@ -137,3 +150,50 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
     assert near(picture, (240, 190, 20)) > 100, "the robot's yellow"
     assert near(picture, (20, 180, 75)) > 100, "the goal's green"
     assert near(picture, (235, 40, 35)) > 100, "the failure's red"
+
+
+async def forbidden_of(url: str, ready: str) -> list[str]:
+    """What the policy of a page forbids until it is `ready`."""
+    with chromium((900, 600)) as port:
+        page = await Page.open(port)
+        await page.heed()
+        await page.do("Page.navigate", url=url)
+        await shows(page, f"document.readyState === 'complete' && ({ready})")
+        return await page.value("forbidden")
+
+
+@pytest.mark.browser
+async def test_a_report_looks_as_it_should_and_runs_nothing(run_folder):
+    page = run_folder / "report.html"
+    write_report(run_folder / "a.ddenv", page)
+    styled = "getComputedStyle(document.querySelector('h1')).margin !== ''"
+    assert await forbidden_of(page.as_uri(), styled) == []
+    (run_folder / "bad.html").write_text(
+        page.read_text().replace("<main>", "<main><script>document.title = 'run'</script>")
+    )
+    assert await forbidden_of((run_folder / "bad.html").as_uri(), "document.title !== 'run'") == [
+        "script-src-elem inline"
+    ]
+
+
+@pytest.fixture
+def run_folder(writer, tmp_path):
+    writer.baseline()
+    writer.round()
+    writer.reduce()
+    return tmp_path
+
+
+@pytest.mark.browser
+async def test_the_served_workbench_is_drawn_within_its_policy(home):
+    pytest.importorskip("textual_serve")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = [sys.executable, "-m", "ddenv", "serve", "--port", str(port)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            url = re.search(r"http://\S+/", server.stdout.readline())[0]
+            assert await forbidden_of(url, "document.body.classList.contains('-first-byte')") == []
+        finally:
+            server.terminate()

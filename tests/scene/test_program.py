@@ -30,12 +30,12 @@ from tests.waiting import PATIENCE, wait_until
 
 def url_of(process: subprocess.Popen) -> str:
     line = process.stdout.readline().strip()
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/static/", line), process.stderr.read()
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{22}/", line), process.stderr.read()
     return line
 
 
 def feed_of(url: str) -> str:
-    return url.replace("http:", "ws:").removesuffix("static/")
+    return url.replace("http:", "ws:") + "feed"
 
 
 def listening(pid: int) -> list[str]:
@@ -89,11 +89,20 @@ def test_page_and_viewer_are_served_and_nothing_else(writer, start_scene):
         assert b"main.min.js" in answer.read()
     with urlopen(url + "main.min.js") as answer:
         assert len(answer.read()) > 100_000
-    with urlopen(url.removesuffix("static/")) as answer:
-        assert answer.url == url
     for path in ("index.js", "../__init__.py", "%2e%2e/%2e%2e/visualizer.py", "main.js"):
         with pytest.raises(HTTPError):
             urlopen(url + path)
+
+
+async def test_nobody_watches_without_the_token(writer, start_scene):
+    url = url_of(start_scene(writer.path))
+    root, token = url.rsplit("/", 2)[:2]
+    for path in ("", "static/", "feed", "main.min.js", f"{token[:-1]}/", f"{'x' * len(token)}/", f"{token[:-1]}/feed"):
+        with pytest.raises(HTTPError) as refused:
+            urlopen(f"{root}/{path}")
+        assert refused.value.code == 403
+        with pytest.raises(HTTPClientError, match="403"):
+            await websocket_connect(feed_of(f"{root}/{path}").removesuffix("feed"))
 
 
 async def test_a_browser_gets_the_scene_and_its_words(writer, start_scene):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +27,7 @@ class Engine:
 
     def __init__(self, lab: Lab, run: Path, jobs: int, share: Path | None = None) -> None:
         self._lab, self._run = lab, run
-        given = {"jobs": jobs, "share": share, "since": time.time()}
+        given = {"jobs": jobs, "cluster": None, "share": share, "after": None, "anyway": "no"}
         self._options = Namespace(accept_mode="automatic", bits="same", certify=None, **given)
         self._terminated = threading.Event()
         self._code: int | None = None
@@ -71,6 +70,8 @@ class Lab:
         monkeypatch.setattr(work, "start_engine", self.start_engine)
         monkeypatch.setattr(program, "Pool", self._pool)
         monkeypatch.setattr(program, "read_parts", self._parts)
+        # No program starts.
+        monkeypatch.setattr(program, "check_trusted", lambda *_: None)
 
     def start_engine(self, run: Path, jobs: int, accept_mode: str = "automatic", share: Path | None = None) -> Engine:
         self.started.append((run.stem, jobs))

@@ -10,7 +10,7 @@ from ddenv.study.results import read_cell
 from ddenv.study.study_folder import RUNS, run_path
 from ddenv.version import __version__
 from tests.study.made import FRESH, LEFT, TESTS, begun, certified, crates, ended, holds, never_failed, plan_of, reduced
-from tests.workbench import fake_run
+from tests.workbench import fake_moments
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_tests_that_were_taken_over_count_as_any_other(tmp_path, cell, run):
 
 PROBLEMS = {
     "begun": (lambda run: run.created(), "has not ended"),
-    "under way": (fake_run.mid_round, "has not ended"),
+    "under way": (fake_moments.mid_round, "has not ended"),
     "stopped": (
         lambda run: run.created().baseline().write("engine_stopped", reason="as you asked"),
         "as you asked",

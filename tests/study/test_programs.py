@@ -40,8 +40,9 @@ WORDS = (
 
 
 @pytest.fixture
-def start(tmp_path):
+def start(tmp_path, monkeypatch):
     """Starts the study; nothing of it is left in the end."""
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path / "home"))
     started = []
 
     def begin():

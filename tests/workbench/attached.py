@@ -65,12 +65,13 @@ class Session:
 
 
 class Attached:
-    def __init__(self, run, size=(120, 36), watch=False):
-        self.run, self.size, self.watch = run, size, watch
+    def __init__(self, run, size=(120, 36), watch=False, notices=False):
+        """With `notices` they are on the screen, too."""
+        self.run, self.size, self.watch, self.notices = run, size, watch, notices
 
     async def __aenter__(self):
         app = Workbench(self.run.path, watch=self.watch)
-        self._context = app.run_test(size=self.size)
+        self._context = app.run_test(size=self.size, notifications=self.notices)
         pilot = await self._context.__aenter__()
         await app.workers.wait_for_complete()
         await pilot.pause()

@@ -9,11 +9,10 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
-from ddenv.claims import is_minimal, verdict_on
 from ddenv.rates import wilson_interval
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.state import FIRST_FRESH_RUN
+from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
@@ -89,6 +88,11 @@ class FakeRun:
         # What takes part in each run from now on.
         self.met: list[str] | None = None
         self._stack = ExitStack()
+
+    @property
+    def state(self) -> RunState:
+        """What all its events add up to."""
+        return fold(self.file.events())
 
     def engine(self):
         return engine_lock(self.path)
@@ -185,7 +189,7 @@ class FakeRun:
 
     def finish_certificate(self, *claims: tuple[str | None, str, str]) -> None:
         """Each claim as (without, verdict, outcomes as in `certify_all`)."""
-        tests = [test.id for test in fold(self.file.events()).confirm_tests]
+        tests = [test.id for test in self.state.confirm_tests]
         self.write("certificate_finished", claims=[self._claim(*each) for each in claims], tests=tests)
 
     def _claim(self, without: str | None, verdict: str, outcomes: str) -> dict:
@@ -322,155 +326,3 @@ def path_samples() -> array:
         yaw = math.atan2(3.6 * math.cos(3 * part) + 0.25, 8)
         rows.extend((45 * part, x, y, 0.2, math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
     return rows
-
-
-def mid_round(run: FakeRun) -> FakeRun:
-    """Round 2 with one part judged and a re-run under way."""
-    run.created().baseline()
-    run.start_round(2)
-    test = run.similar(0)
-    left = run.elements[:6]
-    run.reduce(0, left, test)
-    run.start_round(3, left)
-    run.dissimilar(0)
-    run.test(1, "pass")
-    first = run.start(1, 1)
-    second = run.start(2, 0)
-    run.live((first, 0.6), (second, 0.25))
-    return run
-
-
-def sliced(run: FakeRun) -> FakeRun:
-    """In the first round of a slice the test of the third candidate is implied by that of the second; the next one runs."""
-    run.created().write("still")
-    run.met = [f"crate_{number:02}" for number in (2, 3, 4, 6, 7)]
-    run.baseline()
-    run.write("sliced", environment=run.numbers(run.met), tests=[1, 2, 3, 4], evidence_test=1, audit=False)
-    run.write("leg_started", round=1, n_partitions=None)
-    run.start_round(3, run.met)
-    run.dissimilar(0)
-    without = run.test(1, "pass")
-    run.judge(1, "dissimilar", [without])
-    run.judge(2, "dissimilar", [run.imply(2, without)])
-    run.live((run.start(3), 0.5))
-    return run
-
-
-def piled(run: FakeRun) -> FakeRun:
-    """A round in a world where crates lie on others, with one part judged."""
-    run.created().supports(("crate_02", "crate_05"), ("crate_01", "crate_02"), ("crate_07", "crate_04"))
-    run.baseline()
-    run.start_round(3)
-    run.dissimilar(0)
-    run.live((run.start(1, 0), 0.6))
-    return run
-
-
-def waiting(run: FakeRun) -> FakeRun:
-    """Round 1: the first part shows f, and waits for the user."""
-    run.created().baseline()
-    run.write("accept_mode", mode="ask")
-    run.start_round(3)
-    run.similar(0)
-    run.write("waiting", candidate=0)
-    return run
-
-
-def _rounds(run: FakeRun) -> FakeRun:
-    """A run whose rounds left two models."""
-    run.created().baseline()
-    left = run.elements
-    for keep, parts in ((6, 2), (2, 3)):
-        run.start_round(parts, left)
-        test = run.similar(0)
-        left = left[:keep]
-        run.reduce(0, left, test)
-    run.start_round(2, left)
-    run.dissimilar(0)
-    run.dissimilar(1)
-    run.write("round_finished")
-    return run
-
-
-def guided(run: FakeRun) -> FakeRun:
-    """Two reductions, one taken back; a pinned model; three selections by hand: one adopted, one in vain, one under way."""
-    run.created().baseline()
-    run.start_round(2)
-    left = run.elements[:6]
-    run.reduce(0, left, run.similar(0))
-    run.start_round(3, left)
-    run.reduce(1, left[:2] + left[4:], run.similar(1))
-    run.go_back(1, rejected=2)
-    run.pin(left[0])
-    kept = left[:5]
-    adopted = run.try_out(kept)
-    test = run.start_hand(adopted)
-    run.finish(test, "similar", 0.12, failure="stuck")
-    run.judge_trial(adopted, "similar", [test])
-    run.adopt(adopted, kept, test)
-    vain = run.try_out(kept[:2])
-    tests = [run.start_hand(vain, number) for number in range(4)]
-    for number in tests:
-        run.finish(number, "other", 2.3, failure="tipped over")
-    run.judge_trial(vain, "dissimilar", tests)
-    run.start_round(2, kept, pinned=(left[0],))
-    run.dissimilar(0)
-    under_way = run.try_out(kept[1:])
-    run.live((run.start(1, 0), 0.4), (run.start_hand(under_way), 0.7))
-    return run
-
-
-def certifying(run: FakeRun) -> FakeRun:
-    """The rounds left two models, and fresh runs show what they are worth."""
-    _rounds(run).start_certificate()
-    run.certify_all(2, None, "ssssss")
-    run.certify_all(0, None, "ssspss")
-    run.certify_all(2, "crate_00", "oppe")
-    run.live((run.certify(2, "crate_00", 4), 0.6), (run.certify(2, "crate_01"), 0.25))
-    return run
-
-
-def finished(run: FakeRun) -> FakeRun:
-    """A run that ended with two models, each shown to be needed."""
-    _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "needed", 9 * "p" + "oo"), ("crate_01", "needed", 11 * "p" + "s"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
-    return _claimed(run, claims)
-
-
-def uncertified(run: FakeRun) -> FakeRun:
-    """A run of a file of format 4, which ended with two models and without a certificate."""
-    _rounds(run).write("finished", minimal=True, reason="no single model can be removed")
-    return run
-
-
-def not_shown(run: FakeRun) -> FakeRun:
-    """A run that ended with two models, one of which may not be needed."""
-    _rounds(run).start_certificate()
-    claims = ((None, "kept", 23 * "s"), ("crate_00", "not shown", 9 * "sp" + "oo"), ("crate_01", "unknown", "pseeeeee"))
-    run.certify_all(0, None, 11 * "s" + "p" + 11 * "s")
-    return _claimed(run, claims)
-
-
-def rarer(run: FakeRun) -> FakeRun:
-    """Round 2 in an environment that showed f in one of six runs."""
-    run.created().baseline()
-    run.start_round(2)
-    left, endings = run.elements[:6], ("pass", "similar", "pass", "other", "pass", "pass")
-    tests = [run.test(0, outcome, 0.12, number) for number, outcome in enumerate(endings)]
-    run.judge(0, "similar", tests)
-    run.reduce(0, left, tests[1])
-    run.start_round(3, left)
-    run.dissimilar(0)
-    run.live((run.start(1), 0.6))
-    return run
-
-
-def _claimed(run: FakeRun, claims: tuple) -> FakeRun:
-    """The runs of the current environment that each claim rests on, and the end."""
-    for without, _, outcomes in claims:
-        run.certify_all(2, without, outcomes)
-    run.finish_certificate(*claims)
-    certificate = fold(run.file.events()).certificates[-1]
-    run.write("finished", minimal=is_minimal(certificate), reason=verdict_on(certificate))
-    return run

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from typing import ClassVar
 
+import fake_moments
 import fake_run
 import pytest
 from textual.binding import Binding
@@ -29,7 +30,7 @@ def told(screen):
 
 
 async def test_help_begins_with_the_focused_pane_and_shows_the_users_own_keys(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Workbench(run.path, config=Config(keys={"run.pause": "f8"})).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         found = groups(pilot.app.screen)
@@ -49,7 +50,7 @@ async def test_help_begins_with_the_focused_pane_and_shows_the_users_own_keys(ru
 async def test_every_action_and_model_is_a_command_and_names_are_no_markup(runs):
     names = [f"[bold]box_{number}[/]" for number in range(3)]
     run = fake_run.FakeRun(runs / "m.ddenv", world=fake_run.world_text(names))
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.close()
     async with Workbench(run.path).run_test(size=(120, 36)) as pilot:
         await pilot.pause()
@@ -106,7 +107,7 @@ async def test_footer_help_and_commands_offer_only_what_can_be_done_now(run):
 
 @pytest.mark.parametrize("theme", ["ddenv-light", "ansi-dark"])
 async def test_every_theme_can_be_worn(run, theme):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Workbench(run.path, config=Config(theme=theme)).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         pilot.app.action_help()
@@ -143,25 +144,33 @@ async def listens(port):
 async def test_a_browser_gets_the_app_and_other_pages_do_not(run):
     aiohttp = pytest.importorskip("aiohttp")
     pytest.importorskip("textual_serve")
-    fake_run.finished(run).close()
+    fake_moments.finished(run).close()
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    words = [sys.executable, "-m", "ddenv", "serve", "--port", str(port), str(run.path)]
+    words = [sys.executable, "-m", "ddenv", "serve", "--port", str(port), "--font-size", "28", str(run.path)]
     server = await asyncio.create_subprocess_exec(*words, stdout=asyncio.subprocess.PIPE, env=dict(os.environ))
     own = f"http://127.0.0.1:{port}"
     try:
         said = [(await server.stdout.readline()).decode() for _ in range(4)]
-        assert own in said[0] and "acts as" in said[1] and f"ssh -L {port}:127.0.0.1:{port}" in said[3]
+        home = re.search(rf"({own}/[\w-]{{22}}/)\?fontsize=28 ", said[0])[1]
+        assert "acts as" in said[1] and f"ssh -L {port}:127.0.0.1:{port}" in said[3]
         async with aiohttp.ClientSession() as session:
             await eventually(lambda: listens(port))
-            async with session.get(own) as page:
-                assert page.status == 200 and "textual.js" in await page.text()
-            async with session.get(own, headers={"Host": "elsewhere.example"}) as page:
+            async with session.get(f"{home}?fontsize=28") as page:
+                text = await page.text()
+                assert page.status == 200 and "textual.js" in text and 'data-font-size="28"' in text
+                assert page.headers["Content-Security-Policy"].startswith("default-src 'none'")
+            for path in ("/", "/ws", "/static/js/textual.js", f"/{'x' * 22}/", home.removeprefix(own)[:-1] + "x/"):
+                async with session.get(f"{own}{path}") as page:
+                    assert page.status == 403
+            with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
+                await session.ws_connect(f"{own}/ws", headers={"Origin": own})
+            async with session.get(home, headers={"Host": "elsewhere.example"}) as page:
                 assert page.status == 403
             with pytest.raises(aiohttp.WSServerHandshakeError):
-                await session.ws_connect(f"{own}/ws", headers={"Origin": "http://elsewhere.example"})
-            async with session.ws_connect(f"{own}/ws?width=120&height=36", headers={"Origin": own}) as socketed:
+                await session.ws_connect(f"{home}ws", headers={"Origin": "http://elsewhere.example"})
+            async with session.ws_connect(f"{home}ws?width=120&height=36", headers={"Origin": own}) as socketed:
                 seen = b""
                 while b"crates" not in seen:
                     message = await socketed.receive(timeout=PATIENCE)

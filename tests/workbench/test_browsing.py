@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-import fake_run
+import fake_moments
 import pytest
 from attached import Attached
 from textual.widgets import OptionList
@@ -16,13 +16,14 @@ from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidate_rows import COLUMNS, FRESH_COLUMNS, MEANINGS
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.facts_dialog import FactsDialog
+from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.wording import CLAIM, OUTCOME, STATUS, VERDICT
 from tests.waiting import eventually
 
 
 @pytest.mark.parametrize("watch", [False, True])
 async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run, watch):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run, watch=watch) as session:
         table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
         await session.press("less_than_sign", "less_than_sign")
@@ -44,8 +45,32 @@ async def test_map_table_and_explanation_show_an_earlier_round_until_escape(run,
         assert session.screen.snapshot is session.screen.poll.snapshot
 
 
+async def test_the_log_ends_with_the_moment_that_is_shown(run):
+    fake_moments.finished(run).hold()
+    async with Attached(run, size=(200, 60)) as session:
+        log = session.screen.query_one("#log", Lines)
+        whole = list(log.items)
+        await session.press("less_than_sign", "less_than_sign")
+        assert [entry.words for entry in log.items][-1] == "  reduced to 2 models after 6 tests"
+        assert list(log.items) == whole[: len(log.items)] and len(log.items) < len(whole)
+        await session.press("comma")
+        assert "reduced to 2 models" not in log.items[-1].words
+        await session.press("escape")
+        assert log.items == whole
+
+
+async def test_the_log_has_all_lines_of_a_long_run(run):
+    fake_moments.finished(run)
+    for _ in range(1050):
+        run.write("paused")
+        run.write("resumed")
+    async with Attached(run) as session:
+        log = session.screen.query_one("#log", Lines)
+        assert len(log.items) > 2100 and "engine started" in log.items[0].words
+
+
 async def test_the_moment_stays_while_the_run_goes_on_and_the_last_step_comes_back_to_it(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         await session.press("left_parenthesis")
         assert "part A (2 models): dissimilar" in session.text("#happening")
@@ -64,7 +89,7 @@ async def test_the_moment_stays_while_the_run_goes_on_and_the_last_step_comes_ba
 
 
 async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run, size=(80, 24)) as session:
         await session.press("b")
         options = session.app.screen.query_one(OptionList)
@@ -80,7 +105,7 @@ async def test_b_lists_the_rounds_and_goes_to_the_end_of_one(run):
 
 
 async def test_i_shows_the_facts_of_a_test_of_a_round_that_is_over(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("less_than_sign", "less_than_sign", "i")
         dialog = session.app.screen
@@ -102,14 +127,14 @@ async def test_every_sign_has_its_meaning_one_key_away(run):
     for words in (*OUTCOME.values(), *VERDICT.values(), *CLAIM.values()):
         assert words[0] in shown
     assert shown >= {sign for sign, _ in (*LEGEND, *MORE_SIGNS, *STATUS.values())}
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run, size=(80, 24)) as session:
         await session.press("k")
         assert isinstance(session.app.screen, SignsDialog)
 
 
 async def test_the_footer_has_the_keys_of_what_has_the_focus(run):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     async with Attached(run) as session:
         footer = session.screen.query_one(KeyFooter)
         shown = lambda: [entry.words for entry in footer.entries]  # noqa: E731
@@ -132,7 +157,7 @@ async def test_the_scene_follows_the_chosen_row_and_the_moment(run, monkeypatch,
     monkeypatch.setattr(
         "ddenv.runs.programs.start_scene", lambda _: subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True)
     )
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         last = lambda: read(told.read_text().splitlines()[-1]) if told.exists() else None  # noqa: E731
         await session.press("m")
@@ -151,7 +176,7 @@ def test_lines_that_are_no_wish_are_no_wish():
 
 
 async def test_tooltips_say_what_a_column_means_and_which_models_a_row_has(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         table = session.screen.query_one(Candidates)
         await session.pilot.hover(Candidates, offset=(5, 0))

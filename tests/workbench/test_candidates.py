@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-import fake_run
+import fake_moments
 import pytest
 from textual.app import App
 
@@ -62,7 +62,7 @@ class Table(App):
 
 
 def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
-    rows = rows_of(snapshot(fake_run.mid_round(run)))
+    rows = rows_of(snapshot(fake_moments.mid_round(run)))
     assert [rows[0][name] for name in ("tests", "evidence", "to f", "real", "verdict")] == [
         "4/4",
         "2◇ 2○",
@@ -76,7 +76,7 @@ def test_rows_say_how_many_tests_of_how_many_and_how_they_ended(run):
 
 
 def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
-    rows = rows_of(snapshot(fake_run.piled(run)))
+    rows = rows_of(snapshot(fake_moments.piled(run)))
     # Parts: 00 to 03, 04 to 06, 07 to 10. 02 lies on 05, 01 on 02, and 07 on 04.
     assert [(row["candidate"], row["verdict"].split(" ")[0]) for row in rows] == [
         ("part A↓", "○"),
@@ -90,13 +90,13 @@ def test_what_a_candidate_drops_has_a_sign_and_a_word(run):
 
 
 def test_what_a_try_drops_has_the_same_sign(run):
-    fake_run.piled(run)
+    fake_moments.piled(run)
     run.try_out([name for name in run.elements if name != "crate_04"])
     assert "try 1↓" in [row["candidate"] for row in rows_of(snapshot(run))]
 
 
 def test_what_waits_says_which_keys_decide(run):
-    assert rows_of(snapshot(fake_run.waiting(run)))[0]["verdict"] == "? a or x"
+    assert rows_of(snapshot(fake_moments.waiting(run)))[0]["verdict"] == "? a or x"
 
 
 FRESH = ("environment", "runs", "ended", "f", "95 %", "verdict")
@@ -107,7 +107,7 @@ def told_of(run, engine="alive") -> list[tuple[str, ...]]:
 
 
 def test_a_certificate_in_the_making_counts_runs_without_broken_ones(run):
-    assert told_of(fake_run.certifying(run)) == [
+    assert told_of(fake_moments.certifying(run)) == [
         ("what is left", "6", "6●", "100 %", "61 to 100", ""),
         ("- crate_00", "3", "1◇ 2○ 1✗", "0 %", "0 to 56", "▶ 26.8/45 s"),
         ("- crate_01", "", "", "", "", "▶ 10.8/45 s"),
@@ -117,7 +117,7 @@ def test_a_certificate_in_the_making_counts_runs_without_broken_ones(run):
 
 
 def test_a_finished_certificate_has_its_verdicts_in_words(run):
-    assert told_of(fake_run.finished(run), "absent") == [
+    assert told_of(fake_moments.finished(run), "absent") == [
         ("what is left", "23", "23●", "100 %", "86 to 100", "● kept"),
         ("- crate_00", "11", "2◇ 9○", "0 %", "0 to 26", "● needed"),
         ("- crate_01", "12", "1● 11○", "8 %", "1 to 35", "● needed"),
@@ -126,12 +126,12 @@ def test_a_finished_certificate_has_its_verdicts_in_words(run):
 
 
 def test_what_is_not_shown_says_so(run):
-    verdicts = [row[-1] for row in told_of(fake_run.not_shown(run), "absent")]
+    verdicts = [row[-1] for row in told_of(fake_moments.not_shown(run), "absent")]
     assert verdicts == ["● kept", "? not shown", "✗ tests broke", ""]
 
 
 def test_a_second_certificate_counts_its_own_runs(run):
-    fake_run.finished(run).start_certificate()
+    fake_moments.finished(run).start_certificate()
     run.certify_all(2, None, "sps")
     assert [row[:2] for row in told_of(run)] == [
         ("what is left", "3"),
@@ -142,16 +142,16 @@ def test_a_second_certificate_counts_its_own_runs(run):
 
 
 def test_a_search_that_goes_on_has_its_candidates_again(run):
-    fake_run.certifying(run).write("rate_lost", node=1, lost=2, again=[])
+    fake_moments.certifying(run).write("rate_lost", node=1, lost=2, again=[])
     assert listed(snapshot(run)).of[0] == "round"
 
 
 def test_tests_of_a_dead_engine_do_not_run(run):
-    assert rows_of(snapshot(fake_run.mid_round(run), "absent"))[1]["verdict"] == ""
+    assert rows_of(snapshot(fake_moments.mid_round(run), "absent"))[1]["verdict"] == ""
 
 
 def test_trials_of_this_place_stand_above_the_candidates(run):
-    state = snapshot(fake_run.mid_round(run)).state
+    state = snapshot(fake_moments.mid_round(run)).state
     judged = [Trial(number, ("crate_00",), state.node, "dissimilar", (1,)) for number in range(1, 6)]
     similar = Trial(6, ("crate_00", "crate_01"), state.node, "similar", (1,))
     trials = (*judged, similar, Trial(7, (), state.node), Trial(8, (), state.node + 1))
@@ -161,7 +161,7 @@ def test_trials_of_this_place_stand_above_the_candidates(run):
 
 
 def test_what_matters_least_has_no_column_where_there_is_little_room(run):
-    listing = listed(snapshot(fake_run.mid_round(run)))
+    listing = listed(snapshot(fake_moments.mid_round(run)))
     widths = {width: [column.name for column in fitting(listing, width)] for width in (20, 41, 54, 58, 80)}
     assert widths[20] == widths[41] == ["#", "candidate", "models", "tests", "verdict"]
     assert widths[54] == ["#", "candidate", "models", "tests", "evidence", "verdict"]
@@ -174,7 +174,7 @@ def test_what_matters_least_has_no_column_where_there_is_little_room(run):
 @pytest.mark.parametrize("size", [(20, 5), (60, 12), (150, 20)])
 async def test_lines_are_as_wide_as_the_table_and_columns_stand_in_line(run, size):
     async with (app := Table()).run_test(size=size) as pilot:
-        app.table.show(snapshot(fake_run.mid_round(run)))
+        app.table.show(snapshot(fake_moments.mid_round(run)))
         await pilot.pause()
         strips = [app.table.render_line(y) for y in range(app.table.size.height)]
         assert {strip.cell_length for strip in strips} == {app.table.size.width}
@@ -240,7 +240,7 @@ async def test_of_many_rows_only_those_in_sight_are_made_into_text(monkeypatch):
 
 async def test_vetoed_rows_and_the_cursor_are_seen_without_colours(run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
-    fake_run.mid_round(run).write("vetoed", candidate=3, verdict="vetoed")
+    fake_moments.mid_round(run).write("vetoed", candidate=3, verdict="vetoed")
     async with (app := Table()).run_test(size=(60, 11)) as pilot:
         app.table.show(snapshot(run))
         await pilot.press("down")

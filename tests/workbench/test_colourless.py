@@ -1,5 +1,6 @@
 """Without any colour, brightness included, every screen says the same: what keys change is seen in signs and text styles."""
 
+import fake_moments
 import fake_run
 import pytest
 from test_snapshots import LARGE, MOMENTS, OPENED, SMALL, USUAL, by_name, settled
@@ -51,12 +52,12 @@ async def what_keys_change_is_seen(app, size, opened=()):
 
 @pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["history"]))
 async def test_on_every_screen_over_a_run(run, name):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     await what_keys_change_is_seen(Workbench(run.path), USUAL, OPENED[name])
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL, LARGE], but=[USUAL]), ids=str)
-@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_run.waiting]), ids=by_name)
+@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name)
 async def test_at_every_moment_of_a_run(run, moment, size):
     moment(run).hold()
     await what_keys_change_is_seen(Workbench(run.path), size)
@@ -65,5 +66,36 @@ async def test_at_every_moment_of_a_run(run, moment, size):
 @pytest.mark.screens
 @pytest.mark.parametrize("opened", [(), ("ctrl+o",)], ids=["setup", "open"])
 async def test_on_the_screens_before_a_run(scenarios, runs, opened):
-    fake_run.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     await what_keys_change_is_seen(Workbench(), USUAL, opened)
+
+
+async def test_selected_text_in_a_field(run):
+    fake_moments.guided(run).hold()
+    app = Workbench(run.path)
+    async with app.run_test(size=USUAL) as pilot:
+        await settled(pilot)
+        await pilot.press("slash", *"crate", "shift+left", "shift+left", "shift+left")
+        await pilot.pause()
+        field = app.screen.query_one(Input)
+        assert field.selected_text == "ate"
+        x, y, width, _ = field.content_region
+        row = frame(app, False)[y][x : x + width]
+        assert "".join(char for char, _, _, reverse, _ in row if reverse) == "ate"
+
+
+async def test_text_that_is_selected_with_the_mouse(run):
+    fake_moments.guided(run).hold()
+    app = Workbench(run.path)
+    async with app.run_test(size=USUAL) as pilot:
+        await settled(pilot)
+        await pilot.press("e")
+        await pilot.pause()
+        x, y, *_ = app.screen.query_one("Static").content_region
+        await pilot.mouse_down(offset=(x, y))
+        await pilot.hover(offset=(x + 6, y))
+        await pilot.mouse_up(offset=(x + 6, y))
+        await pilot.pause()
+        selected = app.screen.get_selected_text()
+        assert selected
+        assert selected in "".join(cell[0] for row in frame(app, False) for cell in row if cell[3])

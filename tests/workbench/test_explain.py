@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import fake_moments
 import fake_run
 import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.workbench.run.explain import baseline_sentence, explain
 from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.run.status import facts
 
 
 def snapshot(run, engine="alive") -> Snapshot:
@@ -90,11 +92,11 @@ def test_a_rerun_is_line_7_and_says_why(run, outcome, reason):
 
 
 def test_speculation_is_shown(run):
-    assert "1 later candidate at the same time" in told(fake_run.mid_round(run))[1]
+    assert "1 later candidate at the same time" in told(fake_moments.mid_round(run))[1]
 
 
 def test_waiting_names_the_keys_and_the_sizes(run):
-    line, words = told(fake_run.waiting(run))
+    line, words = told(fake_moments.waiting(run))
     assert line == 10
     assert "got stuck 0.12 m from f's end" in words
     assert "a accepts it (11 → 4 models), x rejects" in words
@@ -118,8 +120,16 @@ def test_a_round_without_f_is_line_15(run):
     assert told(run)[0] == 15
 
 
+def test_a_full_disk_comes_first(run):
+    fake_moments.mid_round(run).write("room", enough=False, needed=32_000_000, free=1)
+    assert told(run)[1].startswith("The disk is full: no new test starts until 32 MB are free.")
+    assert facts(snapshot(run))[0].forms == ("! no room on the disk",)
+    run.write("room", enough=True, needed=32_000_000, free=10**9)
+    assert "disk" not in told(run)[1]
+
+
 def test_paused_comes_first(run):
-    fake_run.mid_round(run).write("paused")
+    fake_moments.mid_round(run).write("paused")
     line, words = told(run)
     assert line == 7
     assert words.startswith("Paused: no new test starts; running tests finish first.")
@@ -139,7 +149,7 @@ def test_after_a_step_its_result_is_shown(run):
 
 
 def test_a_minimal_end_names_what_is_kept(run):
-    line, words = told(fake_run.finished(run), "absent")
+    line, words = told(fake_moments.finished(run), "absent")
     assert line == 21
     assert "Minimal: 2 models left" in words
     assert "crate_00, crate_01" in words
@@ -161,7 +171,7 @@ def test_what_showed_f_is_run_again_until_it_is_clear_that_it_keeps_the_rate(run
 
 
 def test_a_certificate_comes_before_the_end(run):
-    line, words = told(fake_run.certifying(run))
+    line, words = told(fake_moments.certifying(run))
     assert line == 21
     assert "what is left has to keep 80 % of the whole world's rate" in words
     assert "So far f shows in 6 of 6 runs of what is left, and in 5 of 6 runs of the whole world." in words
@@ -169,27 +179,27 @@ def test_a_certificate_comes_before_the_end(run):
 
 
 def test_minimal_is_said_with_what_it_means(run):
-    words = told(fake_run.finished(run), "absent")[1]
+    words = told(fake_moments.finished(run), "absent")[1]
     assert "Minimal: 2 models left. No single model can be removed: f in 23 of 23 fresh runs (86 % to 100 %)" in words
     assert "Minimal means: what is left keeps 80 % of the whole world's rate" in words
 
 
 def test_without_fresh_runs_nothing_is_called_minimal(run):
-    words = told(fake_run.uncertified(run), "absent")[1]
+    words = told(fake_moments.uncertified(run), "absent")[1]
     assert "No single model can be removed; no fresh runs were made." in words
     assert "Minimal" not in words
 
 
 def test_what_is_not_shown_is_said_in_so_many_words(run):
-    words = told(fake_run.not_shown(run), "absent")[1]
+    words = told(fake_moments.not_shown(run), "absent")[1]
     assert "Not shown that each model is needed: tests broke without crate_01" in words
     assert "Minimal" not in words
 
 
 def test_where_f_is_rarer_the_key_that_goes_back_is_named(run):
-    words = told(fake_run.rarer(run))[1]
+    words = told(fake_moments.rarer(run))[1]
     assert "f is rarer than it was: f in 1 of 6 here, 3 of 4 in the whole world. u goes back to 11 models." in words
-    assert "rarer" not in told(fake_run.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]
+    assert "rarer" not in told(fake_moments.mid_round(fake_run.FakeRun(run.path.with_name("b.ddenv"))))[1]
 
 
 def test_other_failures_in_the_baseline_are_named_and_counted(run):
@@ -232,7 +242,7 @@ def test_stopped_and_failed(run, kind, words):
 
 
 def test_a_killed_engine_is_named_with_the_key_that_resumes(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     words = told(run, "absent")[1]
     assert "not running" in words
     assert "r resumes" in words
@@ -262,7 +272,7 @@ def test_a_damaged_file_says_so(run):
 
 
 def test_tries_and_pins_are_named_beside_the_round(run):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     line, words = told(run)
     assert line == 5
     assert "First run of part B (3 models)" in words
@@ -273,7 +283,7 @@ def test_tries_and_pins_are_named_beside_the_round(run):
 
 
 def test_how_the_user_came_to_this_environment_is_shown_until_a_test_is_made(run):
-    fake_run.guided(run).go_back(1)
+    fake_moments.guided(run).go_back(1)
     assert told(run)[1].startswith("Went to 6 models (part A).")
     run.write("changed", settings={"iterations": 5})
     assert told(run)[1].startswith("Changed iterations from 3 to 5, from this round on.")
@@ -303,7 +313,7 @@ def test_a_budget_that_is_used_up_names_the_key_that_gives_more(run):
 
 
 def test_what_was_pinned_is_not_called_needed(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     run.pin("crate_00")
     run.start_certificate()
     run.finish_certificate((None, "kept", 23 * "s"), ("crate_01", "needed", 11 * "p"))
@@ -314,7 +324,7 @@ def test_what_was_pinned_is_not_called_needed(run):
 
 
 def test_a_file_that_is_gone_and_another_engine_are_named(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     found = snapshot(run)
     gone = replace(found, gone=True, error="x.ddenv: the run file was deleted", engine="absent")
     assert explain(gone).sentences[0] == "x.ddenv: the run file was deleted."

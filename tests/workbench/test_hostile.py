@@ -9,6 +9,7 @@ import unicodedata
 from pathlib import Path
 from types import SimpleNamespace
 
+import fake_moments
 import fake_run
 import pytest
 from attached import Attached, starts
@@ -68,7 +69,13 @@ NONSENSE = [
     {},
     {"a": 1},
 ]
-SCENES = (fake_run.mid_round, fake_run.waiting, fake_run.guided, fake_run.certifying, fake_run.finished)
+SCENES = (
+    fake_moments.mid_round,
+    fake_moments.waiting,
+    fake_moments.guided,
+    fake_moments.certifying,
+    fake_moments.finished,
+)
 
 
 def steering(app):
@@ -89,7 +96,7 @@ async def test_no_name_steers_the_terminal(runs, size):
     run = fake_run.FakeRun(
         runs / "ev[il]\u202e-1.ddenv", data, fake_run.world_text([html.escape(name) for name in NAMES])
     )
-    fake_run.guided(run)
+    fake_moments.guided(run)
     run.hold()
     async with Attached(run, size) as session:
         session.screen.asking._mine = {1: "veto"}
@@ -177,7 +184,7 @@ def test_damaged_events_are_told_or_make_a_state_that_can_be_shown(streams):
 
 
 def test_a_run_is_made_once_and_rounds_go_on(run):
-    fake_run.waiting(run)
+    fake_moments.waiting(run)
     run.start_round(2)
     state = RunState()
     for event in run.file.events():
@@ -202,7 +209,7 @@ def test_times_that_no_calendar_has_are_damage(run, time):
 
 
 def test_a_locked_run_is_read_again(run):
-    fake_run.finished(run).close()
+    fake_moments.finished(run).close()
     folder = RunsFolder(run.path.parent)
     other = sqlite3.connect(run.path, isolation_level=None)
     other.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -250,7 +257,7 @@ SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
     started = starts(monkeypatch)
     monkeypatch.setattr("ddenv.workbench.run.processes.Scene.start", lambda self: None)
-    fake_run.guided(run)
+    fake_moments.guided(run)
     run.hold()
     chance = random.Random(20 + watch)
     async with Attached(run, watch=watch) as session:
@@ -273,7 +280,7 @@ async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
 
 
 async def test_an_engine_that_hangs_is_told(run, monkeypatch):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.hold()
     async with Attached(run) as session:
         await session.press("space")
@@ -340,7 +347,7 @@ def test_what_is_no_terminal_for_a_screen_is_told(monkeypatch, terminal, encodin
 @pytest.mark.parametrize("key", slow(pytest.mark.screens, ["o", "y", "l", "h"], but=["h"]))
 @pytest.mark.screens
 async def test_dialogs_survive_terminals_without_room(run, key):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     async with Attached(run) as session:
         await session.press(key)
         for size in ((1, 1), (4, 4), (9, 2)):

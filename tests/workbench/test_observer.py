@@ -4,6 +4,7 @@ import os
 import sqlite3
 import threading
 
+import fake_moments
 import fake_run
 import pytest
 from attached import Attached
@@ -29,7 +30,7 @@ def files(folder):
 
 @pytest.fixture
 def poll(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     opened = Poll(run.path)
     yield opened
     opened.close()
@@ -93,7 +94,7 @@ def test_another_file_in_its_place_is_left_alone(run, poll):
 
 
 def test_watching_writes_nothing(run, runs):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     before = files(runs)
     watching = Poll(run.path, watch=True)
     assert look(watching).state.tests_done == 10
@@ -110,7 +111,7 @@ def test_watching_writes_nothing(run, runs):
 
 
 async def test_the_whole_screen_writes_nothing_while_it_watches(run, runs):
-    fake_run.finished(run).close()
+    fake_moments.finished(run).close()
     before = files(runs)
     async with Workbench(run.path, watch=True).run_test(size=(120, 36)) as pilot:
         await pilot.pause()
@@ -120,7 +121,7 @@ async def test_the_whole_screen_writes_nothing_while_it_watches(run, runs):
 
 
 def test_a_run_that_comes_to_life_is_followed(run, runs):
-    fake_run.mid_round(run).close()
+    fake_moments.mid_round(run).close()
     watching = Poll(run.path, watch=True)
     assert look(watching).status == "lost"
     engine = fake_run.RunFile(run.path)
@@ -174,7 +175,7 @@ def test_a_busy_file_keeps_what_was_read(run, poll, monkeypatch):
 
 
 async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Attached(run) as session:
         answers = []
         for command in (Pause(), Resume(), Stop()):
@@ -185,7 +186,7 @@ async def test_commands_are_sent_in_order_and_answered_on_the_screens_thread(run
 
 
 async def test_a_watched_run_is_sent_nothing(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Attached(run, watch=True) as session:
         session.screen.asking.send(Stop())
         await session.pilot.pause()
@@ -204,7 +205,7 @@ def test_an_engine_of_another_version_is_told(run, poll):
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")
 def test_a_folder_where_nothing_may_be_written(run, runs):
-    fake_run.finished(run).close()
+    fake_moments.finished(run).close()
     runs.chmod(0o500)
     try:
         poll = Poll(run.path)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
+import fake_moments
 import fake_run
 import pytest
 from attached import Attached, starts
@@ -32,7 +33,7 @@ URL = "http://127.0.0.1:7012/static/"
 
 
 async def test_the_cursor_follows_the_run_until_it_is_moved(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         table, world = session.screen.query_one(Candidates), session.screen.query_one(WorldMap)
         assert table.under_cursor.label == world.candidate.label == "without A"
@@ -74,7 +75,7 @@ async def test_the_baseline_is_listed_run_by_run(run):
 
 @pytest.mark.screens
 async def test_keys_that_only_look(run):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     async with Attached(run) as session:
         screen, world = session.screen, session.screen.query_one(WorldMap)
         fitted = world.viewport.view
@@ -113,7 +114,7 @@ async def test_keys_that_only_look(run):
 
 
 async def test_the_log_tells_what_happened_and_goes_on(run):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     async with Attached(run, (80, 24)) as session:
         await session.press("L")
         log = session.screen.query_one("#log", Lines)
@@ -131,7 +132,7 @@ async def test_the_log_tells_what_happened_and_goes_on(run):
 
 @pytest.mark.screens
 async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(run):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     seen = {
         "1": ["#map", "#candidates", "#happening"],
         "2": ["#candidates", "#happening"],
@@ -172,7 +173,7 @@ def test_every_binding_has_an_id_and_a_tooltip():
 
 async def test_e_explains_the_method_of_the_run(runs):
     run = run_by("splitting", runs)
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Attached(run, (80, 24)) as session:
         await session.press("e")
         assert isinstance(session.app.screen, Method)
@@ -202,7 +203,7 @@ def run_by(algorithm, runs):
     ("key", "commands", "words"), [("s", [("stop", {})], "ddenv resume crates-1"), ("l", [], "ddenv open crates-1")]
 )
 async def test_q_asks_what_becomes_of_the_engine(run, key, commands, words):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         await session.press("q")
         assert isinstance(session.app.screen, Quit)
@@ -215,7 +216,7 @@ async def test_q_asks_what_becomes_of_the_engine(run, key, commands, words):
 
 
 async def test_q_without_an_engine_just_leaves(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("q")
         assert session.app._exit
@@ -223,7 +224,7 @@ async def test_q_without_an_engine_just_leaves(run):
 
 @pytest.mark.parametrize("key", ["d", "ctrl+q"])
 async def test_leaving_tells_how_to_come_back(run, key):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         await session.press(key)
         assert session.app._exit_renderables[0].plain == "The engine goes on. Attach again with: ddenv open crates-1"
@@ -232,7 +233,7 @@ async def test_leaving_tells_how_to_come_back(run, key):
 
 async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypatch):
     started = starts(monkeypatch)
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Attached(run) as session:
         assert "engine is gone" in session.text("#status")
         assert "r resumes" in session.text("#happening")
@@ -255,7 +256,7 @@ async def test_space_or_r_starts_the_engine_of_a_run_that_has_none(run, monkeypa
 
 async def test_an_engine_that_ends_at_once_is_told_with_its_log(run, monkeypatch):
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_, **__: SimpleNamespace(poll=lambda: 3))
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.path.with_name("crates-1.ddenv.log").write_text(
         "ddenv engine: started\nModuleNotFoundError: No module named 'x'\n"
     )
@@ -275,7 +276,7 @@ async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(
     monkeypatch.setattr("ddenv.runs.programs.start_scene", scene_program(program))
     monkeypatch.setattr("getpass.getuser", lambda: "ada")
     monkeypatch.setattr("socket.gethostname", lambda: "lab")
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("m")
         await session.app.workers.wait_for_complete()
@@ -306,18 +307,18 @@ async def test_m_shows_where_the_scene_is_and_the_scene_ends_with_the_workbench(
 async def test_a_scene_that_does_not_start_is_told(run, monkeypatch):
     monkeypatch.setattr("ddenv.runs.programs.start_scene", scene_program("pass"))
     run.path.with_name("crates-1.ddenv.scene.log").write_text("no port is free\n")
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run) as session:
         await session.press("m")
         await session.app.workers.wait_for_complete()
         await session.pilot.pause()
         assert "no port is free" in session.app.screen.query_one("#address", Static).render().plain
         await session.press("c")
-        assert "no address yet" in session.said()
+        assert "no address yet" in str(session.app.screen.query_one(".dialog").border_subtitle)
 
 
 async def test_a_damaged_run_is_told_and_nothing_breaks(run):
-    fake_run.mid_round(run).write("nonsense")
+    fake_moments.mid_round(run).write("nonsense")
     async with Attached(run) as session:
         assert "unknown kind 'nonsense'" in session.text("#happening")
         await session.press("space", "r", "v", "p", "w", "u", "plus", "down")
@@ -327,7 +328,7 @@ async def test_a_damaged_run_is_told_and_nothing_breaks(run):
 
 @pytest.mark.parametrize("pose", ['"x"', "[1, 2]", "{}", "[null, 0, 0, 1, 0, 0, 0]", "[NaN, 0, 0, 1, 0, 0, 0]"])
 def test_live_poses_that_make_no_sense_do_no_harm(run, pose):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     run.file._db.execute("UPDATE live SET pose = ?", (pose,))
     poll = Poll(run.path)
     snapshot = poll.look()
@@ -336,7 +337,7 @@ def test_live_poses_that_make_no_sense_do_no_harm(run, pose):
 
 
 async def test_a_world_that_cannot_be_read_is_told_on_the_map(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     run.file._db.execute("UPDATE document SET content = ? WHERE name = 'world'", (b"no xml",))
     async with Attached(run) as session:
         assert "crates.sdf" in session.screen.query_one(WorldMap).notice
@@ -370,7 +371,7 @@ async def test_names_are_text_and_never_markup(runs):
 
 @pytest.mark.screens
 async def test_the_footer_keeps_to_its_width(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run, (64, 18)) as session:
         for width in (64, 80, 120, 200):
             await session.pilot.resize_terminal(width, 36)

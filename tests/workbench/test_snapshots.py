@@ -3,12 +3,17 @@
 import math
 from contextlib import suppress
 
+import fake_moments
 import fake_run
 import pytest
 from textual.widgets import Input
 from textual.worker import WorkerCancelled
 
+from ddenv.learn.score import Score
+from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.learn.kept_scores import keep_score
+from ddenv.workbench.messages import ShowLessons
 from tests.tiers import slow
 
 SMALL, USUAL, LARGE = (80, 24), (120, 36), (200, 60)
@@ -67,13 +72,13 @@ def baseline(run):
 
 MOMENTS = [
     baseline,
-    fake_run.mid_round,
-    fake_run.sliced,
-    fake_run.waiting,
-    fake_run.rarer,
-    fake_run.certifying,
-    fake_run.finished,
-    fake_run.not_shown,
+    fake_moments.mid_round,
+    fake_moments.sliced,
+    fake_moments.waiting,
+    fake_moments.rarer,
+    fake_moments.certifying,
+    fake_moments.finished,
+    fake_moments.not_shown,
 ]
 by_name = lambda value: value.__name__ if callable(value) else str(value)  # noqa: E731
 
@@ -81,28 +86,28 @@ by_name = lambda value: value.__name__ if callable(value) else str(value)  # noq
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, SIZES, but=[USUAL]), ids=str)
 @pytest.mark.parametrize("theme", slow(pytest.mark.screens, THEMES, but=["ddenv"]))
 def test_run_screen(snap_compare, run, theme, size):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme))
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
-@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_run.waiting]), ids=by_name)
+@pytest.mark.parametrize("moment", slow(pytest.mark.screens, MOMENTS, but=[fake_moments.waiting]), ids=by_name)
 def test_moments_of_a_run(snap_compare, run, moment, size):
     moment(run)
-    if moment not in (fake_run.finished, fake_run.not_shown):
+    if moment not in (fake_moments.finished, fake_moments.not_shown):
         run.hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown())
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[SMALL]), ids=str)
 def test_what_a_candidate_drops(snap_compare, run, size):
-    fake_run.piled(run).hold()
+    fake_moments.piled(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "down", "down"))
 
 
 @pytest.mark.screens
 def test_run_screen_without_its_engine(snap_compare, run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)
 
 
@@ -142,28 +147,28 @@ OPENED = {
     ],
 )
 def test_what_a_key_opens(snap_compare, run, name, theme, size):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
 
 
 @pytest.mark.screens
 @pytest.mark.parametrize("name", ["history", "compare", "runs"])
 def test_what_a_key_opens_where_there_is_room(snap_compare, run, name):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=LARGE, run_before=shown("ddenv", *OPENED[name]))
 
 
 @pytest.mark.screens
 @pytest.mark.parametrize("pane", ["2", "3", "4", "5"])
 def test_panes_where_there_is_little_room(snap_compare, run, pane):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", pane))
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, SIZES, but=[LARGE]), ids=str)
 @pytest.mark.parametrize("theme", slow(pytest.mark.screens, THEMES, but=["ddenv-light"]))
 def test_setup_screen(snap_compare, scenarios, runs, theme, size):
-    fake_run.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
     assert snap_compare(Workbench(), terminal_size=size, run_before=shown(theme))
 
 
@@ -212,6 +217,18 @@ def reduced_by(algorithm, runs):
 
 
 @pytest.mark.screens
+@pytest.mark.parametrize("size", [SMALL, USUAL], ids=str)
+@pytest.mark.parametrize("does", ["budget", "race"])
+def test_what_a_lesson_lets_students_do(snap_compare, runs, does, size):
+    lesson = open_lesson(bundled()[0]).lesson
+    step = next(number for number, step in enumerate(lesson.steps) if getattr(step, does))
+    keep_score(lesson.name, Score(step=step))
+    app, next_model = Workbench(first=ShowLessons(lesson.file)), "right_square_bracket"
+    keys = {"budget": ["enter", next_model, "enter", "w", "m", "m"], "race": ["s", "enter", "end"]}
+    assert snap_compare(app, terminal_size=size, run_before=shown("ddenv", *keys[does]))
+
+
+@pytest.mark.screens
 def test_run_screen_of_another_algorithm(snap_compare, runs):
     run = reduced_by("splitting", runs)
     run.hold()
@@ -222,12 +239,12 @@ def test_run_screen_of_another_algorithm(snap_compare, runs):
 @pytest.mark.screens
 @pytest.mark.parametrize("size", [(20, 5), (60, 20)], ids=str)
 def test_too_small_says_what_it_needs(snap_compare, run, size):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=settled)
 
 
 @pytest.mark.screens
 def test_no_color(snap_compare, run, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=USUAL, run_before=settled)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import fake_moments
 import fake_run
 import pytest
 from textual.app import App
@@ -23,7 +24,7 @@ def said(shown, width=200, **more):
 
 
 def test_everything_is_said_where_there_is_room(run):
-    shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
+    shown = snapshot(fake_moments.mid_round(run), accept_mode="ask")
     told = said(shown, 260, scene="http://127.0.0.1:7000/static/", asked="pause", cut=3)
     assert list(told) == ["state", "asked", "tests", "drift", "cut", "time", "left", "mode", "engine", "scene"]
     assert told["drift"] == "f in 1 of 1 here, 3 of 4 in the whole world"
@@ -41,12 +42,12 @@ def test_it_is_said_that_the_piles_settle(run):
 
 @pytest.mark.parametrize("width", [200, 120, 100, 80])
 def test_where_f_is_clearly_rarer_the_mark_and_the_key_stay(run, width):
-    told = said(snapshot(fake_run.rarer(run)), width)
+    told = said(snapshot(fake_moments.rarer(run)), width)
     assert told["drift"].startswith("▼ f ") and told["drift"].endswith(": u goes back")
 
 
 def test_broken_tests_do_not_count_in_the_drift(run):
-    fake_run.certifying(run)
+    fake_moments.certifying(run)
     before = said(snapshot(run))["drift"]
     run.certify_all(2, None, "eee")
     assert said(snapshot(run))["drift"] == before
@@ -56,7 +57,7 @@ def test_broken_tests_do_not_count_in_the_drift(run):
 
 @pytest.mark.parametrize("width", [120, 100, 80, 64, 40])
 def test_the_least_important_goes_first(run, width):
-    shown = snapshot(fake_run.mid_round(run), accept_mode="ask")
+    shown = snapshot(fake_moments.mid_round(run), accept_mode="ask")
     told = said(shown, width, asked="pause", cut=3)
     assert sum(len(words) + 3 for words in told.values()) <= width
     assert told["state"] == "▶ running"
@@ -64,20 +65,20 @@ def test_the_least_important_goes_first(run, width):
 
 
 def test_of_a_paused_run_the_tests_are_told_that_are_left(run):
-    fake_run.mid_round(run).write("paused")
+    fake_moments.mid_round(run).write("paused")
     assert said(snapshot(run))["left"].split(" (")[0].endswith("tests left")
-    assert "left" not in said(snapshot(fake_run.finished(fake_run.FakeRun(run.path.with_name("b.ddenv")))))
+    assert "left" not in said(snapshot(fake_moments.finished(fake_run.FakeRun(run.path.with_name("b.ddenv")))))
 
 
 def test_a_budget_is_told_with_the_tests(run):
-    state = snapshot(fake_run.mid_round(run)).state
+    state = snapshot(fake_moments.mid_round(run)).state
     scenario = state.scenario | {"reduction": state.scenario["reduction"] | {"budget": 12}}
     told = said(snapshot(run, scenario=scenario))
     assert told["tests"].startswith("10 of 12 tests")
 
 
 def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     assert said(snapshot(run, "absent"))["state"] == "✗ engine is gone: r resumes"
     assert said(snapshot(run, engine_version=__version__))["engine"] == "engine ●"
     assert said(snapshot(run, engine_version="0.0.9"))["engine"] == "engine ● 0.0.9, older"
@@ -87,7 +88,7 @@ def test_an_engine_that_is_gone_or_of_another_version_is_told(run):
 
 
 def test_tests_that_were_ended_early_are_counted_as_they_come(run):
-    tests = snapshot(fake_run.mid_round(run)).state.tests
+    tests = snapshot(fake_moments.mid_round(run)).state.tests
     cut = PersistentTuple.of(replace(test, cut=test.id % 3 == 0) for test in tests)
     once = cut_tests(cut, tests, 0)
     assert once == 4
@@ -103,7 +104,7 @@ def nodes(*parents, rejected=()):
 def test_a_branch_is_told_unless_it_is_the_newest(run):
     # 0 - 1 - 2, and from 1 later 3 - 4.
     tree = nodes(None, 0, 1, 1, 3)
-    state = snapshot(fake_run.mid_round(run)).state
+    state = snapshot(fake_moments.mid_round(run)).state
     assert [branch_of(state.changed(nodes=tree, node=node)) for node in range(5)] == [None, None, 1, None, None]
     undone = nodes(None, 0, 1, rejected={2})
     assert branch_of(state.changed(nodes=undone, node=1)) is None
@@ -119,7 +120,7 @@ class Lines(App):
 
 @pytest.mark.parametrize("width", [20, 64, 80, 120])
 async def test_lines_fit_and_are_drawn_only_when_they_changed(run, width, monkeypatch):
-    shown = snapshot(fake_run.mid_round(run), pinned=frozenset({"crate_00"}), nodes=nodes(None, 0, 0), node=1)
+    shown = snapshot(fake_moments.mid_round(run), pinned=frozenset({"crate_00"}), nodes=nodes(None, 0, 0), node=1)
     async with (app := Lines()).run_test(size=(width, 4)) as pilot:
         header, status = app.query_one(Header), app.query_one(Status)
         header.show(shown)

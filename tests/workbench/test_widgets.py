@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import fake_moments
 import fake_run
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def looks_of(run, candidate=None):
 
 
 def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run):
-    drawn = looks_of(fake_run.mid_round(run))
+    drawn = looks_of(fake_moments.mid_round(run))
     assert drawn["crate_00"] == (KEPT, "A")
     assert drawn["crate_05"] == (KEPT, "C")
     assert drawn["crate_10"] == (REMOVED, "")
@@ -84,7 +85,7 @@ def test_kept_models_carry_the_letter_of_their_part_and_removed_ones_none(run):
 
 
 def test_what_a_candidate_leaves_out_gets_a_small_letter(run):
-    drawn = looks_of(fake_run.mid_round(run), candidate=1)
+    drawn = looks_of(fake_moments.mid_round(run), candidate=1)
     assert drawn["crate_00"] == (LEFT_OUT, "a")
     assert drawn["crate_02"] == (KEPT, "B")
 
@@ -98,7 +99,7 @@ def test_a_large_element_is_a_floor(runs):
 
 
 def test_without_colours_the_cells_still_differ(run):
-    state = fold(fake_run.mid_round(run).file.events())
+    state = fold(fake_moments.mid_round(run).file.events())
     prints = footprints(parse_world(run.world, Path("w.sdf")))
     view = View(0, 0, 0.25, 64, 18)
     canvas = Canvas(view.rows, view.columns, (0, 0, 0))
@@ -124,8 +125,8 @@ def test_text_ends_at_the_edge_of_the_map():
 
 
 def test_recent_runs_say_how_they_stand(runs):
-    fake_run.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
-    fake_run.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
+    fake_moments.mid_round(fake_run.FakeRun(runs / "b.ddenv")).close()
     (runs / "c.ddenv").write_text("no run")
     told = {run.path.stem: run for run in recent_runs(runs)}
     assert told["a"].words == "2/11 finished"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ddenv.cli.options import jobs_option, json_option
+from ddenv.cli.options import cluster_option, jobs_option, json_option, trust_option, whole
 from ddenv.errors import UserError
 
 
@@ -12,15 +12,18 @@ from ddenv.errors import UserError
 @click.argument("run")
 @click.option(
     "--runs",
-    type=click.IntRange(1),
+    type=whole(1),
     metavar="N",
     help="Run what is left at least so often; as often as the baseline's whole world if not given.",
 )
 @jobs_option()
+@cluster_option()
+@trust_option
 @json_option
-def certify_command(run: str, runs: int | None, jobs: int, as_json: bool) -> int:
+def certify_command(run: str, runs: int | None, jobs: int, cluster: str | None, trust: bool, as_json: bool) -> int:
     """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
+    from ddenv.cli.trusting import allow_run
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.run_settings import settings
@@ -29,6 +32,7 @@ def certify_command(run: str, runs: int | None, jobs: int, as_json: bool) -> int
     from ddenv.runs.programs import start_engine
 
     path = find_run(run)
+    allow_run(path, trust, cluster)
     with RunFile(path) as file, engine_lock(path):
         state = fold(file.events())
     if state.baseline is None:
@@ -37,5 +41,6 @@ def certify_command(run: str, runs: int | None, jobs: int, as_json: bool) -> int
         )
     if state.status != "finished" and not (state.confirming and state.ended):
         raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
+    where = {"cluster": cluster} if cluster else {}
     at_least = runs or settings(state).baseline_runs
-    return follow_to_summary(path, start_engine(path, jobs, certify=at_least), as_json)[0]
+    return follow_to_summary(path, start_engine(path, jobs, certify=at_least, **where), as_json)[0]

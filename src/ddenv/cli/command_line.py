@@ -15,11 +15,13 @@ import click
 
 from ddenv.cli.certify_command import certify_command
 from ddenv.cli.config_command import config_command
+from ddenv.cli.doctor_command import doctor_command
 from ddenv.cli.export_command import export_command
 from ddenv.cli.learn_command import learn_command
 from ddenv.cli.open_command import open_command
 from ddenv.cli.options import given_reading, reading_options
 from ddenv.cli.report_command import report_command
+from ddenv.cli.reproduce_command import reproduce_command
 from ddenv.cli.resume_command import resume_command
 from ddenv.cli.run_command import run_command
 from ddenv.cli.runs_command import runs_command
@@ -27,8 +29,9 @@ from ddenv.cli.schemas_command import schemas_command
 from ddenv.cli.serve_command import serve_command
 from ddenv.cli.study_command import study_command
 from ddenv.cli.test_command import test_command
+from ddenv.cli.why_command import why_command
 from ddenv.cli.world_command import world_group
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 from ddenv.schemas import nearest
 from ddenv.version import __version__
 
@@ -99,15 +102,24 @@ for command in (
     runs_command,
     test_command,
     export_command,
+    reproduce_command,
     report_command,
+    why_command,
     learn_command,
     study_command,
     schemas_command,
     serve_command,
     config_command,
+    doctor_command,
     world_group,
 ):
     app.add_command(command)
+
+
+def _help_of(error: click.ClickException) -> str:
+    """The command that lists what would have been right."""
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    return f"{'ddenv' if context is None else context.command_path} --help"
 
 
 def main() -> None:
@@ -116,7 +128,7 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = app(standalone_mode=False)
+        code = app(standalone_mode=False, prog_name="ddenv")
         sys.stdout.flush()
     except UserError as error:
         print(f"ddenv: {error}", file=sys.stderr)
@@ -127,7 +139,10 @@ def main() -> None:
         code = 130
     except KeyboardInterrupt:
         code = 130
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message(), file=sys.stderr)
+        code = 2
     except click.ClickException as error:
-        print(f"ddenv: {error.format_message().rstrip('.')}; see 'ddenv --help'", file=sys.stderr)
+        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{_help_of(error)}'"), file=sys.stderr)
         code = 2
     sys.exit(code)

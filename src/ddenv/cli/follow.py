@@ -38,9 +38,12 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
     except Interrupted as interrupted:
         # It may have ended just then.
         state, code = interrupted.state, 0 if interrupted.state.certified else 130
-    print(json.dumps(summary(state, path)) if as_json else "\n".join(summary_lines(state, path)), flush=True)
+    print(
+        json.dumps(summary(state, path)) if as_json else "\n".join(map(printable, summary_lines(state, path))),
+        flush=True,
+    )
     if code == 130:
-        print(f"interrupted; continue with: ddenv resume {path}", file=sys.stderr)
+        print(printable(f"interrupted; continue with: ddenv resume {path}"), file=sys.stderr)
     return code, state
 
 

@@ -6,28 +6,44 @@ from pathlib import Path
 
 import click
 
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 
 
 @click.command("learn")
 @click.argument("lesson", metavar="[LESSON_OR_RUN]", required=False)
+@click.argument("runs", metavar="[RUN]...", nargs=-1)
 @click.option("--list", "listed", is_flag=True, help="Print the lessons, with how far you are.")
 @click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own; prints what is wrong with it.")
 @click.option("--new", type=Path, metavar="FILE", help="Write a lesson to start from; --run is the run it shows.")
 @click.option("--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson.")
+@click.option(
+    "--record", type=Path, metavar="FILE", help="Add to a lesson's oracle what the algorithms do in its world."
+)
+@click.option("--race", is_flag=True, help="Two to four runs of one world side by side, test by test.")
 @click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
 def learn_command(
-    lesson: str | None, listed: bool, check: Path | None, new: Path | None, run: str | None, page: Path | None
+    lesson: str | None,
+    runs: tuple[str, ...],
+    listed: bool,
+    check: Path | None,
+    new: Path | None,
+    run: str | None,
+    record: Path | None,
+    race: bool,
+    page: Path | None,
 ) -> int:
     """Lessons on delta debugging, on recorded runs: step by step, with predictions and questions. They need no Drake.
 
     LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn' alone shows the list.
     """
-    asked = [
-        name for name, value in (("--list", listed), ("--check", check), ("--new", new), ("--page", page)) if value
-    ]
+    given = {"--list": listed, "--check": check, "--new": new, "--record": record, "--race": race, "--page": page}
+    asked = [name for name, value in given.items() if value]
     if len(asked) > 1:
         raise UserError(f"{' and '.join(asked)}: give one of them")
+    if race:
+        return _race([*([lesson] if lesson else ()), *runs])
+    if runs:
+        raise UserError(f"{runs[0]!r}: expected one lesson or run; --race shows several runs")
     if run is not None and new is None:
         raise UserError("--run: only with --new")
     if listed:
@@ -36,18 +52,20 @@ def learn_command(
         return _check(check)
     if new is not None:
         return _new(new, run)
+    if record is not None:
+        return _record(record)
     if page is not None:
         return _page(lesson, page)
     return _open(lesson)
 
 
 def _list() -> int:
-    from ddenv.learn.shelf import bundled, open_lesson
-    from ddenv.workbench.learn.progress import all_scores, in_words
+    from ddenv.learn.shelf import bundled, glance
+    from ddenv.workbench.learn.kept_scores import all_scores, in_words
 
     scores = all_scores()
     for number, file in enumerate(bundled(), 1):
-        lesson = open_lesson(file).lesson
+        lesson = glance(file)
         print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name), lesson.asked)}")
     return 0
 
@@ -61,14 +79,37 @@ def _check(file: Path) -> int:
 
 
 def _new(file: Path, run: str | None) -> int:
-    from ddenv.learn.template import write_template
+    from ddenv.learn.new_lesson import write_template
     from ddenv.runs.folder import find_run
 
     if run is None:
         raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
     for path in write_template(file, find_run(run)):
-        print(f"wrote {path}")
+        print(printable(f"wrote {path}"))
     return 0
+
+
+def _record(file: Path) -> int:
+    from ddenv.cli.record_plays import record_plays
+
+    oracle, names = record_plays(file)
+    print(f"{oracle}: has what {', '.join(names)} did")
+    return 0
+
+
+def _race(names: list[str]) -> int:
+    from ddenv.learn.plays import plays_of_runs
+    from ddenv.learn.race import RACERS
+    from ddenv.runs.folder import find_run
+    from ddenv.workbench.launch import run_workbench
+    from ddenv.workbench.messages import ShowRace
+
+    if not RACERS[0] <= len(names) <= RACERS[1]:
+        raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
+    runs = tuple(find_run(name) for name in names)
+    # Read before the screen, so that runs that cannot race are one line in the terminal.
+    plays_of_runs(runs)
+    return run_workbench(first=ShowRace(runs))
 
 
 def _page(name: str | None, file: Path) -> int:
@@ -82,7 +123,7 @@ def _page(name: str | None, file: Path) -> int:
     if file.exists():
         raise UserError(f"--page: {file}: exists already; choose another name")
     write_file(file, html(handout(open_lesson(_lesson(name or "")))).encode())
-    print(f"wrote {file}")
+    print(printable(f"wrote {file}"))
     return 0
 
 

@@ -12,7 +12,7 @@ import click
 
 from ddenv import processor
 from ddenv.errors import UserError, printable
-from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, Setting
+from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in every click
@@ -26,13 +26,39 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # not generic in ever
             numbers = tuple(float(word) for word in value.split(","))
         except ValueError:
             numbers = ()
-        if not self.fewest <= len(numbers) <= self.most or not all(abs(number) <= FARTHEST for number in numbers):
+        if any(not abs(number) <= FARTHEST for number in numbers):
+            self.fail(f"no number may be beyond {FARTHEST:g}; found '{value}'", param, ctx)
+        if not self.fewest <= len(numbers) <= self.most:
             self.fail(
                 f"expected {self.name}, such as {','.join('1.5' for _ in range(self.most))}; found '{value}'",
                 param,
                 ctx,
             )
         return numbers
+
+
+class Number(click.ParamType):  # type: ignore[type-arg]  # as above
+    """A number as a setting has it. Only one that is not `checked` later has to be in the setting's range."""
+
+    name = "number"
+
+    def __init__(self, one: Setting, *, checked: bool = False) -> None:
+        self._one, self._checked = one, checked
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> int | float:
+        whole = self._one.kind is int
+        try:
+            number: int | float = int(value) if whole else float(value)
+        except ValueError:
+            self.fail(f"expected {self._one.wanted}, found '{value}'", param, ctx)
+        if not self._checked and not self._one.allows(number):
+            self.fail(f"expected {self._one.wanted}, found {value}", param, ctx)
+        return number
+
+
+def whole(least: int, most: int | None = None) -> Number:
+    """Whole numbers in a range."""
+    return Number(Setting(None, "", least=least, most=most, kind=int))
 
 
 if TYPE_CHECKING:
@@ -63,20 +89,30 @@ def _option(one: Setting) -> Option:
         words += "; 0: no limit"
     if one.kind is bool:
         return click.option(f"{one.option}/--no-{one.option[2:]}", default=None, help=f"{words}.")
-    # The range is checked with the scenario, which says what else is allowed.
-    kind = click.IntRange(0) if one.none else one.kind
+    # The range is checked with the scenario, which says what else is allowed; 0 takes back a limit.
+    kind = whole(0) if one.none else one.kind if one.kind is str else Number(one, checked=True)
     more = f" {one.more}" if one.shown == "method" else ""
     return click.option(one.option, type=kind, metavar="|".join(one.choices) or None, help=f"{words}.{more}")
 
 
 def jobs_option(what: str = "Tests") -> Option:
     """How many tests or runs are made at the same time."""
-    allowed = click.IntRange(int(JOBS.least or 1), int(JOBS.most or 1))
     words = f"{what} at the same time."
-    return click.option("--jobs", type=allowed, default=processor.usable_cores(), show_default=True, help=words)
+    return click.option("--jobs", type=Number(JOBS), default=processor.usable_cores(), show_default=True, help=words)
+
+
+def cluster_option() -> Option:
+    """Where the tests of a run that is there are made from now on."""
+    one = SETTINGS["cluster"]
+    words = f"{one.summary[:1].upper()}{one.summary[1:]}; as before if not given."
+    return click.option(one.option, help=words)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one summary object at the end.")
+
+trust_option = click.option(
+    "--trust", is_flag=True, help="Start the controller or the simulator that the scenario brings along."
+)
 
 # For commands that take a scenario.
 scenario_options = _together(
@@ -121,6 +157,7 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
     """The scenario of a name or a file with what the options above say. Raises UserError."""
     from ddenv.runs.scenarios import reading_of, scenario_for_world, with_options
     from ddenv.world.load import find_scenario, load_scenario
+    from ddenv.world.read import read_world
 
     reading = {option: given[option] for option in READING}
     others = {option: value for option, value in given.items() if option not in READING}
@@ -129,6 +166,8 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
         return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
     spawn, goal, world = (others.pop(option) for option in ("spawn", "goal", "world"))
     if spawn is None or goal is None:
+        # A file that is no world needs no places either.
+        read_world(Path(name), reading_of(**reading), announce)
         raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
     if world is not None:
         raise UserError(f"--world: only for a scenario; {name} is a world")
@@ -142,17 +181,17 @@ def announce(line: str) -> None:
 
 
 @contextmanager
-def announced(line: str) -> Iterator[None]:
-    """Announces a slow step that cannot say how far it is; on a terminal, with the time it has taken so far."""
+def announced(line: str) -> Iterator[Callable[[str], None]]:
+    """Announces a slow step; on a terminal, with the time it has taken so far. Yields what replaces the line there."""
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
     if not console.is_terminal:
         announce(line)
-        yield
+        yield lambda _: None
         return
     columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
     with Progress(*columns, console=console, transient=True) as progress:
-        progress.add_task(printable(line), total=None)
-        yield
+        task = progress.add_task(printable(line), total=None)
+        yield lambda words: progress.update(task, description=printable(words))

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from ddenv.errors import UserError, printable
+
 
 @click.command("report")
 @click.argument("run")
@@ -14,16 +16,21 @@ import click
     "--output",
     "file",
     type=Path,
-    required=True,
     metavar="FILE",
-    help="A .html page, or a .md file with its pictures beside it.",
+    help="A .html page, or a .md file with its pictures beside it; has to be given.",
 )
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-def report_command(run: str, file: Path, force: bool) -> int:
+def report_command(run: str, file: Path | None, force: bool) -> int:
     """Writes a report on RUN: one page to read, print or mail."""
     from ddenv.report.report import write_report
+    from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
 
-    for path in write_report(find_run(run), file, force):
-        print(f"wrote {path}")
+    path = find_run(run)
+    with RunFile(path):
+        # A run that is not there needs no file either.
+        if file is None:
+            raise UserError(f"give the file to write, such as -o {path.stem}.html")
+    for written in write_report(path, file, force):
+        print(printable(f"wrote {written}"))
     return 0

@@ -16,6 +16,7 @@ from ddenv.cli.options import (
     reading_options,
     scenario_options,
     setting_options,
+    trust_option,
 )
 from ddenv.errors import printable
 
@@ -33,17 +34,25 @@ if TYPE_CHECKING:
 @click.option(
     "--output", type=Path, help="A .ddenv file or a folder for the run; or an .sdf file for the minimal world."
 )
+@trust_option
 @json_option
-def run_command(scenario: str, name: str | None, output: Path | None, jobs: int, as_json: bool, **options: Any) -> int:
+def run_command(
+    scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **options: Any
+) -> int:
     """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
     from ddenv.cli.export_command import announce_needs
     from ddenv.cli.follow import follow_to_summary
+    from ddenv.cli.trusting import allow_named
     from ddenv.runs.creation import create_run
     from ddenv.runs.export import export_world
     from ddenv.runs.folder import run_path
     from ddenv.runs.programs import start_engine
+    from ddenv.runs.trust import trust_cluster
 
     chosen = chosen_scenario(scenario, options)
+    if options["cluster"]:
+        trust_cluster(chosen)
+    allow_named(chosen, scenario, trust)
     path = run_path(chosen.name, name, output)
     announce_notes(create_run(chosen, path, announce), as_json)
     code, state = follow_to_summary(path, start_engine(path, jobs), as_json)

@@ -6,7 +6,10 @@ from typing import Any
 
 import click
 
+from ddenv.cli.options import whole
 from ddenv.errors import UserError
+
+PORT = 8000
 
 
 def _refuse_host(_: Any, __: Any, value: str | None) -> None:
@@ -19,11 +22,18 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 
 @click.command("serve")
 @click.argument("run", required=False)
-@click.option("--port", type=click.IntRange(1, 65535), default=8000, show_default=True, help="Port on 127.0.0.1.")
+@click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
+@click.option(
+    "--font-size",
+    type=whole(6, 72),
+    default=16,
+    show_default=True,
+    help="Of the text, in pixels; 28 for a projector.",
+)
 @click.option("--host", hidden=True, expose_value=False, callback=_refuse_host)
-def serve_command(run: str | None, port: int) -> int:
+def serve_command(run: str | None, port: int, font_size: int) -> int:
     """Serves the workbench to browsers on this machine; with RUN (a name or a file) attached to it."""
     from ddenv.workbench.terminal.served import serve
 
-    serve(port, run)
+    serve(port, run, font_size)
     return 0

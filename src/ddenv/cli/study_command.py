@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ddenv.cli.options import jobs_option, setting_options
+from ddenv.cli.options import jobs_option, setting_options, trust_option, whole
 
 
 @click.command("study")
@@ -32,7 +32,7 @@ from ddenv.cli.options import jobs_option, setting_options
     metavar="NAMES",
     help="Algorithms separated by commas, or 'all'.",
 )
-@click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Reductions of each.")
+@click.option("--seeds", type=whole(1, 1000), default=1, show_default=True, help="Reductions of each.")
 @jobs_option()
 @click.option(
     "-o",
@@ -44,16 +44,28 @@ from ddenv.cli.options import jobs_option, setting_options
     metavar="DIR",
     help="Folder of the study; an existing study continues.",
 )
-@setting_options(without=("pair", "algorithm", "seed", "budget", "timeout"))
+@setting_options(without=("pair", "algorithm", "seed", "budget", "timeout", "cluster"))
+@trust_option
 def study_command(
-    scenarios: tuple[str, ...], pairs: str, algorithms: str, seeds: int, jobs: int, folder: Path, **options: Any
+    scenarios: tuple[str, ...],
+    pairs: str,
+    algorithms: str,
+    seeds: int,
+    jobs: int,
+    folder: Path,
+    trust: bool,
+    **options: Any,
 ) -> int:
     """Makes the paper's tables and figures: reduces each scenario with each pair, and writes the results.
 
     It can be stopped at any time; the same command continues. Each reduction is a run in DIR/runs, for 'ddenv open'.
     With --as-printed it follows the paper's algorithm to the letter, which needs many more tests.
     """
+    from ddenv.cli.trusting import allow_named
     from ddenv.study.conduct import conduct
-    from ddenv.study.plan import make_plan
+    from ddenv.study.plan import make_plan, scenario_names
 
-    return conduct(make_plan(scenarios, pairs, algorithms, seeds, **options), folder, jobs, sys.stdout)
+    plan = make_plan(scenarios, pairs, algorithms, seeds, **options)
+    for scenario, name in zip(plan.scenarios, scenario_names(scenarios), strict=True):
+        allow_named(scenario, name, trust)
+    return conduct(plan, folder, jobs, sys.stdout)

@@ -15,8 +15,10 @@ from ddenv.cli.options import (
     reading_options,
     scenario_options,
     setting_options,
+    trust_option,
+    whole,
 )
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 
 if TYPE_CHECKING:
     from ddenv.engine.single_test import Subject
@@ -29,14 +31,13 @@ if TYPE_CHECKING:
 @reading_options
 @click.option("--keep", help="Only these models, by name, separated by commas.")
 @click.option("--minimal", is_flag=True, help="Only the models of the run's environment.")
-@click.option(
-    "--test", type=click.IntRange(1), metavar="NUMBER", help="The models and the seed of this test of the run."
-)
+@click.option("--test", type=whole(1), metavar="NUMBER", help="The models and the seed of this test of the run.")
 @click.option("--leave-out", multiple=True, metavar="MODEL", help="Leave this model out as well; may be repeated.")
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
-@click.option("--seed", type=click.IntRange(0, 2**31), help="Seed of the first run; the next ones count up.")
-@click.option("--repeat", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Runs of each.")
+@click.option("--seed", type=whole(0, 2**31), help="Seed of the first run; the next ones count up.")
+@click.option("--repeat", type=whole(1, 100_000), default=1, show_default=True, help="Runs of each.")
 @jobs_option("Runs")
+@trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
 def test_command(
     subject: str,
@@ -48,14 +49,15 @@ def test_command(
     seed: int | None,
     repeat: int,
     jobs: int,
+    trust: bool,
     as_json: bool,
     **options: Any,
 ) -> int:
     """Runs the robot in a scenario, or in a run's world; prints each run's outcome, and in the end how often it fails."""
-    from ddenv.cli.test_summary import lines, summary
+    from ddenv.cli.test_summary import line, lines, summary
     from ddenv.engine.single_test import plan, run_trials
 
-    what = _subject(subject, options)
+    what = _subject(subject, options, trust)
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
     trials = plan(
         what,
@@ -71,7 +73,7 @@ def test_command(
     for result in run_trials(what, trials, jobs):
         results.append(result)
         if not as_json:
-            print(printable(_line(result)), flush=True)
+            print(line(result), flush=True)
     rows = summary(results)
     if as_json:
         print(json.dumps({"runs": results, "summary": rows}))
@@ -80,8 +82,9 @@ def test_command(
     return 0
 
 
-def _subject(name: str, options: Mapping[str, Any]) -> Subject:
+def _subject(name: str, options: Mapping[str, Any], trust: bool) -> Subject:
     """A run if there is one of that name, else a scenario."""
+    from ddenv.cli.trusting import allow, allow_named
     from ddenv.engine.single_test import Subject, subject_of_run
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
@@ -95,19 +98,9 @@ def _subject(name: str, options: Mapping[str, Any]) -> Subject:
                 "a run keeps its own"
             )
         with RunFile(path) as file:
-            return subject_of_run(file)
+            run = subject_of_run(file)
+        allow(run.scenario, path, trust)
+        return run
     scenario = chosen_scenario(name, options)
+    allow_named(scenario, name, trust)
     return Subject(scenario, *load_parts(scenario, announce))
-
-
-def _line(result: Mapping[str, Any]) -> str:
-    without = f"  without {result['without']}" if result["without"] else ""
-    if result["end_pose"] is None:
-        return f"seed {result['seed']:<4} {result['outcome']:<8} {result['failure']}{without}"
-    x, y, z = result["end_pose"][:3]
-    distance = "" if result["distance"] is None else f"  {result['distance']:.2f} m from f"
-    failure = f"  {result['failure']}" if result["failure"] else ""
-    return (
-        f"seed {result['seed']:<4} {result['outcome']:<8} ended at ({x:.2f}, {y:.2f}, {z:.2f}) m "
-        f"after {result['simulated_seconds']:.1f} s{failure}{distance}{without}"
-    )

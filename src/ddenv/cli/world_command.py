@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.options import Numbers, announce, reading_options
-from ddenv.errors import UserError
+from ddenv.errors import UserError, printable
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
@@ -72,7 +72,7 @@ def show(
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
     if svg is not None:
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
-        print(f"wrote {svg}")
+        print(printable(f"wrote {svg}"))
         return 0
     print(terminal_map(world, columns, rows - 1, color=color, spawn=start, goal=goal))
     return 0
@@ -89,7 +89,7 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
     from ddenv.world.write import write_converted
 
     for path in write_converted(_read(file, reading), output):
-        print(f"wrote {path}")
+        print(printable(f"wrote {path}"))
     return 0
 
 
@@ -101,7 +101,7 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
     """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
     from ddenv.cli.world_settle import settle_world
 
-    print("\n".join(settle_world(*_read_as(file, reading), output)))
+    print("\n".join(map(printable, settle_world(*_read_as(file, reading), output))))
     return 0
 
 

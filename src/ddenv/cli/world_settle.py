@@ -16,6 +16,9 @@ MOST_NAMES = 5
 
 def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
+    from ddenv.robot.drake_installed import check_drake
+
+    check_drake()
     from ddenv.robot.drake.template import Variants
     from ddenv.robot.settled import moved, notes_on
     from ddenv.runs.scenarios import scenario_for_world

@@ -10,39 +10,49 @@ import os
 import signal
 import sys
 import threading
-import time
 from pathlib import Path
 
 from ddenv import processor
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
+from ddenv.engine.crash_loop import check_crash_loop
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.engine.repeating import check_repeats
+from ddenv.engine.room import Room
 from ddenv.engine.settle import note_start
 from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
+from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.creation import read_parts
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
+from ddenv.runs.trust import check_trusted
 from ddenv.version import __version__
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m ddenv.engine", description="Works on a run until it ends.")
     parser.add_argument("run", type=Path)
     parser.add_argument("--jobs", type=int, default=processor.usable_cores())
+    parser.add_argument("--cluster", help="where the tests are made, in place of what the scenario says")
     parser.add_argument("--accept-mode", choices=("automatic", "ask"))
     parser.add_argument(
         "--bits", choices=("same", "mixed"), default="same", help="whether tests with other bits may follow"
+    )
+    parser.add_argument(
+        "--anyway", choices=("yes", "no"), default="no", help="whether to start although the last engines died at once"
     )
     parser.add_argument("--share", type=Path, help="folder of other runs; their tests are reused")
     parser.add_argument(
         "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
     )
-    parser.add_argument("--since", type=float, default=time.time(), help="when it was asked to start, Unix time, s")
+    parser.add_argument("--after", type=int, help="the last command before it was asked to start")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
     terminated = threading.Event()
@@ -63,16 +73,23 @@ def _say(words: str) -> None:
 def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Event) -> int:
     jobs = max(1, options.jobs)
     scenario, world, robot = read_parts(file)
-    file.own()
+    cluster = options.cluster or scenario.reduction.cluster
+    check_trusted(made_here(scenario) if options.cluster else scenario, file.path)
+    check_cluster(cluster)
+    after = file.last_command() if options.after is None else options.after
+    room = Room(file, terminated)
+    file.own(room.wait)
     journal = Journal(file)
     new = options.certify or journal.has_broken or file.commands(journal.state.last_command)
     if journal.state.status == "finished" and not new:
         return 0
+    if options.anyway == "no":
+        check_crash_loop(journal)
     try:
-        _begin(journal, jobs, options.accept_mode)
-        control = Control(journal, terminated, options.since)
-        workers = Pool(scenario, world, robot, jobs)
-        pool: Pool | SharingPool = workers
+        _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
+        control = Control(journal, terminated, after, room)
+        workers = _workers(scenario, world, robot, jobs, cluster, journal)
+        pool = workers
         if options.share is not None:
             pool = SharingPool(workers, tests_of_others(file, scenario, options.share))
         try:
@@ -104,6 +121,18 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
         file.set_live([])
         file.settle()
     return 0
+
+
+def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster: str, journal: Journal) -> Workers:
+    if cluster == HERE:
+        return Pool(scenario, world, robot, jobs)
+    # Only who asks for a cluster needs Dask.
+    from ddenv.engine.cluster.cluster_pool import ClusterPool
+
+    def tell(tests: int, words: str) -> None:
+        journal.record("cluster", jobs=tests, words=words)
+
+    return ClusterPool(scenario, world, robot, cluster, tell)
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,12 @@ from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.noting import give_up_if_late, note_slow
-from ddenv.engine.pool import Broken, Pool
-from ddenv.engine.shared import SharingPool
+from ddenv.engine.pool import Broken
 from ddenv.engine.subjects import Asked, Keep
+from ddenv.engine.thinking import Thinking
 from ddenv.engine.wall_limit import wall_limit
 from ddenv.engine.worker import Start
+from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
@@ -75,7 +77,7 @@ class Bench:
     Before f is fixed, a run that failed is recorded as "failed".
     """
 
-    def __init__(self, journal: Journal, pool: Pool | SharingPool, control: Control) -> None:
+    def __init__(self, journal: Journal, pool: Workers, control: Control) -> None:
         self._failures: tuple[Failure, ...] = ()
         self._failed: tuple[int, ...] = ()
         self._journal = journal
@@ -86,7 +88,9 @@ class Bench:
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
-        self._meanwhile: Iterator[object] = iter(())
+        self._thinking = Thinking()
+        # Whether no test ended at the last look: where tests end at once, nobody waits for thoughts.
+        self._quiet = False
 
     def work(
         self,
@@ -95,27 +99,33 @@ class Bench:
         wanted: Callable[[], Wanted],
         meanwhile: Iterator[object] | None = None,
     ) -> None:
-        """Makes tests until none is wanted. While tests run, advances `meanwhile`; each of its steps takes some milliseconds.
+        """Makes tests until none is wanted. While tests run, advances `meanwhile` (`Thinking`).
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
         them; it is called again after every look. Raises Stopped, Steered, and UserError if nothing can be simulated or all
         tests break.
         """
         full = self._journal.is_full(phase)
-        self._meanwhile = meanwhile or iter(())
+        self._thinking.begin(meanwhile)
         while tests := wanted():
-            due = [Asked(phase, keep, run, round, candidate) for keep, run, candidate in tests]
-            if self._start([one for one in due if (one.keep, one.run, full) not in self._started], full):
+            # With hundreds of workers thousands are wanted at every look: only those that can start are put together.
+            due = ((keep, run, candidate) for keep, run, candidate in tests if (keep, run, full) not in self._started)
+            if self._start(
+                [Asked(phase, keep, run, round, candidate) for keep, run, candidate in islice(due, self._free)], full
+            ):
                 # Other tests may be wanted now.
                 self._look(0.0)
             else:
                 self.tick()
 
+    @property
+    def _free(self) -> int:
+        """How many tests of a phase may start now. A step is one test, the next in order; nothing runs ahead."""
+        return self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+
     def _start(self, tests: list[Asked], full: bool) -> bool:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
-        # A step is one test, the next in order; nothing runs ahead.
-        free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
-        for asked in tests[:free]:
+        for asked in tests:
             if not self._control.may_start():
                 return False
             implied = self._make(asked, full)
@@ -127,7 +137,7 @@ class Bench:
         return False
 
     def _make(self, asked: Asked, full: bool) -> bool | None:
-        """Starts a test, or writes its result if another one implies it; returns whether that is so, None if the budget is used up.
+        """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
         Raises Stopped if it is used up and no test runs.
         """
@@ -136,7 +146,7 @@ class Bench:
         if source is not None and asked.phase != "audit" and not audit_is_due(journal.state, asked.phase):
             journal.imply(asked, source)
             return True
-        if self._is_spent():
+        if self._is_spent() or not self._control.has_room():
             return None
         test = journal.start_test(asked, source)
         self._started.add((asked.keep, asked.run, full))
@@ -198,11 +208,13 @@ class Bench:
 
     def _look_around(self, wait: float) -> None:
         self._control.poll()
-        thinks = self._pool.busy > 0 and next(self._meanwhile, self) is not self
+        thinks = self._quiet and self._pool.busy > 0 and self._thinking.step()
         finished = self._pool.finished(0.0 if thinks else wait)
         for test, result in finished:
             self._record(test, result)
+            self._thinking.test_ended()
             self._give_up_if_all_break(result)
+        self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()
         if self._pool.busy == 0:

@@ -34,7 +34,6 @@ class Certifier:
     journal: Journal
     bench: Bench
     free: Sequence[str]
-    jobs: int
     moves: bool
 
     def certify(self, at_least: int, anew: bool = False) -> None:
@@ -93,8 +92,8 @@ class Certifier:
         return self.journal.without(name) not in self.journal.refused
 
     def _settle(self, procedure: Procedure) -> Claim:
-        first = self._certificate.first_run
-        return settle(procedure, lambda keep, run: self.journal.shown(keep, first + run, full=True), self.jobs)
+        first, jobs = self._certificate.first_run, max(1, self.journal.state.jobs)
+        return settle(procedure, lambda keep, run: self.journal.shown(keep, first + run, full=True), jobs)
 
     def _wanted(self) -> Wanted:
         wanted = dict.fromkeys(test for _, claim in self._claims() for test in self._in_order(claim))

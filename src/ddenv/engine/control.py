@@ -8,8 +8,10 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from ddenv.engine.clock_jumps import ClockJumps
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
+from ddenv.engine.room import Room
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, parse, refusal
 from ddenv.guiding.course import Change, GoBack, Undo
@@ -39,11 +41,13 @@ class Steered(Exception):
 class Control:
     """Commands turned into events and into what the driver may do next.
 
-    `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `since` is
-    when this engine was asked to start (Unix time, s).
+    `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `after` is
+    the number of the last command before this engine was asked to start. `room` says whether the disk has room for more tests.
     """
 
-    def __init__(self, journal: Journal, terminated: threading.Event, since: float = math.inf) -> None:
+    def __init__(
+        self, journal: Journal, terminated: threading.Event, after: float = math.inf, room: Room | None = None
+    ) -> None:
         self._journal = journal
         self._terminated = terminated
         self._paused = False
@@ -51,12 +55,14 @@ class Control:
         self._pause_after_round = False
         self._searches = False
         self._last = -math.inf
-        self._catch_up(since)
+        self._room = room
+        self._jumps = ClockJumps(journal)
+        self._catch_up(after)
 
-    def _catch_up(self, since: float) -> None:
+    def _catch_up(self, after: float) -> None:
         """Obeys what was asked for before this engine was."""
         for command in self._journal.file.commands(self._journal.state.last_command):
-            if command.time >= since:
+            if command.id > after:
                 return
             if command.kind in [each.kind for each in OF_THE_MOMENT]:
                 self._handled(command)
@@ -67,6 +73,7 @@ class Control:
         """Obeys new commands. Raises Stopped."""
         if self._terminated.is_set():
             raise Stopped("the engine was terminated")
+        self._jumps.look()
         for command in self._journal.file.commands(self._journal.state.last_command):
             self._obey(command)
             self._last = time.monotonic()
@@ -91,6 +98,10 @@ class Control:
     def may_start(self) -> bool:
         """Whether a test may start now."""
         return not self._paused and self._credit != 0
+
+    def has_room(self) -> bool:
+        """Whether the disk has room for the results of more tests."""
+        return self._room is None or self._room.enough()
 
     def speculates(self) -> bool:
         """Whether idle workers may run ahead: not while the user steps."""

@@ -52,7 +52,6 @@ class Driver:
         self._scenario, self._world = scenario, world
         self._reduction = scenario.reduction
         self._failure_spec = scenario.failure
-        self._enough = AHEAD * max(1, journal.state.jobs)
         self._journal = journal
         self._bench = bench
         self._control = control
@@ -194,7 +193,7 @@ class Driver:
     def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
         """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
         journal = self._journal
-        Certifier(journal, self._bench, free, max(1, journal.state.jobs), moves).certify(at_least, anew)
+        Certifier(journal, self._bench, free, moves).certify(at_least, anew)
         while journal.steered and not anew:
             self._bench.tick()
         certificate = current(journal.state)
@@ -287,7 +286,7 @@ class Driver:
             replace(self._known(), trials=tuple(self._trials)),
             self._journal.rule,
             known_failure(self._journal.state).rate,
-            self._journal.state.jobs,
+            max(1, self._journal.state.jobs),
         )
 
     def _forecast(self, number: int, moment: Moment) -> Iterator[object]:
@@ -319,7 +318,9 @@ class Driver:
         """Tests of the candidates that have no verdict yet."""
         open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
         shown, rule, refused = self._journal.shown, self._rule(round), self._journal.refused
-        return standing(open_ones, shown, rule, refused, first=self._judged, enough=self._enough)
+        return standing(
+            open_ones, shown, rule, refused, first=self._judged, enough=AHEAD * max(1, self._journal.state.jobs)
+        )
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
         """Records verdicts in the order of candidates: tests that ran ahead of time wait for their turn."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.engine.known_tests import KnownTests
-from ddenv.engine.subjects import Asked, Keep, current_round, keep_of, keep_of_candidate
+from ddenv.engine.subjects import Asked, Keep, Keeps, current_round
 from ddenv.reduction.acceptance import Acceptance, estimated_rate
 from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
@@ -73,6 +73,7 @@ class Journal:
         self.command: int | None = None
         self.partitions: dict[int, list[list[int]]] = {}
         self._keeps: dict[int, Keep] = {}
+        self._sets = Keeps()
         self._refused_in: dict[Keep, int | None] = {}
         # n of the last round in each node.
         self._fineness: dict[int, int] = {}
@@ -311,7 +312,7 @@ class Journal:
         self.refused.lose(frozenset(self.state.nodes[data["lost"]].environment))
 
     def _test_started(self, data: dict[str, Any]) -> None:
-        self._keeps.setdefault(data["test"], keep_of(self.state, self.state.tests[-1]))
+        self._keeps.setdefault(data["test"], self._sets.of(self.state, self.state.tests[-1]))
 
     def _test_finished(self, data: dict[str, Any]) -> None:
         self._enter(self.state.tests[data["test"] - 1])
@@ -324,14 +325,14 @@ class Journal:
         round, candidate = data["round"], data["candidate"]
         self.decisions[round, candidate] = data["decision"]
         if data["decision"] == "reject":
-            self._refuse(keep_of_candidate(self.state, candidate), "rejected", round)
+            self._refuse(self._sets.of_candidate(self.state, candidate), "rejected", round)
 
     def _vetoed(self, data: dict[str, Any]) -> None:
-        self._refuse(keep_of_candidate(self.state, data["candidate"]), data["verdict"], data.get("round"))
+        self._refuse(self._sets.of_candidate(self.state, data["candidate"]), data["verdict"], data.get("round"))
 
     def _unvetoed(self, data: dict[str, Any]) -> None:
         """A refusal in an earlier round has blocked candidates since, so the search starts again."""
-        keep, round = keep_of_candidate(self.state, data["candidate"]), data["round"]
+        keep, round = self._sets.of_candidate(self.state, data["candidate"]), data["round"]
         self.refused.pop(keep, None)
         self.decisions.pop((round, data["candidate"]), None)
         # A rejected candidate was judged, and is judged again.

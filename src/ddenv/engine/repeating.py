@@ -7,8 +7,9 @@ import numpy as np
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
-from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.pool import Broken
 from ddenv.engine.wall_limit import wall_limit
+from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import RunState, Test
@@ -17,7 +18,7 @@ from ddenv.runfile.state import RunState, Test
 WAIT = 0.05
 
 
-def check_repeats(journal: Journal, pool: Pool, control: Control, mixed: bool) -> None:
+def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool) -> None:
     """Makes the first baseline run again, and compares its bits, if this engine computes with anything else than the earlier ones.
 
     Raises UserError if they differ, unless the run goes on `mixed`; and Stopped.

@@ -17,9 +17,10 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Broken, Pace, Pool
+from ddenv.engine.pool import Broken, Pace
 from ddenv.engine.subjects import Keep
 from ddenv.engine.worker import Start
+from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import as_it_was
@@ -123,7 +124,7 @@ def _asked(scenario: Any) -> Any:
 class SharingPool:
     """Runs new tests in `pool`; a `known` test has its result at once, and takes no worker."""
 
-    def __init__(self, pool: Pool, known: dict[Key, Place]) -> None:
+    def __init__(self, pool: Workers, known: dict[Key, Place]) -> None:
         self._pool = pool
         self._known = known
         self._ready: list[tuple[int, RunResult | Broken]] = []

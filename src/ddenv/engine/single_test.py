@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from ddenv.engine.judging import failures_of, result_data
@@ -53,6 +54,11 @@ def subject_of_run(file: RunFile) -> Subject:
     position = position_in(file.events())
     failures = failures_of(file, position.end, scenario.failure)
     return Subject(scenario, world, robot, position.end, failures, position)
+
+
+def in_folder(subject: Subject, folder: Path) -> Subject:
+    """The same, with the user's own controller or simulator from `folder`."""
+    return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
 
 
 def plan(

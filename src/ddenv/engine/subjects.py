@@ -10,6 +10,8 @@ from ddenv.runfile.state import FRESH, Round, RunState, Test
 from ddenv.runfile.supports import stack_with
 
 Keep = frozenset[str]
+# The sets of so many candidates are held: 10,000 of them would take gigabytes.
+HELD = 64
 
 
 @dataclass(frozen=True)
@@ -53,21 +55,45 @@ def _node(state: RunState, keep: Keep) -> dict[str, int]:
     return {"node": state.node, "without": state.elements.index(gone)}
 
 
-def keep_of(state: RunState, test: Test) -> Keep:
-    """The models of a test that has just started."""
-    if test.phase == "baseline":
-        return frozenset(state.elements)
-    if test.phase in (*FRESH, "audit"):
-        environment = state.nodes[test.node].environment
-        return frozenset(environment) - frozenset(stack_with(state, environment, test.without))
-    if test.phase == "hand":
-        return frozenset(state.trials[(test.trial or 0) - 1].models)
-    return keep_of_candidate(state, test.candidate or 0)
+class Keeps:
+    """The models of tests that have just started, as sets. Runs of one candidate share one: of thousands of models, a set takes a
+    while to be made.
+    """
 
+    def __init__(self) -> None:
+        self._environment: tuple[tuple[str, ...], Keep] = (), frozenset()
+        # Of the latest candidates, by round and number.
+        self._latest: dict[tuple[int, int], Keep] = {}
 
-def keep_of_candidate(state: RunState, candidate: int) -> Keep:
-    """The models of a candidate of the current round."""
-    return frozenset(current_round(state).candidates[candidate].models)
+    def of(self, state: RunState, test: Test) -> Keep:
+        """The models of a test that has just started."""
+        if test.phase == "baseline":
+            return self._set(state.elements)
+        if test.phase in (*FRESH, "audit"):
+            environment = state.nodes[test.node].environment
+            return self._set(environment).difference(stack_with(state, environment, test.without))
+        if test.phase == "hand":
+            return frozenset(state.trials[(test.trial or 0) - 1].models)
+        return self.of_candidate(state, test.candidate or 0)
+
+    def of_candidate(self, state: RunState, candidate: int) -> Keep:
+        """The models of a candidate of the current round."""
+        round = current_round(state)
+        key = round.number, candidate
+        if key not in self._latest:
+            if len(self._latest) >= HELD:
+                self._latest.clear()
+            one = round.candidates[candidate]
+            part = round.partitions[one.partition]
+            parts = frozenset(part).union(one.split.pinned)
+            self._latest[key] = parts if one.kind == "partition" else self._set(round.environment).difference(part)
+        return self._latest[key]
+
+    def _set(self, environment: tuple[str, ...]) -> Keep:
+        """The set of an environment, which stays the same for many tests."""
+        if self._environment[0] is not environment:
+            self._environment = environment, frozenset(environment)
+        return self._environment[1]
 
 
 def current_round(state: RunState) -> Round:

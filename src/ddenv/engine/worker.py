@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NoReturn, Protocol, cast, runtime_checkable
+from multiprocessing.connection import Connection
+from typing import Any, Protocol, cast, runtime_checkable
 
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import Progress, RunResult
@@ -19,7 +22,7 @@ from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 NICENESS = 5
-# How many bytes of the reason why a worker broke its pool can read.
+# The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
 
 
@@ -54,6 +57,9 @@ class Settling(Protocol):
     def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None: ...
 
 
+Make = Callable[[Scenario, World, Model], Simulator]
+
+
 @dataclass(frozen=True)
 class Start:
     """What rests on what in the settled world, as (upper, lower), how it settled, and the ties of its models if they are known."""
@@ -67,36 +73,57 @@ class Start:
 class Shared:
     """Memory that a pool shares with its workers, with a part for each slot.
 
-    `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that;
-    `reasons` `REASON` bytes: why the worker broke, in UTF-8.
+    `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that.
     """
 
     progress: Any
     begun: Any
-    reasons: Any
 
 
-_simulator: Simulator | Exception
-_shared: Shared
+@dataclass(frozen=True)
+class Run:
+    """Asks for a test of at most `limit` s of real time."""
+
+    keep: frozenset[str]
+    seed: int
+    full: bool
+    limit: float
 
 
-def prepare(scenario: Scenario, world: World, robot: Model, shared: Shared) -> None:
-    """Runs first in every worker. An error is stored, and raised by every test: here it would only break the pool."""
-    global _simulator, _shared
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Simulations take all cores; a screen on the same machine needs little, and a user waits for it.
-    os.nice(NICENESS)
-    # Output printed here, also by native code, must not mix with the caller's output, which programs read.
-    os.dup2(2, 1)
-    threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
-    _shared = shared
-    try:
-        _simulator = _simulator_of(scenario, world, robot)
-    except Exception as error:
-        _simulator = error
+@dataclass(frozen=True)
+class Settle:
+    """Asks how the world settles, and which of `elements` rest on which then. The user's own simulator cannot say."""
+
+    elements: frozenset[str]
 
 
-def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
+Task = Run | Settle
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The worker has prepared, and takes its first task."""
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The world cannot be simulated: `why` is for the user."""
+
+    why: UserError
+
+
+@dataclass(frozen=True)
+class Broke:
+    """An exception ended the task, in one line, and ends the worker: nobody knows what it has left behind in the simulator."""
+
+    reason: str
+
+
+Answer = Ready | RunResult | Start | Refused | Broke
+
+
+def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
+    """The simulator that a scenario asks for. Raises UserError if the world cannot be simulated."""
     if scenario.oracle is not None:
         from ddenv.robot.external.simulator import ExternalSimulator
 
@@ -107,69 +134,80 @@ def _simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
     return Variants(world, robot, scenario)
 
 
-def run_test(keep: frozenset[str], seed: int, full: bool, limit: float, slot: int) -> RunResult:
-    """One test of at most `limit` s of real time, with its progress in `slot` of the shared memory.
+def work(line: Connection, output: Connection, parts: Any, shared: Shared, slot: int) -> None:
+    """Answers the tasks that come over `line`, one at a time, until it is closed; whatever is printed goes to `output`.
 
-    Raises UserError if the world cannot be simulated. Any other exception ends the worker, with the reason in the shared
-    memory: nobody knows what it has left behind in the simulator.
+    `parts` has what to make the simulator with, pickled: shared memory, so that starting a worker takes no time in a large world.
     """
+    _settle_in(output)
+    make, of = pickle.loads(bytes(parts))
+    try:
+        simulator: Simulator | Exception = make(*of)
+    # It is raised by every task: a worker that cannot even start would be taken for one that was killed.
+    except Exception as error:
+        simulator = error
+    line.send(Ready())
+    while True:
+        try:
+            task = line.recv()
+        except (EOFError, OSError):
+            return
+        answer = answered(task, simulator, shared, slot)
+        line.send(answer)
+        if isinstance(answer, Broke):
+            os._exit(1)
+
+
+def _settle_in(output: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Simulations take all cores; a screen on the same machine needs little, and a user waits for it.
+    os.nice(NICENESS)
+    # Output printed here, also by native code, must not mix with the caller's output, which programs read.
+    for stream in (1, 2):
+        os.dup2(output.fileno(), stream)
+    output.close()
+    threading.Thread(target=_follow_parent, args=(os.getppid(),), daemon=True).start()
+
+
+def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot: int) -> Answer:
+    """Does a task, with its progress in `slot` of the shared memory. A traceback is printed."""
+    try:
+        if isinstance(simulator, Exception):
+            raise simulator
+        if isinstance(task, Settle):
+            world = cast(Settling, simulator)
+            return Start(world.supports(task.elements), world.settled(), world.ties(task.elements))
+        if isinstance(simulator, Limited):
+            simulator.limit = task.limit
+        return simulator.run(task.keep, task.seed, _progress(shared, slot), task.full)
+    # Drake raises SystemExit when one of its own checks fails.
+    except BaseException as error:
+        if error is simulator and isinstance(error, UserError):
+            return Refused(error)
+        traceback.print_exception(error)
+        sys.stderr.flush()
+        return Broke(_reason(error))
+
+
+def _progress(shared: Shared, slot: int) -> Progress:
+    """Writes how far a test is to the shared memory."""
     start, begun = slot * COLUMNS, False
 
     def report(time_s: float, pose: tuple[float, ...]) -> None:
         nonlocal begun
         if not begun or time_s == 0.0:
             # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
-            _shared.begun[slot], begun = time.monotonic(), True
-        _shared.progress[start : start + COLUMNS] = (time_s, *pose)
+            shared.begun[slot], begun = time.monotonic(), True
+        shared.progress[start : start + COLUMNS] = (time_s, *pose)
 
-    if isinstance(_simulator, UserError):
-        raise _simulator
-    try:
-        if isinstance(_simulator, Exception):
-            raise _simulator
-        if isinstance(_simulator, Limited):
-            _simulator.limit = limit
-        return _simulator.run(keep, seed, report, full)
-    # Drake raises SystemExit when one of its own checks fails.
-    except BaseException as error:
-        _break(error, slot)
+    return report
 
 
-def settle(elements: frozenset[str], slot: int) -> Start:
-    """How the world settles, and which of `elements` rest on which then. The user's own simulator cannot say.
-
-    Raises as `run_test`.
-    """
-    if isinstance(_simulator, UserError):
-        raise _simulator
-    try:
-        if isinstance(_simulator, Exception):
-            raise _simulator
-        world = cast(Settling, _simulator)
-        return Start(world.supports(elements), world.settled(), world.ties(elements))
-    except BaseException as error:
-        _break(error, slot)
-
-
-def _break(error: BaseException, slot: int) -> NoReturn:
-    """Ends the worker. The traceback goes to the log."""
-    try:
-        reason, start = _reason(error), slot * REASON
-        # The first byte comes last: whoever finds one finds all.
-        _shared.reasons[start + 1 : start + len(reason)] = reason[1:]
-        _shared.reasons[start] = reason[0]
-        traceback.print_exception(error)
-        sys.stderr.flush()
-    finally:
-        os._exit(1)
-
-
-def _reason(error: BaseException) -> bytes:
-    """An exception in one line of at most `REASON` bytes."""
+def _reason(error: BaseException) -> str:
+    """An exception in one line."""
     text = " ".join(str(error).split())
     words = text if isinstance(error, UserError) else f"{type(error).__name__}{': ' if text else ''}{text}"
-    # A character that is cut in two is left out when the bytes are read.
-    return printable(words).encode(errors="replace")[:REASON]
+    return printable(words)[:REASON]
 
 
 def _follow_parent(parent: int) -> None:

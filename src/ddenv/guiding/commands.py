@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, get_args
 
+from ddenv.claims import fresh_runs_made, in_the_making
 from ddenv.errors import UserError
 from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
 from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step, Stop
@@ -16,6 +17,7 @@ from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
 from ddenv.guiding.situation import NO_MODELS, Situation
 from ddenv.runfile.state import RunState
+from ddenv.words import count
 
 Command = (
     Pause
@@ -38,8 +40,10 @@ Command = (
 )
 KINDS: dict[str, Callable[..., Command]] = {each.kind: each for each in get_args(Command)}
 FIELDS: dict[str, list[str]] = {each.kind: [field.name for field in fields(each)] for each in get_args(Command)}
-# The run goes on from these: an engine is started for them if none is running.
+# The run goes on from these: an engine starts for them if none is running.
 GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
+# After these a new search begins, and a certificate that is being made is broken off.
+ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 
 
 def refusal(command: Command | StartEngine, now: Situation) -> str:
@@ -48,8 +52,22 @@ def refusal(command: Command | StartEngine, now: Situation) -> str:
 
 
 def starts_engine(command: Command, state: RunState) -> bool:
-    """Whether an engine is started for a command if none is running. Other pins restart a finished search."""
+    """Whether an engine starts for a command if none is running. Other pins restart a finished search."""
     return isinstance(command, GOES_ON) or (isinstance(command, Pin | Unpin) and state.status == "finished")
+
+
+def question(command: Command, state: RunState) -> str:
+    """What is asked before a command is sent, or "": also where it breaks off a certificate."""
+    own, now = command.words(state).question, in_the_making(state)
+    begins_anew = command.begins_anew(state) if isinstance(command, Change) else isinstance(command, ANEW)
+    if now is None or not begins_anew:
+        return own
+    made = count(fresh_runs_made(state, now), "run")
+    lost = (
+        f"This breaks off certificate {now.number} after {made}, which then count for nothing. "
+        "A new search begins, and another certificate ends it."
+    )
+    return f"{own}\n\n{lost}" if own else f"{lost}\n\n{command.words(state).brief.capitalize()} all the same?"
 
 
 def said(command: Command, now: Situation) -> str:
@@ -58,7 +76,7 @@ def said(command: Command, now: Situation) -> str:
     if not words or now.engine != "absent":
         return words
     starts = starts_engine(command, now.state)
-    return f"{words}; an engine is started for it" if starts else f"{words}; it waits for an engine, space starts one"
+    return f"{words}; an engine starts for it" if starts else f"{words}; it waits for an engine, space starts one"
 
 
 def data_of(command: Command) -> dict[str, Any]:

@@ -88,8 +88,12 @@ class Change:
     def words(self, state: RunState) -> Words:
         new = self.new(state).items()
         words = ", ".join(f"{key} {'no limit' if value is None else printable(str(value))}" for key, value in new)
-        then = "" if set(self.new(state)) <= {"budget"} else f". {new_search(state)}"
+        then = f". {new_search(state)}" if self.begins_anew(state) else ""
         return Words("change settings", f"from now on: {words}{then}")
+
+    def begins_anew(self, state: RunState) -> bool:
+        """Whether a new search begins: the budget alone changes nothing in the order of the tests."""
+        return not set(self.new(state)) <= {"budget"}
 
     def new(self, state: RunState) -> dict[str, Value]:
         """The settings that differ from the current ones."""

@@ -33,7 +33,7 @@ class Pin:
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
     kind: ClassVar[str] = "pin"
-    offer: ClassVar[str] = "pin"
+    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -63,7 +63,7 @@ class Unpin:
     """Let pinned models be removed again."""
 
     kind: ClassVar[str] = "unpin"
-    offer: ClassVar[str] = "unpin"
+    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:

@@ -121,7 +121,7 @@ def _reason(test: Test, candidate: Candidate) -> Question:
             Answer(
                 "It failed, but not as in f: it ended elsewhere or otherwise.",
                 True,
-                "This may have another cause, so it says nothing about f.",
+                "It may have another cause, so it does not count: the candidate is one without f.",
             ),
             Answer(
                 "Any failure is good enough: this is f.", False, "Only the same failure counts, near f's end.", "any"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -35,21 +36,27 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A step of a lesson: a Markdown `text`, then maybe a question, or something to foretell.
+    """A step of a lesson: a Markdown `text`, then maybe a question, something to foretell, or something to do.
 
-    `at` is the event of the run that is shown; None leaves it where it is. `line` is the line in the lesson's file.
+    `at` is the event of the run that is shown; None leaves it where it is. `budget` is how many tests a student has to search
+    alone, `race` names the algorithms or pairs that race. `line` is the line in the lesson's file.
     """
 
     text: str
     at: int | None = None
     question: Question | None = None
     foretell: Foretold | None = None
+    budget: int | None = None
+    race: tuple[str, ...] = ()
     line: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """`name` is its file's, without number and ending; `minutes` is how long it takes. `oracle` is None without one."""
+    """`name` is its file's, without number and ending; `minutes` is how long it takes. `oracle` is None without one.
+
+    `beside` are other runs by name, for figures to compare with.
+    """
 
     file: Path
     title: str
@@ -58,6 +65,7 @@ class Lesson:
     run: Path
     oracle: Path | None
     steps: tuple[Step, ...]
+    beside: Mapping[str, Path] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -65,9 +73,10 @@ class Lesson:
 
     @property
     def asked(self) -> int:
-        """How many questions and predictions it has; the prediction of an outcome also asks for the reason."""
+        """How many questions, predictions, searches and races it has; the prediction of an outcome also asks for the reason."""
         foretold = [each.foretell for each in self.steps if each.foretell is not None]
-        return sum(each.question is not None for each in self.steps) + len(foretold) + foretold.count("outcome")
+        done = sum(bool(each.question or each.budget or each.race) for each in self.steps)
+        return done + len(foretold) + foretold.count("outcome")
 
 
 # What students often believe, and what is right instead.
@@ -95,6 +104,14 @@ MISCONCEPTIONS = {
     "alone": (
         "thinks that one model is the culprit",
         "A failure can need several models at once: without any one of them the robot gets through.",
+    ),
+    "hit": (
+        "takes one run with f for its rate",
+        "One run with f shows that f can happen there. How often it does, only many runs show.",
+    ),
+    "took": (
+        "takes what took part for what is needed",
+        "What took part changed a bit of a run. Whether f needs it, only a test without it shows.",
     ),
     "stuck": (
         "thinks that a round without f is wasted, or the end",

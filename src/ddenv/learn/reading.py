@@ -5,22 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Protocol, get_args
 
 import yaml
 
 from ddenv.errors import UserError
-from ddenv.learn import figures
+from ddenv.learn import lesson_figures
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Foretold, Lesson, Question, Step
-from ddenv.learn.places import Places
-from ddenv.schemas import nearest
+from ddenv.learn.race import RACERS
+from ddenv.schemas import names, nearest, pairs
 from ddenv.world.files.access import read_bytes
 
 LONGEST = 1_000_000  # bytes of a lesson's file
 ANSWERS = (2, 6)
-_KEYS = ("title", "aim", "minutes", "run", "oracle", "steps")
-_STEP = ("text", "at", "ask", "hint", "answers", "foretell")
+_KEYS = ("title", "aim", "minutes", "run", "beside", "oracle", "steps")
+_STEP = ("text", "at", "ask", "hint", "answers", "foretell", "try", "race")
+# A step has at most one of these.
+_DOES = ("ask", "foretell", "try", "race")
 _ANSWER = ("say", "why", "right", "misconception")
+
+
+class Places(Protocol):
+    """Knows the events of a run by the words of a lesson."""
+
+    def event(self, words: str) -> int:
+        """Raises UserError for words that are no place in the run."""
 
 
 def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
@@ -49,7 +58,8 @@ def read_lesson(file: Path, places: Callable[[Path], Places]) -> Lesson:
         top.at["minutes"].whole() if "minutes" in top.at else 10,
         run,
         oracle,
-        tuple(_step(each, found) for each in top.at["steps"].entries()),
+        tuple(_step(each, found, oracle is not None) for each in top.at["steps"].entries()),
+        {name: _beside(node) for name, node in top.at["beside"].named()} if "beside" in top.at else {},
     )
 
 
@@ -97,6 +107,12 @@ class _Node:
             raise self.wrong("expected a list with at least one entry")
         return [_Node(self.file, each, f"{self.key}[{place}]") for place, each in enumerate(self.node.value, 1)]
 
+    def named(self) -> list[tuple[str, _Node]]:
+        """The entries of a mapping with names of the user's own."""
+        if not isinstance(self.node, yaml.MappingNode):
+            raise self.wrong("expected names, each with a file")
+        return [(str(key.value), _Node(self.file, value, f"{self.key}.{key.value}")) for key, value in self.node.value]
+
     def raw(self) -> str:
         if not isinstance(self.node, yaml.ScalarNode) or not self.node.value.strip():
             raise self.wrong("expected a text")
@@ -105,7 +121,7 @@ class _Node:
     def words(self) -> str:
         """A text for readers."""
         text = self.raw()
-        self.tried(lambda: figures.check(text))
+        self.tried(lambda: lesson_figures.check(text))
         return text
 
     def whole(self) -> int:
@@ -149,11 +165,14 @@ def _beside(node: _Node) -> Path:
     return path
 
 
-def _step(node: _Node, places: Places) -> Step:
+def _step(node: _Node, places: Places, has_oracle: bool) -> Step:
     keys = node.keys(_STEP)
     at = keys.at.get("at")
-    if "ask" in keys.at and "foretell" in keys.at:
-        raise keys.at["ask"].wrong("a step asks or foretells, not both")
+    if len(does := [key for key in _DOES if key in keys.at]) > 1:
+        raise keys.at[does[1]].wrong(f"a step has one of {', '.join(_DOES)}, found {' and '.join(does)}")
+    for key in ("try", "race"):
+        if key in keys.at and not has_oracle:
+            raise keys.at[key].wrong("needs to know how every part of the world ends; give the lesson the key 'oracle'")
     for key in ("answers", "hint"):
         if key in keys.at and "ask" not in keys.at:
             raise keys.at[key].wrong("belongs to a question; the key 'ask' is missing")
@@ -170,8 +189,22 @@ def _step(node: _Node, places: Places) -> Step:
         None if at is None else int(at.tried(lambda: places.event(at.raw()))),
         _question(keys) if "ask" in keys.at else None,
         foretell,
+        keys.at["try"].keys(("budget",)).need("budget").whole() if "try" in keys.at else None,
+        _racers(keys.at["race"]) if "race" in keys.at else (),
         node.line,
     )
+
+
+def _racers(node: _Node) -> tuple[str, ...]:
+    entries = node.entries()
+    if not RACERS[0] <= len(entries) <= RACERS[1]:
+        raise node.wrong(f"expected {RACERS[0]} to {RACERS[1]} algorithms or pairs, found {len(entries)}")
+    found: list[str] = []
+    for each in entries:
+        found.append(each.one_of((*names("algorithm"), *pairs())))
+        if found[-1] in found[:-1]:
+            raise each.wrong(f"{found[-1]!r} stands twice")
+    return tuple(found)
 
 
 def _foretold(node: _Node) -> Foretold:

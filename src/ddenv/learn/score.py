@@ -8,10 +8,16 @@ from typing import Any
 
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Lesson
 
+# Of one search; what is longer is no search.
+MOST_MOVES = 2000
+
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """`step` is where the student is. `answered` has for each question, by a key such as "3.reason", whether it was right."""
+    """`step` is where the student is. `answered` has for each question, by a key such as "3.reason", whether it was right.
+
+    `moves` are those of the student's own searches, by their steps.
+    """
 
     step: int = 0
     done: bool = False
@@ -19,6 +25,7 @@ class Score:
     streak: int = 0
     best: int = 0
     misconceptions: Mapping[str, int] = field(default_factory=dict)
+    moves: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def right(self) -> int:
@@ -41,6 +48,10 @@ class Score:
             misconceptions=beliefs,
         )
 
+    def with_moves(self, key: str, moves: tuple[str, ...]) -> Score:
+        """After moves of the student's own search."""
+        return replace(self, moves={**self.moves, key: moves})
+
     def at(self, step: int, last: int) -> Score:
         """At a step of a lesson whose last step is `last`."""
         return replace(self, step=step, done=self.done or step >= last)
@@ -48,7 +59,7 @@ class Score:
 
 def data_of(score: Score) -> dict[str, Any]:
     """As JSON."""
-    return asdict(score) | {"answered": dict(score.answered), "misconceptions": dict(score.misconceptions)}
+    return asdict(score)
 
 
 def score_of(data: Any) -> Score:
@@ -58,10 +69,11 @@ def score_of(data: Any) -> Score:
     try:
         answered = {str(key)[:40]: value is True for key, value in dict(data["answered"]).items()}
         beliefs = {key: int(number) for key, number in dict(data["misconceptions"]).items() if key in MISCONCEPTIONS}
+        moves = {str(key)[:40]: tuple(map(str, list(each)[:MOST_MOVES])) for key, each in data.get("moves", {}).items()}
         step, streak, best = (max(0, int(data[key])) for key in ("step", "streak", "best"))
-    except (KeyError, TypeError, ValueError, OverflowError):
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
         return Score()
-    return Score(step, data.get("done") is True, answered, streak, best, beliefs)
+    return Score(step, data.get("done") is True, answered, streak, best, beliefs, moves)
 
 
 def summary(lesson: Lesson, score: Score) -> list[str]:
@@ -74,5 +86,5 @@ def summary(lesson: Lesson, score: Score) -> list[str]:
         lines.append("No typical misconception was seen.")
     for name, _ in sorted(score.misconceptions.items(), key=lambda item: -item[1]):
         belief, instead = MISCONCEPTIONS[name]
-        lines.append(f"One of your answers {belief}. {instead}")
+        lines.append(f"One of your answers is typical of somebody who {belief}. {instead}")
     return lines

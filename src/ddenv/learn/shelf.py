@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.learn import figures
-from ddenv.learn.lesson import Lesson
-from ddenv.learn.oracle import Oracle, read_oracle
-from ddenv.learn.places import Places
+from ddenv.learn import lesson_figures
+from ddenv.learn.attempt import Attempt
+from ddenv.learn.lesson import Lesson, Step
+from ddenv.learn.lesson_figures import Figures
+from ddenv.learn.plays import Play, recorded_play
 from ddenv.learn.reading import read_lesson
+from ddenv.learn.recorded_oracle import Oracle, read_oracle
+from ddenv.learn.run_places import Places
+from ddenv.runfile.fold import fold
 from ddenv.runfile.position import Position, position_in
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 
 LESSONS = Path(__file__).parent / "lessons"
@@ -34,15 +40,26 @@ def find_lesson(name: str) -> Path | None:
 
 @dataclass(frozen=True)
 class Opened:
-    """A lesson with the position in its run, and its oracle if it has one."""
+    """A lesson with the position in its run, its oracle if it has one, and the ends of the runs beside it."""
 
     lesson: Lesson
     position: Position
     oracle: Oracle | None
+    beside: Mapping[str, RunState]
+    plays: Mapping[str, Play] = field(default_factory=dict)
+
+    def attempt(self, step: Step, moves: Iterable[str] = ()) -> Attempt | None:
+        """The student's own search in a step, after these moves; None if the step has none."""
+        return None if step.budget is None or self.oracle is None else Attempt(self.oracle, step.budget, moves)
+
+    def racers(self, step: Step) -> tuple[Play, ...]:
+        """The searches that race in a step."""
+        return tuple(self.plays[name] for name in step.race)
 
     def text(self, words: str, at: int) -> str:
-        """`words` with their figures, as they are at the event `at`."""
-        return figures.filled(words, figures.values(self.position.end, self.position.state(at), self.oracle))
+        """`words` with their figures, as they are at the event `at`. Raises UserError for one that nothing here knows."""
+        here = self.position.state(at)
+        return lesson_figures.filled(words, Figures(self.position.end, here, self.oracle, self.beside))
 
     @cached_property
     def places(self) -> tuple[int, ...]:
@@ -52,6 +69,18 @@ class Opened:
             at = step.at or at
             found.append(at)
         return tuple(found)
+
+
+class _Anywhere:
+    """The places of a run that is not read."""
+
+    def event(self, words: str) -> int:
+        return 0
+
+
+def glance(file: Path) -> Lesson:
+    """A lesson for a list: its run is not read, and so its places are not known. Raises UserError as `open_lesson`."""
+    return read_lesson(file, lambda run: _Anywhere())
 
 
 def open_lesson(file: Path) -> Opened:
@@ -68,18 +97,46 @@ def open_lesson(file: Path) -> Opened:
     oracle = None if lesson.oracle is None else read_oracle(lesson.oracle)
     if oracle is not None and set(oracle.models) != set(opened[0].end.elements):
         raise UserError(f"{lesson.oracle}: its models are not those of {lesson.run.name}")
-    if oracle is None:
-        _need_no_oracle(lesson)
-    return Opened(lesson, opened[0], oracle)
+    if (
+        oracle is not None
+        and any(step.budget for step in lesson.steps)
+        and frozenset(oracle.models) not in oracle.showing
+    ):
+        raise UserError(f"{lesson.oracle}: f does not show with all models, so there is nothing to search")
+    plays = {} if oracle is None else _plays(lesson, oracle)
+    made = Opened(lesson, opened[0], oracle, {name: _end(run) for name, run in lesson.beside.items()}, plays)
+    _check_figures(made)
+    return made
 
 
-def _need_no_oracle(lesson: Lesson) -> None:
-    """Raises UserError if a text has a figure that only an oracle knows."""
+def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
+    """What is recorded of the algorithms. Raises UserError if a step needs more, or if it does not fit the oracle."""
     for step in lesson.steps:
+        for name in step.race:
+            if name not in oracle.rounds:
+                raise UserError(
+                    f"{lesson.file}:{step.line}: race: {name!r} is not recorded yet; "
+                    f"'ddenv learn --record {lesson.file}' does it"
+                )
+    try:
+        return {name: recorded_play(name, oracle) for name in oracle.rounds}
+    except UserError as error:
+        raise UserError(f"{lesson.oracle}: {error}") from None
+
+
+def _end(run: Path) -> RunState:
+    with RunFile(run) as content:
+        return fold(content.events())
+
+
+def _check_figures(opened: Opened) -> None:
+    """Raises UserError if a text has a figure that neither the runs nor the oracle know."""
+    for step, at in zip(opened.lesson.steps, opened.places, strict=True):
         asked = step.question
         answers = (
             () if asked is None else (asked.text, asked.hint, *(f"{each.text} {each.why}" for each in asked.answers))
         )
-        for name in figures.OF_ORACLE:
-            if f"{{{name}}}" in " ".join((step.text, *answers)):
-                raise UserError(f"{lesson.file}:{step.line}: {{{name}}} needs an oracle; give the key 'oracle'")
+        try:
+            opened.text(" ".join((step.text, *answers)), at)
+        except UserError as error:
+            raise UserError(f"{opened.lesson.file}:{step.line}: {error}") from None

@@ -7,22 +7,21 @@ from html import escape
 from pathlib import Path
 
 from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts, plain
+from ddenv.page.policy import hashed, policy
 
 HERE = Path(__file__).parent
-# Nothing is fetched or run, whatever a run file contains.
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
 def html(report: Report) -> str:
     """The page."""
-    style = (HERE / "style.css").read_text() + (HERE / "page.css").read_text()
+    style = "\n" + (HERE / "style.css").read_text() + (HERE / "page.css").read_text()
     lines = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy({"style-src": hashed(style)})}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{_text(report.name)}: {_text(report.verdict)}</title>",
-        f"<style>\n{style}</style></head><body><main>",
+        f"<style>{style}</style></head><body><main>",
         f'<header><p class="of"><bdi>{_text(report.name)}</bdi></p>',
         f"<h1>{_text(report.verdict)}</h1>",
         *(_paragraph(each) for each in report.lead),

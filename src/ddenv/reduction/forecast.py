@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import xor
@@ -25,6 +25,8 @@ NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
 # round takes as long as one candidate for each `SPLIT` models of its environment, and those that it has.
 PLAYS, CANDIDATES, FEWEST_PLAYS, SPLIT = 30, 6_000, 8, 50
 STEP = 100
+# What is known is looked through with a break after so many models of tests.
+MODELS = 20_000
 # A play that goes on for longer says nothing new.
 MOST_ROUNDS = 1500
 # The interval holds eight of ten plays, and somewhat more: a play knows less than there is to know.
@@ -95,8 +97,8 @@ def playing(moment: Moment) -> Iterator[float | None]:
     random = Random(f"{moment.evidence.seed} {len(moment.environment)} {len(moment.evidence.trials)}")
     codes = {name: random.getrandbits(62) for name in moment.elements}
     guide, line = _quick_guide(moment), _near_to_far(moment)
-    verdicts, missed = _known(moment, codes)
-    groups = _groups(moment, line)
+    verdicts, missed = yield from _known(moment, codes)
+    groups = yield from _groups(moment, line)
     looked_at = 0
     for number in range(PLAYS):
         if number >= FEWEST_PLAYS and looked_at > CANDIDATES:
@@ -197,10 +199,12 @@ def _code(codes: dict[str, int], models: Iterable[str]) -> int:
     return reduce(xor, map(codes.__getitem__, models), 0)
 
 
-def _known(moment: Moment, codes: dict[str, int]) -> tuple[dict[int, bool], dict[int, int]]:
+def _known(moment: Moment, codes: dict[str, int]) -> Generator[None, None, tuple[dict[int, bool], dict[int, int]]]:
     """The verdicts so far, and how often candidates without a verdict missed f."""
     shown, missed = set[int](), dict[int, int]()
-    for trial in moment.evidence.trials:
+    for number, trial in enumerate(moment.evidence.trials, 1):
+        if number % max(1, MODELS // len(codes)) == 0:
+            yield
         code = _code(codes, trial.models.intersection(codes))
         if trial.similar:
             shown.add(code)
@@ -258,12 +262,16 @@ def _near_to_far(moment: Moment) -> Partition:
     return tuple(moment.environment[place] for place in order)
 
 
-def _groups(moment: Moment, line: Partition) -> list[tuple[int, ...]]:
+def _groups(moment: Moment, line: Partition) -> Generator[None, None, list[tuple[int, ...]]]:
     """Places in the line of which one at least is needed: f did not show without the models there."""
     place = {name: number for number, name in enumerate(line)}
     shown = {trial.models for trial in moment.evidence.trials if trial.similar}
     missed = {trial.models for trial in moment.evidence.trials} - shown
-    groups = {tuple(sorted(place[name] for name in place.keys() - models)) for models in missed}
+    groups = set()
+    for number, models in enumerate(missed, 1):
+        groups.add(tuple(sorted(place[name] for name in place.keys() - models)))
+        if number % max(1, MODELS // len(place)) == 0:
+            yield
     # A group of which nothing is left was not needed after all.
     return sorted((group for group in groups if group), key=lambda group: (len(group), group))[:MOST_GROUPS]
 

@@ -29,6 +29,7 @@ from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
+from ddenv.report.why import why
 from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed, vector
 from ddenv.runfile.failures import Place
@@ -42,7 +43,7 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    about = (what_is_left, worth, way, guiding, sureness, others_met, settings, repeat)
+    about = (what_is_left, why, worth, way, guiding, sureness, others_met, settings, repeat)
     sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),

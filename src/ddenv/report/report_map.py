@@ -6,7 +6,7 @@ Its colours are classes of `style.css`, so that it follows the reader's light or
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -21,6 +21,9 @@ from ddenv.page.blocks import plain, section
 from ddenv.report.run_data import Record
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.extent import convex_hull
+
+# Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.
+Ways = Mapping[str, "array[float] | None"]
 
 # Pixels: of a letter, between entries, and from line to line.
 LETTER, GAP, LINE, LEGEND_LEFT = 6.9, 12.0, 24.0, 52.0
@@ -43,6 +46,8 @@ WORDS = {
     "whole": "can be removed",
     "way": "path in f",
     "last": "path, last similar run",
+    "with": "path with it",
+    "without": "path without it",
     "start": "start",
     "goal": "goal",
     "end": "end of f",
@@ -88,10 +93,12 @@ def _room(name: str) -> float:
 def _sign(name: str) -> str:
     if name in MARKS:
         return f'<g transform="translate(10 0)">{MARKS[name]}</g>'
-    if name in ("way", "last"):
+    if name in PATHS:
         return f'<path class="{name}" d="M0 0H26"/>'
     return f'<rect class="{name}" x="1" y="-7" width="24" height="14"/>'
 
+
+PATHS = ("way", "last", "with", "without")
 
 # Pixels: the drawing's own width, the highest map and close-up, the lowest map, and the margins.
 WIDTH, HIGHEST, CLOSE_HIGH, LEAST_HIGH = 880.0, 620.0, 420.0, 180.0
@@ -111,7 +118,18 @@ CROSS = 4.0
 def picture(record: Record, models: Sequence[Drawn], name: str = "all") -> str:
     """The map of a run as SVG; `models` are its world's, with circles of `CORNERS`. `name` is different for each map of a page."""
     points = [point for point in _places(record) if point is not None]
-    return _picture(record, models, _frame(models, points, LEAST), name)
+    return _picture(record, models, _frame(models, points, LEAST), name, _ways(record))
+
+
+def _ways(record: Record) -> Ways:
+    last = record.evidence if record.evidence is not record.original else None
+    return {"way": record.original, "last": last}
+
+
+def two_ways(record: Record, models: Sequence[Drawn], ways: Ways, name: str) -> str:
+    """The map with two paths of the robot, "with" and "without" a model, in place of those in f."""
+    points = [point for point in _places(record) if point is not None]
+    return _picture(record, models, _frame(models, points, LEAST), name, ways)
 
 
 def close_up(record: Record, models: Sequence[Drawn]) -> str:
@@ -124,20 +142,18 @@ def close_up(record: Record, models: Sequence[Drawn]) -> str:
     frame = _frame(kept, [end], CLOSE, CLOSE_HIGH)
     if frame.scale < CLOSER * _frame(models, points, LEAST).scale:
         return ""
-    return _picture(record, models, frame, "near")
+    return _picture(record, models, frame, "near", _ways(record))
 
 
-def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str) -> str:
+def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str, ways: Ways) -> str:
     """`name` is different for each picture of a page."""
     start, goal, end = (point if frame.holds(point) else None for point in _places(record))
     points = [point for point in (start, goal, end) if point is not None]
     sorts = {each.model.name: _sort(record, each.model.name) for each in models}
     coarse = sum(len(each.outline.polygons) for each in models) > MOST_POLYGONS
-    ways = [("way", record.original)]
-    ways += [("last", record.evidence)] if record.evidence is not record.original else []
-    drawn = [(name, path) for name, samples in ways if (path := _way(samples, frame))]
-    shown = [*dict.fromkeys(sorts.values()), *(name for name, _ in drawn)]
-    shown += [name for name, point in (("start", start), ("goal", goal), ("end", end)) if point is not None]
+    drawn = [(way, path) for way, samples in ways.items() if (path := _way(samples, frame))]
+    shown = [*dict.fromkeys(sorts.values()), *(way for way, _ in drawn)]
+    shown += [sign for sign, point in (("start", start), ("goal", goal), ("end", end)) if point is not None]
     bottom = float(frame.box[3]) + AXIS
     height = bottom + legend_height(shown, WIDTH)
     lines = [
@@ -146,7 +162,7 @@ def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str) -
         f'<clipPath id="{name}"><rect {_rectangle(frame.box)}/></clipPath>',
         f'<g clip-path="url(#{name})">',
         *(_model(each, sorts[each.model.name], frame, coarse) for each in models),
-        *(f'<path class="{name}" d="{path}"/>' for name, path in drawn),
+        *(f'<path class="{way}" d="{path}"/>' for way, path in drawn),
         *_near(record, frame, goal, end),
         "</g>",
         *_labels(models, sorts, frame, points),

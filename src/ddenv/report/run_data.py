@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ddenv.claims import current
 from ddenv.errors import UserError
 from ddenv.page.blocks import section
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Event, RunFile
+from ddenv.runs.reasons import Reason, reasons
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
@@ -26,7 +28,8 @@ class Record:
 
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
-    removed, `kept` those of them that are left.
+    removed, `kept` those of them that are left. `reasons` say what happens without each of these, `ways` are the robot's paths in
+    the tests that they compare.
     """
 
     path: Path
@@ -41,6 +44,8 @@ class Record:
     troubles: tuple[str, ...] = ()
     elements: frozenset[str] = frozenset()
     kept: frozenset[str] = frozenset()
+    reasons: tuple[Reason, ...] = ()
+    ways: Mapping[int, array[float]] = field(default_factory=dict)
 
 
 def read_run(path: Path) -> Record:
@@ -57,6 +62,9 @@ def read_run(path: Path) -> Record:
         original = _path(file, first, troubles)
         same = state.evidence_test == first
         evidence = original if same else _path(file, state.evidence_test, troubles)
+        why = _reasons(file, state, troubles)
+        compared = [test for each in why if (one := each.parting) for test in (one.with_test, one.without_test)]
+        ways = {test: file.trajectory(test) for test in compared}
     return Record(
         path=path,
         state=state,
@@ -70,6 +78,8 @@ def read_run(path: Path) -> Record:
         troubles=tuple(troubles),
         elements=frozenset(state.elements),
         kept=frozenset(state.environment),
+        reasons=why,
+        ways=ways,
     )
 
 
@@ -101,6 +111,16 @@ def _world(file: RunFile, troubles: list[str]) -> World | None:
     except UserError as error:
         troubles.append(str(error))
         return None
+
+
+def _reasons(file: RunFile, state: RunState, troubles: list[str]) -> tuple[Reason, ...]:
+    if current(state) is None:
+        return ()
+    try:
+        return reasons(file, state)
+    except UserError as error:
+        troubles.append(str(error))
+        return ()
 
 
 def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:

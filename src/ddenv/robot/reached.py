@@ -14,9 +14,9 @@ import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers, Objects
 from ddenv.robot.drake.articulation import anchored
-from ddenv.robot.hull import Hull
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
+from ddenv.robot.robot_hull import Hull
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Plane, World
 from ddenv.world.pose import Pose

@@ -5,6 +5,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     created              scenario {...}, elements [names]
     engine_started       pid, jobs, version (of ddenv), simulator (Drake and numpy with their versions, or the oracle), machine?
                          (Python and the processor)
+    cluster              jobs (how many tests its workers can make at the same time now), words: what has happened to it
     comparing            test: it is made again, because this engine computes with something else than the earlier ones
     compared             same: whether its bits are the same; if not, the user goes on with mixed tests
     supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
@@ -42,6 +43,8 @@ The kinds of events with their data. Models are indices into the run's `elements
     left_out             without, environment [..], evidence_test: the certificate showed that this model is not needed
     confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
+    room                 enough, needed, free (bytes): without enough room on the disk no tests are started
+    clock_jumped         seconds that Unix time went on or back at once: the machine slept, or its clock was set
     accept_mode          mode
     vetoed               candidate, verdict: vetoed; with `again`? also rejected or undone: the same models were refused so before
     unvetoed             round, candidate

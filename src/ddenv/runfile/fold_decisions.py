@@ -28,7 +28,10 @@ def unpinned(state: RunState, data: Data, at: float) -> Changes:
 
 
 def _cut_short(state: RunState) -> str:
-    """That the round ends with candidates that were not tried."""
+    """That the round ends with candidates that were not tried, or that the certificate is not finished."""
+    now = state.certificate
+    if now is not None and state.confirming and not now.claims:
+        return f"; certificate {now.number} broken off"
     untried = 0 if state.round is None else len(state.round.untried)
     return f"; round {state.round.number} ended with {untried} untried" if state.round and untried else ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,9 @@ except ImportError:
     # Windows: runs can be viewed there, but no engine works.
     fcntl = None  # type: ignore[assignment]
 
+# The mode of a file that only its owner may read.
+OWN = 0o600
+
 
 def _lock_path(run: Path) -> Path:
     return run.with_name(f"{run.name}.lock")
@@ -25,19 +29,29 @@ def _lock_path(run: Path) -> Path:
 def engine_lock(run: Path, taken: str = "") -> Iterator[None]:
     """Holds the run's lock. Raises UserError, with the words `taken` if there are any, if another engine holds it."""
     taken = taken or f"{run}: another engine is working on this run; attach to it with 'ddenv open {run}'"
-    with held(
-        _lock_path(run), taken, f"{run}: no engine can work here", "copy the run to a folder that you can write to"
-    ):
+    refused, instead = (
+        f"{run}: no engine can work here",
+        "copy the run to a folder of this machine that you can write to",
+    )
+    with held(_lock_path(run), taken, refused, instead, mode_beside(run)):
         yield
 
 
+def mode_beside(run: Path) -> int:
+    """The mode of files beside a run: its own, which is the user's alone until the user opens it to others."""
+    try:
+        return stat.S_IMODE(run.stat().st_mode) & 0o666
+    except OSError:
+        return OWN
+
+
 @contextmanager
-def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
-    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made."""
+def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
+    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked."""
     if fcntl is None:
         raise UserError(f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows")
     try:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, mode)
     except OSError as error:
         raise UserError(f"{refused}: {error.strerror}; {instead}") from None
     try:
@@ -47,6 +61,15 @@ def held(lock: Path, taken: str, refused: str, instead: str) -> Iterator[None]:
             if time.monotonic() > deadline:
                 raise UserError(taken)
             time.sleep(0.02)
+    except OSError as error:
+        os.close(handle)
+        raise UserError(
+            f"{refused}: its folder has no file locks ({error.strerror}), as some network folders; {instead}"
+        ) from None
+    except UserError:
+        os.close(handle)
+        raise
+    try:
         yield
     finally:
         os.close(handle)
@@ -62,6 +85,9 @@ def engine_is_alive(run: Path) -> bool:
         return False
     try:
         return not _try(handle, fcntl.LOCK_SH)
+    except OSError:
+        # Where there are no locks, no engine works.
+        return False
     finally:
         os.close(handle)
 

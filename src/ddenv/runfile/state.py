@@ -55,8 +55,9 @@ class RunState:
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
     `refusal` is the last command that the engine could not obey, with the reason.
-    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `working_seconds` is the time
-    that ended engines have worked, s; `started_at` (Unix time, s) is set while one works.
+    `tally` counts the tests by outcome, `deflake_runs` the finished re-runs of candidates. `needs_room` is how many bytes
+    have to be free on the disk before more tests start, 0 if there is room. `working_seconds` is the time that ended engines
+    have worked, s; `started_at` (Unix time, s) is set while one works.
     """
 
     revision: int = 0
@@ -67,6 +68,7 @@ class RunState:
     environment: tuple[str, ...] = ()
     accept_mode: str = "automatic"
     paused: bool = False
+    needs_room: int = 0
     waiting_candidate: int | None = None
     baseline: Baseline | None = None
     round: Round | None = None
@@ -102,6 +104,7 @@ class RunState:
     simulator: str = ""
     physics: Physics = field(default_factory=Physics)
     jobs: int = 0
+    cluster: str = ""
     working_seconds: float = 0.0
     started_at: float | None = None
     updated_at: float = 0.0

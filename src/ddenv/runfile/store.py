@@ -14,8 +14,8 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,9 @@ CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NO
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
 # The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
 LOGS = ("-wal", "-shm", "-journal")
+# A quota, and a limit of a file's size, come as an error of writing.
+_FULL = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE)
+NOWHERE = (0, 0)
 ROBOT = ""  # the robot's own rows in `motion`; models cannot have an empty name
 # Samples by model. In place of the robot's, an implied test has the number of the test that it follows from, which has all of its.
 Motions = dict[str, bytes | int]
@@ -90,9 +93,6 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         connection.close()
         with Path(name).open("rb") as file:
             os.fsync(file.fileno())
-        # The usual permissions of a new file; a temporary one is only for its owner.
-        os.umask(mask := os.umask(0))
-        Path(name).chmod(0o666 & ~mask)
         _forget(path)
         os.link(name, path)
     except FileExistsError:
@@ -116,15 +116,26 @@ def _forget(path: Path) -> None:
             log.unlink(missing_ok=True)
 
 
-class RunFile:
-    """An open run file. Raises UserError for a file that is missing, not a run file, or of another format."""
+class NoRoom(UserError):
+    """The disk takes no more: what was to be written is not there, and nothing else has changed."""
 
-    def __init__(self, path: Path) -> None:
+
+class RunFile:
+    """An open run file. Raises UserError for a file that is missing, not a run file, or of another format.
+
+    `untouched` reads the file alone: not its log, and nothing is made beside it.
+    """
+
+    def __init__(self, path: Path, untouched: bool = False) -> None:
         self.path = path
+        self.address = _address(path, untouched)
+        self._owned: tuple[int, int] | None = None
+        self._logs: dict[Path, tuple[int, int]] = {}
+        self._wait: Callable[[NoRoom], bool] | None = None
         if not path.is_file():
             raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
         try:
-            self._db = sqlite3.connect(_address(path), uri=True, isolation_level=None, timeout=VIEWER_WAIT)
+            self._db = sqlite3.connect(self.address, uri=True, isolation_level=None, timeout=VIEWER_WAIT)
             self._db.execute("PRAGMA trusted_schema = OFF")
         except sqlite3.Error as error:
             raise UserError(f"{path}: cannot be read: {error}") from None
@@ -179,6 +190,11 @@ class RunFile:
         """The requests of viewers with an id above `after`, in order."""
         return self._entries("command", after)
 
+    def last_command(self) -> int:
+        """The id of the last request; 0 before the first one."""
+        row = self._one("SELECT max(id) FROM command")
+        return whole(row[0]) if row and row[0] else 0
+
     def send(self, kind: str, **data: Any) -> int:
         """Sends a command to the engine; returns its id. Raises UserError."""
         with self._writing() as db:
@@ -218,8 +234,12 @@ class RunFile:
 
     # The methods below are for the engine alone.
 
-    def own(self) -> None:
-        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event."""
+    def own(self, wait: Callable[[NoRoom], bool] | None = None) -> None:
+        """Prepares for writing: readers are never blocked, and a killed engine loses no committed event.
+
+        Where the disk has no room for an event, `wait` is called; it returns whether to try again.
+        """
+        self._owned, self._wait = _identity(self.path), wait
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
@@ -228,7 +248,18 @@ class RunFile:
         self._db.execute("PRAGMA synchronous = NORMAL")
 
     def append(self, kind: str, data: dict[str, Any], motions: Motions | None = None) -> Event:
-        """Records one event, with the trajectories of its test, in one transaction."""
+        """Records one event, with the trajectories of its test, in one transaction.
+
+        Raises UserError if the run file was deleted or replaced meanwhile: SQLite would go on to write what nobody can read.
+        """
+        while True:
+            try:
+                return self._append(kind, data, motions)
+            except NoRoom as full:
+                if self._wait is None or not self._wait(full):
+                    raise
+
+    def _append(self, kind: str, data: dict[str, Any], motions: Motions | None) -> Event:
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
             id = self._insert(db, "event", kind, data)
@@ -236,12 +267,24 @@ class RunFile:
                 db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (data["test"], model, samples))
             at = db.execute("SELECT time FROM event WHERE id = ?", (id,)).fetchone()[0]
             db.execute("COMMIT")
+        if not self._logs:
+            logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
+            self._logs = {log: _identity(log) for log in logs if log.exists()}
         return Event(id, at, kind, data)
+
+    def _take_log(self) -> None:
+        """Merges the log into the file, wherever it is now, and removes it: SQLite would add it to another file of this name."""
+        with suppress(sqlite3.Error):
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        for log, identity in self._logs.items():
+            if _identity(log) == identity:
+                log.unlink(missing_ok=True)
 
     def set_live(self, running: list[Live]) -> None:
         """Replaces the table of running tests."""
         rows = [(live.slot, live.test, live.time, json.dumps(live.pose)) for live in running]
-        with self._writing() as db:
+        # It only shows what is replaced soon.
+        with suppress(NoRoom), self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
             db.execute("DELETE FROM live")
             db.executemany("INSERT INTO live VALUES (?, ?, ?, ?)", rows)
@@ -249,7 +292,7 @@ class RunFile:
 
     def settle(self) -> None:
         """Merges the write-ahead log into the run file, so that the run is one file again."""
-        with self._writing() as db:
+        with suppress(NoRoom), self._writing() as db:
             db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def _insert(self, db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
@@ -280,17 +323,35 @@ class RunFile:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
+        if self._owned is not None and (now := _identity(self.path)) != self._owned:
+            self._take_log()
+            what = "deleted or moved" if now == NOWHERE else "replaced by another file"
+            raise UserError(
+                f"{self.path}: the run file was {what} while an engine worked on it; nothing more is written"
+            )
         try:
             yield self._db
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
-            raise UserError(f"{self.path}: cannot be written: {error}; its content is intact") from None
+            kind = NoRoom if error.sqlite_errorcode in _FULL else UserError
+            raise kind(f"{self.path}: cannot be written: {error}; its content is intact") from None
 
 
-def _address(path: Path) -> str:
+def _identity(path: Path) -> tuple[int, int]:
+    """Device and number of the file that a path names now."""
+    try:
+        found = os.stat(path)  # noqa: PTH116  (at each write, and twice as fast)
+    except OSError:
+        return NOWHERE
+    return found.st_dev, found.st_ino
+
+
+def _address(path: Path, untouched: bool) -> str:
     """SQLite's URI of the file; read-only if the folder is not writable and there is no write-ahead log to merge."""
     address = path.resolve().as_uri()
+    if untouched:
+        return f"{address}?immutable=1"
     settled = not path.with_name(f"{path.name}-wal").exists()
     return f"{address}?immutable=1" if settled and not os.access(path.parent, os.W_OK) else address
 

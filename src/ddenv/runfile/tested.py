@@ -50,6 +50,16 @@ def made_for(state: RunState, test: Test) -> Candidate | Trial | None:
     return current.candidates[test.candidate] if 0 <= test.candidate < len(current.candidates) else None
 
 
+def told(moment: Moment) -> Test | None:
+    """The test whose end a moment tells: the one that ended in it, or the last one of a candidate that was judged."""
+    kind, state, data = moment.event.kind, moment.after, moment.event.data
+    if kind in ("test_finished", "implied"):
+        test: Test = state.tests[data["test"] - 1]
+        return test
+    row = pointed(moment) if kind == "candidate_judged" else None
+    return state.tests[row.tests[-1] - 1] if row is not None and row.tests else None
+
+
 def pointed(moment: Moment) -> Candidate | None:
     """The candidate that a moment is about; None if it is about none."""
     state, data = moment.after, moment.event.data

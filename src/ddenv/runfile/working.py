@@ -1,8 +1,10 @@
-"""How long engines have worked on a run: neither a pause nor the time in which a reduction waits for the user counts."""
+"""With how many workers engines work on a run, and how long: no pause counts, nor the time in which a reduction waits for the user
+or for the disk.
+"""
 
 from __future__ import annotations
 
-from ddenv.runfile.events import Changes
+from ddenv.runfile.events import Changes, Data, number, whole
 from ddenv.runfile.state import RunState
 
 
@@ -16,6 +18,26 @@ def stopped(state: RunState, at: float) -> Changes:
     return {"working_seconds": spent(state, at), "started_at": None}
 
 
+def room(_: RunState, data: Data, at: float) -> Changes:
+    """The disk has no room for more tests, or has room again."""
+    return {"needs_room": 0 if data["enough"] else whole(data["needed"])}
+
+
+def clock_jumped(state: RunState, data: Data, at: float) -> Changes:
+    """Unix time went `seconds` on or back at once: nobody worked in that time."""
+    if state.started_at is None:
+        return {}
+    return {"started_at": min(at, state.started_at + number(data["seconds"]))}
+
+
+def on_cluster(_: RunState, data: Data, _at: float) -> Changes:
+    """What has happened to the cluster that makes the tests."""
+    return {"jobs": whole(data["jobs"]), "cluster": str(data["words"])}
+
+
+HANDLERS = {"cluster": on_cluster, "room": room, "clock_jumped": clock_jumped}
+
+
 def counted(before: RunState, after: RunState) -> RunState:
     """`after`, the state after one more event, with the clock stopped where the run stands still, and started where it goes on."""
     stood, stands = _stands(before), _stands(after)
@@ -27,4 +49,4 @@ def counted(before: RunState, after: RunState) -> RunState:
 
 
 def _stands(state: RunState) -> bool:
-    return state.paused or state.waiting_candidate is not None
+    return state.paused or state.needs_room > 0 or state.waiting_candidate is not None

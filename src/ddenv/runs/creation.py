@@ -10,6 +10,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.events import as_it_was
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
+from ddenv.runs.clusters import check_cluster
 from ddenv.runs.scenarios import check_parts, load_parts
 from ddenv.world.files.access import read_bytes
 from ddenv.world.files.resources import Stored
@@ -26,6 +27,7 @@ def create_run(scenario: Scenario, path: Path, announce: Callable[[str], None] |
 
     Calls `announce` with a line of text before slow steps.
     """
+    check_cluster(scenario.reduction.cluster)
     world, _ = load_parts(scenario, announce)
     documents = {f"{RESOURCE}{key}": content for key, content in world.resources.items()}
     documents |= {
@@ -43,6 +45,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 
     The original files of world and robot are not needed. Raises UserError, with nothing written.
     """
+    check_cluster(scenario.reduction.cluster)
     with RunFile(run) as file:
         _, world, robot = read_parts(file)
         documents = {f"{RESOURCE}{key}": content for key, content in file.documents(RESOURCE).items()}
@@ -55,10 +58,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     """The scenario, world and robot of a run file. Raises UserError."""
-    try:
-        scenario = Scenario.model_validate(as_it_was(json.loads(run.document("scenario"))))
-    except ValueError:
-        raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
+    scenario = read_scenario(run)
     # Never opens another file, whatever the run file says.
     stored = Stored(run.documents(RESOURCE))
     world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
@@ -66,3 +66,11 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
+
+
+def read_scenario(run: RunFile) -> Scenario:
+    """The scenario of a run file. Raises UserError."""
+    try:
+        return Scenario.model_validate(as_it_was(json.loads(run.document("scenario"))))
+    except ValueError:
+        raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None

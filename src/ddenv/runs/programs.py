@@ -2,37 +2,55 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ddenv.errors import UserError
-from ddenv.runfile.lock import engine_is_alive
+from ddenv.runfile.lock import engine_is_alive, mode_beside
 from ddenv.runfile.store import RunFile
 
 # Prefix of the engine's own lines in its log, where libraries print too; and its first line.
 ENGINE_SAYS = "ddenv engine:"
 ENGINE_STARTED = "started"
+# The scene takes the first free port from here on.
+FIRST_PORT = 7000
 # Maximum time for engines to stop, s.
 STOP_WAIT = 15.0
 # Matches the last line of a traceback.
 PYTHON_SAYS = re.compile(r"[\w.]*(Error|Exception)(:|$)")
 
 
+def log_of(run: Path) -> Path:
+    """Where the engines of a run write what they print."""
+    return run.with_name(f"{run.name}.log")
+
+
 def start_engine(run: Path, jobs: int, **options: Any) -> subprocess.Popen[bytes]:
     """Starts the engine on a run in its own session, so that it outlives this terminal.
 
-    Its output goes to a log beside the run file. `options` become `--name=value` on its command line.
+    Its output goes to a log beside the run file. `options` become `--name=value` on its command line. Raises UserError.
     """
-    words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--since", repr(time.time())]
+    with RunFile(run) as file:
+        words = [sys.executable, "-m", "ddenv.engine", "--jobs", str(jobs), "--after", str(file.last_command())]
     # After `--`, a name that begins with a dash is no option.
     words += [*(f"--{name.replace('_', '-')}={value}" for name, value in options.items()), "--", str(run)]
-    with run.with_name(f"{run.name}.log").open("ab") as log:
+    try:
+        log = _log(log_of(run), run)
+    except OSError as error:
+        raise UserError(f"{run}: no engine can work here: its log cannot be written: {error.strerror}") from None
+    with log:
         return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+
+
+def _log(place: Path, run: Path) -> BinaryIO:
+    """A log, for whom the run is."""
+    return os.fdopen(os.open(place, os.O_WRONLY | os.O_APPEND | os.O_CREAT, mode_beside(run)), "ab")
 
 
 def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> None:
@@ -52,7 +70,7 @@ def stop_engines(engines: Sequence[tuple[RunFile, subprocess.Popen[bytes]]]) -> 
 
 def last_words(run: Path) -> str:
     """Why the last engine of a run is gone, from its log."""
-    log = run.with_name(f"{run.name}.log")
+    log = log_of(run)
     said = crashed = ""
     for line in log.read_text(errors="replace").splitlines() if log.exists() else []:
         if line.startswith(ENGINE_SAYS):
@@ -71,7 +89,12 @@ def start_scene(run: Path, port: int = 0) -> subprocess.Popen[str]:
     could not start; its log says why.
     """
     words = [sys.executable, "-m", "ddenv.scene", str(run), "--port", str(port), "--pointed"]
-    with run.with_name(f"{run.name}.scene.log").open("ab") as log:
+    try:
+        log = _log(run.with_name(f"{run.name}.scene.log"), run)
+    except OSError:
+        # A run in a folder that cannot be written can be seen all the same.
+        log = Path(os.devnull).open("wb")  # noqa: SIM115  (closed below)
+    with log:
         return subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, start_new_session=True
         )

@@ -77,7 +77,10 @@ def with_options(
         chosen["world"] = str(world.resolve())
     if reading is not None:
         chosen["reading"] = reading.model_dump(mode="json")
-    return validate(chosen, "options")
+    named = {SETTINGS[name].key: SETTINGS[name].option for name in given if SETTINGS[name].option}
+    places = (("--spawn", "robot.spawn", spawn), ("--goal", "goal", goal))
+    named |= {f"{key}.{axis}": option for option, key, place in places if place for axis in ("x", "y", "z", "yaw")}
+    return validate(chosen, "options", named)
 
 
 def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:

@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
+from ddenv.certificate_cost import certificate_tests
+from ddenv.claims import expected_fresh_runs, fresh_runs_made
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.settings import SETTINGS, Reduction, read
@@ -28,13 +30,8 @@ SCALE = {
 RERUN, FEWER, MORE = 0.75, 0.35, 2.3
 # Where f nearly always shows, so many runs without it make a candidate dissimilar, if the rate is to be kept.
 FEWEST_MISSES = 2
-# A certificate takes so many times the expected number of tests. From the rate `SURE` on, what is left runs alone.
-SHORTER, LONGER, SURE = 0.5, 2.2, 0.93
-# The maximum number of pairs, for what is left and for a removal; and how many models are left, if nothing is known.
-MOST_PAIRS, MOST_REMOVAL_PAIRS, SURVIVORS = 600, 240, 3
-# Logarithms of the wealth that the first certificate asks for, with what it costs to bet in several ways at once: that the rate is
-# kept, and that a single model is needed.
-FOR_KEPT, FOR_NEEDED = 4.0, 4.9
+# How many models are left, if nothing is known.
+SURVIVORS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +80,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
 def _of_certificate(state: RunState, now: Certificate) -> tuple[int, int, int] | None:
     if now.claims:
         return None
-    left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    low, likely, high = certificate_tests(now.rate, now.keep_rate, left, now.at_least)
-    done = sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+    (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
     return None if done >= high else (max(0, low - done), max(0, likely - done), high - done)
 
 
@@ -97,7 +92,7 @@ def _keep_rate(state: RunState) -> float:
 
 def _seconds_of_a_test(state: RunState) -> float | None:
     """Real time from one finished test to the next, s; None while nothing is started."""
-    if state.paused or state.waiting_candidate is not None:
+    if state.paused or state.needs_room or state.waiting_candidate is not None:
         return None
     finished = (test.wall_seconds for test in islice(reversed(state.tests), 2 * LATEST) if test.is_finished)
     times = [each for each in islice(finished, LATEST) if each > 0]
@@ -139,24 +134,3 @@ def rough_run(models: int, asked: Reduction) -> Rough:
     rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
     certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs)
     return Rough((low, likely, high), certificate)
-
-
-def certificate_tests(rate: float, keep_rate: float, left: int, at_least: int) -> tuple[int, int, int]:
-    """Tests of a certificate of `left` needed models that keep all of `rate`, as (low, likely, high).
-
-    Of what is left, alone or in pairs with the whole world, and without each model, in pairs as well; pairs of the whole world
-    are the same for all. The numbers follow `ddenv.reduction.certificate`: wealth grows as the square of the mean gain of a
-    pair over twice its second moment.
-    """
-    rate = min(max(rate, 0.05), 0.985)
-    needs = FOR_NEEDED + math.log(max(1, left))
-    removals = min(MOST_REMOVAL_PAIRS, max(at_least, needs / math.log(1 + 0.95 * keep_rate) / rate)) if left else 0
-    if rate >= SURE:
-        of_left, of_whole = max(at_least, 1.27 * FOR_KEPT / -math.log(keep_rate)), removals
-    else:
-        mean = rate * (1 - keep_rate)
-        moment = rate**2 * (1 - keep_rate) ** 2 + rate * (1 - rate) * (1 + keep_rate**2)
-        of_left = min(MOST_PAIRS, max(at_least, FOR_KEPT * 2 * moment / mean**2))
-        of_whole = max(of_left, removals)
-    likely = of_left + of_whole + left * removals
-    return math.floor(SHORTER * likely), round(likely), math.ceil(LONGER * likely)

@@ -1,7 +1,8 @@
 """Serves the scene to browsers on this machine: a page, Meshcat's viewer, and a websocket that feeds it.
 
 Meshcat's own server listens on all interfaces, accepts drawing commands from any local program, and keeps every property
-ever set. This one listens on the loopback interface only, accepts no commands, and lets no foreign page read the scene.
+ever set. This one listens on the loopback interface only, accepts no commands, and lets no foreign page read the scene. Its address
+has a token, so that other users of this machine cannot watch.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import secrets
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,12 +23,23 @@ import tornado.web
 import tornado.websocket
 
 from ddenv.errors import UserError
+from ddenv.page.policy import of_scripts, policy
+from ddenv.runs.programs import FIRST_PORT
 
 LOOPBACK = "127.0.0.1"
-FIRST_PORT, TRIES = 7000, 1000
+TRIES = 1000
 _LOCAL_NAMES = ("localhost", LOOPBACK, "::1")
 _VIEWER = Path(meshcat.viewer_assets_path()) / "dist"
 _PAGE = Path(__file__).with_name("page.html")
+TOKEN_BYTES = 16
+# Meshcat's control panel brings its own styles.
+_POLICY = {
+    "script-src": "'self'",
+    "style-src": "'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "connect-src": "'self' ws://127.0.0.1:* ws://localhost:*",
+    "frame-ancestors": "'none'",
+}
 # Time between pings, s: lost browsers are noticed after about this time.
 _PING = 15
 # Maximum number of messages waiting for a slow browser before it skips some of the robot's moves.
@@ -40,13 +53,16 @@ class Server:
         self.viewers: set[_Feed] = set()
         self.welcome: Callable[[], list[bytes]] = list
         self.caption = ""
+        # A new one for each scene: whoever takes the port later hears an old page ask for it again.
+        self._token = secrets.token_urlsafe(TOKEN_BYTES)
         routes: list[Any] = [
-            (r"/", _Feed, {"server": self}),
-            (r"/static/(?:index\.html)?", _Page, {"page": _PAGE.read_bytes()}),
-            (r"/static/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
+            (f"/{self._token}/feed", _Feed, {"server": self}),
+            (f"/{self._token}/", _Page, {"page": _PAGE.read_text()}),
+            (rf"/{self._token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
         ]
         application = tornado.web.Application(
             routes,
+            default_handler_class=_Stranger,
             compress_response=True,
             log_function=lambda _: None,
             websocket_ping_interval=_PING,
@@ -66,7 +82,7 @@ class Server:
             except OSError:
                 continue
             self._http.add_sockets(sockets)
-            return f"http://{LOOPBACK}:{number}/static/"
+            return f"http://{LOOPBACK}:{number}/{self._token}/"
         if port:
             raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
         raise UserError(f"no free port from {FIRST_PORT} to {FIRST_PORT + TRIES - 1}")
@@ -92,12 +108,23 @@ class Server:
 
 
 class _Page(tornado.web.RequestHandler):
-    def initialize(self, page: bytes) -> None:
+    def initialize(self, page: str) -> None:
         self._page = page
 
     def get(self) -> None:
         self.set_header("Cache-Control", "no-store")
+        self.set_header("Referrer-Policy", "no-referrer")
+        scripts = f"{_POLICY['script-src']} {of_scripts(self._page)}"
+        self.set_header("Content-Security-Policy", policy(_POLICY | {"script-src": scripts}))
         self.finish(self._page)
+
+
+class _Stranger(tornado.web.RequestHandler):
+    """Refuses all who do not know the token."""
+
+    def prepare(self) -> None:
+        self.set_status(403)
+        self.finish("the address of this scene has a token; take all of it from ddenv\n")
 
 
 class _Feed(tornado.websocket.WebSocketHandler):
@@ -106,9 +133,6 @@ class _Feed(tornado.websocket.WebSocketHandler):
         self._on_the_way = 0
 
     async def get(self, *args: str, **kwargs: str) -> None:
-        if self.request.headers.get("Upgrade", "").lower() != "websocket":
-            self.redirect("/static/")
-            return
         # Tornado's own check would let in a page whose host name was made to resolve to this machine (DNS rebinding).
         if not self.check_origin(self.request.headers.get("Origin", f"http://{LOOPBACK}")):
             raise tornado.web.HTTPError(403)

@@ -114,7 +114,7 @@ def make_plan(
 
     `options` are those of `ddenv.runs.scenarios.with_options` for all of it.
     """
-    names = _names("--scenarios", ",".join(scenarios)) if scenarios else SCENARIOS
+    names = scenario_names(scenarios)
     chosen_pairs, chosen_algorithms = _pairs(pairs), _algorithms(algorithms)
     loaded = tuple(_loaded(name, options) for name in names)
     for number, scenario in enumerate(loaded):
@@ -124,6 +124,11 @@ def make_plan(
     if len({cell.name for cell in plan.cells}) < len(plan.cells):
         raise UserError("--scenarios: the names of two of them make the same file names; give each a name of its own")
     return plan
+
+
+def scenario_names(words: Sequence[str]) -> tuple[str, ...]:
+    """The names or files of the scenarios, each once; the paper's three if none is given. Raises UserError."""
+    return _names("--scenarios", ",".join(words)) if words else SCENARIOS
 
 
 def _loaded(name: str, options: dict[str, Any]) -> Scenario:

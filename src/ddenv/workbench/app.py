@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,14 +16,22 @@ from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
-from textual.screen import Screen
+from textual.notifications import SeverityLevel
+from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.messages import Attention, ShowLesson, ShowLessons, ShowRun, ShowSetup
+from ddenv.workbench.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
+from ddenv.workbench.terminal.parsed_once import ParsedOnce
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
+from ddenv.workbench.widgets.breakpoints import classes_at
 from ddenv.workbench.wording import plain
+
+# New objects until garbage is collected, then how often until older ones are looked through, too.
+THRESHOLDS = (20_000, 20, 20)
+# So many notices wait for a dialog to close, the latest ones.
+HELD = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +50,16 @@ def _commands() -> type[Provider]:
     from ddenv.workbench.help.command_palette import Commands
 
     return Commands
+
+
+def _collect_from_now() -> None:
+    """Collects garbage again, but not in what there is already: looking through it takes longer than to answer a key.
+
+    Python looks through all the rest far too often where most is left out, so it begins with more new objects.
+    """
+    gc.freeze()
+    gc.set_threshold(*THRESHOLDS)
+    gc.enable()
 
 
 class Workbench(App[int]):
@@ -101,9 +121,10 @@ class Workbench(App[int]):
         watch: bool = False,
         config: Config | None = None,
         file: Path | None = None,
-        first: ShowLessons | ShowLesson | None = None,
+        first: ShowLessons | ShowLesson | ShowRace | None = None,
     ) -> None:
         super().__init__()
+        self.stylesheet = ParsedOnce(variables=self.get_css_variables())
         self._written = Written()
         self._reading = reading
         for theme in OURS:
@@ -111,6 +132,7 @@ class Workbench(App[int]):
         config = config or Config()
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
+        self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.run.observed import Observed
@@ -144,14 +166,52 @@ class Workbench(App[int]):
             self.push_screen(self._screen_for(self._first))
         except UserError as error:
             self.exit(2, message=Text(f"ddenv: {error}"))
+        if not self.is_headless:
+            self.call_after_refresh(_collect_from_now)
+
+    # Notices: they would hide the words and the buttons of a dialog, so they wait until it is closed.
+
+    def notify(
+        self,
+        message: str,
+        *,
+        title: str = "",
+        severity: SeverityLevel = "information",
+        timeout: float | None = None,
+        markup: bool = True,
+    ) -> None:
+        """As every app, but while a dialog is open a notice waits; its time begins when it is shown."""
+        options: dict[str, Any] = {"title": title, "severity": severity, "timeout": timeout, "markup": markup}
+        if self._asks:
+            self._held.append((message, options))
+        else:
+            super().notify(message, **options)
+
+    @property
+    def _asks(self) -> bool:
+        """Whether a dialog is open."""
+        return any(isinstance(screen, ModalScreen) for screen in self.screen_stack[-1:])
+
+    def _refresh_notifications(self) -> None:
+        """Textual calls it for each screen that comes to the top."""
+        if self._asks:
+            return
+        super()._refresh_notifications()
+        while self._held:
+            message, options = self._held.popleft()
+            super().notify(message, **options)
+
+    def action_help_quit(self) -> None:
+        """What ctrl+c says: in a terminal it should end nothing by mistake."""
+        self.notify("ctrl+q quits; an engine keeps running", timeout=3)
 
     # The screens.
 
-    def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson) -> Screen[Any]:
+    def _screen_for(self, asked: ShowRun | ShowSetup | ShowLessons | ShowLesson | ShowRace) -> Screen[Any]:
         if isinstance(asked, ShowRun):
             from ddenv.workbench.run.run_screen import RunScreen
 
-            return RunScreen(asked.run, asked.engine, asked.watch)
+            return RunScreen(asked.run, asked.engine, asked.watch, classes_at(RunScreen, self.size))
         if isinstance(asked, ShowLessons):
             from ddenv.workbench.learn.lessons_screen import LessonsScreen
 
@@ -160,9 +220,13 @@ class Workbench(App[int]):
             from ddenv.workbench.learn.lesson_screen import LessonScreen
 
             return LessonScreen(asked.run)
+        if isinstance(asked, ShowRace):
+            from ddenv.workbench.learn.race_screen import race_of_runs
+
+            return race_of_runs(asked.runs)
         from ddenv.workbench.setup.setup_screen import SetupScreen
 
-        return SetupScreen(self._reading, asked.like, asked.file)
+        return SetupScreen(self._reading, asked.like, asked.file, classes_at(SetupScreen, self.size))
 
     @on(ShowRun)
     @on(ShowSetup)

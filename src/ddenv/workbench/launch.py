@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.config import read_config
-from ddenv.workbench.messages import ShowLesson, ShowLessons
-from ddenv.workbench.terminal.themes import fitting
+
+if TYPE_CHECKING:
+    from ddenv.workbench.messages import ShowLesson, ShowLessons, ShowRace
 
 # One character of each kind that is drawn.
 SIGNS = "╭▶●⠒█…"
@@ -24,12 +24,31 @@ def run_workbench(
     *,
     watch: bool = False,
     file: Path | None = None,
-    first: ShowLessons | ShowLesson | None = None,
+    first: ShowLessons | ShowLesson | ShowRace | None = None,
 ) -> int:
     """Runs the workbench until the user quits; returns the exit code. Raises UserError without a run file or a terminal.
 
     It opens on the screen `first`, on `run`, on the setup screen with a scenario's or a world's `file`, or on the setup screen.
     """
+    # What is made until the first paint stays: looking through it for garbage would only delay that. The app goes on with it.
+    gc.disable()
+    try:
+        return _run(run, reading, watch, file, first)
+    finally:
+        gc.enable()
+
+
+def _run(
+    run: Path | None,
+    reading: Mapping[str, Any] | None,
+    watch: bool,
+    file: Path | None,
+    first: ShowLessons | ShowLesson | ShowRace | None,
+) -> int:
+    from ddenv.workbench.app import Workbench
+    from ddenv.workbench.help.config import read_config
+    from ddenv.workbench.terminal.themes import fitting
+
     config = read_config()
     app = Workbench(run, reading, watch=watch, config=config, file=file, first=first)
     check_terminal()

@@ -44,6 +44,13 @@ class ShowLesson(Message):
 
 
 @dataclass
+class ShowRace(Message):
+    """The searches of two to four runs of one world side by side."""
+
+    runs: tuple[Path, ...]
+
+
+@dataclass
 class Attention(Message):
     """The user should look at `run`: `why`."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -75,54 +75,62 @@ def load_scenario(path: Path) -> Scenario:
     return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
 
 
-def validate(data: dict[str, Any], where: str) -> Scenario:
-    """`data` as a scenario. Raises UserError with the first wrong key; `where` names its file."""
+def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) -> Scenario:
+    """`data` as a scenario. Raises UserError with the first wrong key.
+
+    `where` names its file; `named` has what the user calls some of the keys, such as an option.
+    """
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        raise UserError(f"{where}: {complaint(error.errors()[0], Scenario)}") from None
+        raise _wrong(where, *complaint(error.errors()[0], Scenario), named) from None
     # Not the model's own matter: a run is shown also where the package that brought its schemas is missing.
-    _check_schema(where, "algorithm", scenario.reduction.algorithm, partial(schemas.check, "algorithm"))
-    _check_schema(where, "pair", scenario.reduction.pair, schemas.split_pair)
+    for key, value, check in (
+        ("algorithm", scenario.reduction.algorithm, partial(schemas.check, "algorithm")),
+        ("pair", scenario.reduction.pair, schemas.split_pair),
+    ):
+        try:
+            check(value)
+        except UserError:
+            raise _wrong(where, f"reduction.{key}", _of_schemas(key, value), named) from None
     return scenario
 
 
-def _check_schema(where: str, key: str, value: str, check: Callable[[str], object]) -> None:
-    try:
-        check(value)
-    except UserError:
-        known, allowed = schemas.names("algorithm"), ", ".join(schemas.names("algorithm"))
-        if key == "pair":
-            parts = (", ".join(schemas.names(kind)) for kind in ("partitioning", "prioritization"))
-            known, allowed = schemas.pairs(), ", then '/', then one of ".join(parts)
-        guess = nearest(value[:100], known)
-        raise UserError(
-            f"{where}: reduction.{key}: {_shown(value)} is not allowed{guess}; use one of {allowed}"
-        ) from None
+def _wrong(where: str, key: str, words: str, named: Mapping[str, str]) -> UserError:
+    return UserError(f"{named[key]}: {words}" if key in named else f"{where}: {key}: {words}")
 
 
-def complaint(error: Any, model: type[BaseModel]) -> str:
-    """One of pydantic's errors in our words: the key, the value, what is allowed."""
+def _of_schemas(key: str, value: str) -> str:
+    """What is allowed in place of a name that no schema has."""
+    known, allowed = schemas.names("algorithm"), ", ".join(schemas.names("algorithm"))
+    if key == "pair":
+        parts = (", ".join(schemas.names(kind)) for kind in ("partitioning", "prioritization"))
+        known, allowed = schemas.pairs(), ", then '/', then one of ".join(parts)
+    return f"{_shown(value)} is not allowed{nearest(value[:100], known)}; use one of {allowed}"
+
+
+def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
+    """One of pydantic's errors in our words: the key; then what is wrong with its value, and what is allowed."""
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
         known = sorted([*_section(model, location[:-1]).model_fields, *_shorthands(location[:-1])])
-        return f"{key}: unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
+        return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if error["type"] == "as_printed":
-        return f"{key}.as_printed: {error['msg']}"
+        return f"{key}.as_printed", str(error["msg"])
     if error["type"] == "missing":
-        return f"{key}: is missing"
+        return key, "is missing"
     context = error.get("ctx", {})
     if error["type"] == "literal_error":
         allowed = context["expected"].replace("'", "").replace(" or ", ", ")
         near = nearest(str(error["input"]), allowed.split(", "))
-        return f"{key}: {_shown(error['input'])} is not allowed{near}; use one of {allowed}"
+        return key, f"{_shown(error['input'])} is not allowed{near}; use one of {allowed}"
     if error["type"] in PLAINLY:
-        return f"{key}: {PLAINLY[error['type']]}, found {_shown(error['input'])}"
+        return key, f"{PLAINLY[error['type']]}, found {_shown(error['input'])}"
     if error["type"] == "string_pattern_mismatch" and key == "controller.use":
-        return f"{key}: expected straight, costmap or module:Class, found {_shown(error['input'])}"
+        return key, f"expected straight, costmap or module:Class, found {_shown(error['input'])}"
     message = error["msg"][:1].lower() + error["msg"][1:].replace("Input should", "should")
-    return f"{key}: {message.replace('input should', 'should')}, found {_shown(error['input'])}"
+    return key, f"{message.replace('input should', 'should')}, found {_shown(error['input'])}"
 
 
 def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of
+from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of, resting_corners
 from ddenv.robot.drake.template import Template, lowest
 from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Sphere
+from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import link_of, model_of, wedge
 
@@ -99,3 +99,32 @@ def test_nothing_of_a_world_is_lower_than_its_lowest_surface(world_of, add):
     pit = model_of("pit", link_of("link", wedge(1.0, 1.0, 1.0), Pose((0.0, 0.0, -4.0)), mass=None))
     assert lowest(add(world_of(), pit)) == pytest.approx(-4.5)
     assert lowest(world_of()) == 0.0
+
+
+def tile(across: int) -> list[Collision]:
+    """A tile of `across` times `across` boxes, 0.5 m apart, with every other one a step higher."""
+    places = [(0.5 * i, 0.5 * j, 0.1 * ((i + j) % 2)) for i in range(across) for j in range(across)]
+    return [Collision("box", Box((0.5, 0.5, 0.2)), Pose(place), 0.5) for place in places]
+
+
+def test_a_link_of_few_shapes_rests_on_all_of_their_corners():
+    collisions = tile(2)
+    assert resting_corners(collisions) == [corners_of(each.shape) for each in collisions]
+
+
+def test_a_link_of_many_shapes_rests_on_the_outermost_corners():
+    collisions = tile(6)
+    rests = resting_corners(collisions)
+    assert len(rests) == 36
+    assert all(set(some) <= set(corners_of(each.shape)) for some, each in zip(rests, collisions, strict=True))
+    places = np.array(
+        [(each.pose @ Pose(corner)).position for each, some in zip(collisions, rests, strict=True) for corner in some]
+    )
+    every = np.array([(each.pose @ Pose(corner)).position for each in collisions for corner in corners_of(each.shape)])
+    assert len(places) < 64
+    # As wide as the whole tile, on top and below.
+    assert places.min(axis=0) == pytest.approx(every.min(axis=0)) and places.max(axis=0) == pytest.approx(
+        every.max(axis=0)
+    )
+    low = places[places[:, 2] == every[:, 2].min()]
+    assert np.ptp(low[:, 0]) > 2 and np.ptp(low[:, 1]) > 2

@@ -2,7 +2,7 @@
 
 from contextlib import asynccontextmanager
 
-import fake_run
+import fake_moments
 import pytest
 from textual.app import App
 from textual.widgets import Button, Checkbox, Input, Static
@@ -23,7 +23,7 @@ def folder(tmp_path, monkeypatch):
 @asynccontextmanager
 async def dialog(run, size=(80, 24)):
     """The dialog of an ended run."""
-    fake_run.finished(run)
+    fake_moments.finished(run)
     app = App()
     async with app.run_test(size=size) as pilot:
         await app.push_screen(ExportScreen(run.path))

@@ -1,5 +1,6 @@
 """The history of a run: its tree, going back in it, and two of its environments side by side."""
 
+import fake_moments
 import fake_run
 import pytest
 from attached import Attached, starts
@@ -37,15 +38,15 @@ def test_long_histories_are_drawn_at_once():
 
 
 def test_what_a_node_is_has_a_sign_and_words(run):
-    state = fold(fake_run.guided(run).file.events())
+    state = fold(fake_moments.guided(run).file.events())
     told = [(branches.sign(node, state.node), branches.words(node, state.node)) for node in state.nodes]
     assert told == [("○", ""), ("○", ""), ("✗", "taken back"), ("●", "here")]
-    state = fold(fake_run.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
+    state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
     assert branches.words(state.nodes[-1], 0) == "minimal"
 
 
 def test_two_environments_are_compared_by_name(run):
-    state = fold(fake_run.guided(run).file.events())
+    state = fold(fake_moments.guided(run).file.events())
     found = compare(state.nodes[2], state.nodes[3])
     assert found.only_first == ("crate_05",)
     assert found.only_second == ("crate_02", "crate_03")
@@ -58,7 +59,7 @@ def cells(session):
 
 
 async def test_the_history_follows_the_run_and_compares(run):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     async with Attached(run) as session:
         await session.press("h")
         history = session.app.screen
@@ -67,7 +68,8 @@ async def test_the_history_follows_the_run_and_compares(run):
         assert [row[4] for row in cells(session)] == ["3 of 4", "1 of 1", "1 of 1", "1 of 1"]
         assert [row[5] for row in cells(session)] == ["", "", "taken back", "here"]
         assert history.under_cursor.number == 3
-        decided = " ".join(line.plain[10:] for line in history.query_one(Lines).items)
+        lines = history.query_one(Lines)
+        decided = " ".join(lines.render_line(row).text[10:].strip() for row in range(6))
         assert decided.startswith("took back without A: 6 models again pinned crate_00")
         await session.press("c")
         assert "mark one environment first" in session.said()
@@ -92,7 +94,7 @@ async def test_the_history_follows_the_run_and_compares(run):
 
 async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_works(run, monkeypatch):
     started = starts(monkeypatch)
-    fake_run.finished(run)
+    fake_moments.finished(run)
     async with Attached(run, (80, 24)) as session:
         await session.press("h", "enter")
         assert "the run is there already" in session.said()
@@ -113,7 +115,7 @@ async def test_enter_goes_back_after_a_question_and_starts_an_engine_where_none_
 
 
 def test_each_branch_counts_its_own_tests(run):
-    state = fold(fake_run.guided(run).file.events())
+    state = fold(fake_moments.guided(run).file.events())
     baseline, first, undone, adopted = state.nodes
     assert [node.own_tests for node in (baseline, first, undone)] == [0, 5, 6]
     # The test of the reduction that was taken back is not its own.
@@ -122,7 +124,7 @@ def test_each_branch_counts_its_own_tests(run):
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (121, 36), (147, 40)], but=[(121, 36)]), ids=str)
 async def test_both_maps_have_one_scale_and_one_frame(run, size):
-    fake_run.guided(run).hold()
+    fake_moments.guided(run).hold()
     async with Attached(run, size) as session:
         await session.press("h", "m", "up", "up", "c")
         await session.pilot.pause()

@@ -3,11 +3,20 @@
 import pytest
 
 from ddenv.runfile.position import position_in
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.explain import explain
 from tests.learn.lessons import RUNS
+from tests.tiers import slow
 
+# By algorithm, the lines of a first run, a re-run, a verdict with f, a reduction and the end. Splitting has a line of its own for
+# its last sweep.
+LINES = {
+    "ddenv": ({5}, {7}, {10}, {11}, {21}),
+    "ddmin": ({4}, {5}, {6}, {6}, {8}),
+    "splitting": ({3, 7}, {4}, {5, 7}, {5, 7}, {8}),
+}
 FAILING = ("fails", "failed", "got stuck", "shows f", "showed f")
 
 
@@ -19,16 +28,20 @@ def moments(run):
             yield moment, explain(snapshots.of(moment, what_happened(moment)))
 
 
-@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
+QUICK = [run for run in RUNS if run.stem in ("delivery", "quay-kept", "ditch-sliced")]
+
+
+@pytest.mark.parametrize("run", slow(pytest.mark.screens, RUNS, but=QUICK), ids=lambda run: run.stem)
 def test_every_sentence_fits_its_moment(run):
     seen = set()
     for moment, explained in moments(run):
         kind, data, state = moment.event.kind, moment.event.data, moment.after
         said = " ".join(explained.sentences)
         here = f"event {moment.event.id}, {kind}: {explained}"
+        first, again, shown, reduced, end = LINES[settings(state).algorithm]
         assert explained.sentences, here
         if kind == "test_started" and data["phase"] == "round":
-            assert explained.line == (5 if data["run"] == 0 else 7), here
+            assert explained.line in (first if data["run"] == 0 else again), here
             assert not any(
                 word in said.replace("It shows f if", "").replace("last time", "") for word in ("shows f",)
             ), here
@@ -45,13 +58,13 @@ def test_every_sentence_fits_its_moment(run):
         elif kind == "candidate_judged":
             one = state.round.candidates[data["candidate"]]
             if one.verdict == "similar":
-                assert explained.line == 10 and f"{one.label} shows f" in said, here
+                assert explained.line in shown and f"{one.label} shows f" in said, here
                 assert "No candidate" not in said and "Next is" not in said, here
             else:
                 assert f"{one.label} shows f" not in said, here
         elif kind == "reduced":
-            assert explained.line == 11 and "E is now" in said, here
+            assert explained.line in reduced and "E is now" in said, here
             assert f"→ {len(state.environment)} model" in said, here
         elif kind == "finished":
-            assert explained.line == 21, here
-    assert seen >= {"similar", "other", "pass"}
+            assert explained.line in end, here
+    assert "similar" in seen and len(seen) > 1

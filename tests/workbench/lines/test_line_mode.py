@@ -4,7 +4,7 @@ import io
 import subprocess
 import sys
 
-import fake_run
+import fake_moments
 import pytest
 
 from ddenv.guiding.offers import ACTIONS
@@ -34,7 +34,7 @@ def commands(run):
 
 
 def test_it_begins_with_where_the_run_is_and_goes_on_with_what_happens(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     before = said(run)
     assert "running · round 2, n 3 · 6 of 11 models · 10 tests, 2 running" in before
     assert "an engine is at work" in before
@@ -43,7 +43,9 @@ def test_it_begins_with_where_the_run_is_and_goes_on_with_what_happens(run):
     assert now.endswith("  without A (4 models): dissimilar after 2 tests (2 pass)\n")
 
 
-@pytest.mark.parametrize("moment", [fake_run.mid_round, fake_run.certifying, fake_run.finished, fake_run.guided])
+@pytest.mark.parametrize(
+    "moment", [fake_moments.mid_round, fake_moments.certifying, fake_moments.finished, fake_moments.guided]
+)
 def test_every_question_has_an_answer_at_any_time(run, moment):
     moment(run)
     for question in QUESTIONS:
@@ -51,7 +53,7 @@ def test_every_question_has_an_answer_at_any_time(run, moment):
 
 
 def test_what_stands_in_the_table_is_said_in_words(run):
-    fake_run.guided(run)
+    fake_moments.guided(run)
     words = said(run, "table", "models")
     assert "try 2: 2 models, dissimilar, 4 tests" in words
     assert "part B: 3 models, in test, 1 test, ranked by 2.1" in words
@@ -59,7 +61,7 @@ def test_what_stands_in_the_table_is_said_in_words(run):
 
 
 def test_typed_words_and_the_keys_of_the_screen_guide_the_run(run):
-    fake_run.waiting(run).hold()
+    fake_moments.waiting(run).hold()
     assert "part A is accepted" in said(run, "a")
     assert commands(run) == [("accept", {"round": 1, "candidate": 0})]
     words = said(run, "veto part C", "p crate_07, crate_08", "pin nobody", "veto part Z", "veto", "dance", "pin")
@@ -69,7 +71,7 @@ def test_typed_words_and_the_keys_of_the_screen_guide_the_run(run):
 
 
 def test_a_question_is_answered_by_the_next_line(run):
-    fake_run.not_shown(run)
+    fake_moments.not_shown(run)
     run.hold()
     assert "there is no 'try 1'" in said(run, "accept try 1")
     assert "not possible: there is nothing to reject" in said(run, "reject", "yes")
@@ -77,7 +79,7 @@ def test_a_question_is_answered_by_the_next_line(run):
 
 
 def test_watching_changes_nothing(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     assert "watching only" in said(run, "pause", "undo", watch=True)
     assert commands(run) == []
 
@@ -93,7 +95,7 @@ def test_every_action_that_guides_a_run_can_be_typed_with_its_key(run):
 
 
 def test_the_program_ends_with_the_run_when_nothing_more_can_be_typed(run):
-    fake_run.finished(run)
+    fake_moments.finished(run)
     words = [sys.executable, "-m", "ddenv", "open", str(run.path), "--lines"]
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
     assert done.stderr == ""

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import fake_moments
 import fake_run
 import numpy as np
 import pytest
@@ -80,7 +81,7 @@ def subtitle(world) -> str:
 
 @pytest.fixture
 def busy(run):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     return run
 
 
@@ -211,7 +212,7 @@ HIDDEN = ("sensed", "took part")
 
 @pytest.mark.parametrize("layer", SIGNS)
 async def test_layers_are_shown_or_not(run, layer):
-    fake_run.mid_round(run).write("pinned", models=[1])
+    fake_moments.mid_round(run).write("pinned", models=[1])
     test = fold(run.file.events()).evidence_test
     async with Shown(run) as (pilot, world):
         state = world.snapshot.state

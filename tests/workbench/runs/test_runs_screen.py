@@ -1,5 +1,6 @@
 """The list of all runs: how each stands, and what can be done with it."""
 
+import fake_moments
 import fake_run
 import pytest
 from textual import events
@@ -19,9 +20,9 @@ from ddenv.workbench.setup.setup_screen import SetupScreen
 @pytest.fixture
 def several(runs, run):
     """crates-1 runs, done is finished, gone lost its engine, new was never started, broken is no run."""
-    fake_run.mid_round(run).hold()
-    fake_run.finished(fake_run.FakeRun(runs / "done.ddenv")).close()
-    fake_run.mid_round(fake_run.FakeRun(runs / "gone [b]x.ddenv")).close()
+    fake_moments.mid_round(run).hold()
+    fake_moments.finished(fake_run.FakeRun(runs / "done.ddenv")).close()
+    fake_moments.mid_round(fake_run.FakeRun(runs / "gone [b]x.ddenv")).close()
     fake_run.FakeRun(runs / "new.ddenv").close()
     (runs / "broken.ddenv").write_text("no run")
     return run
@@ -93,6 +94,15 @@ async def test_every_run_says_how_it_stands(several):
         assert "is not a ddenv run file" in listed.about()
         await listed.choose("done")
         assert "2 of 11 models left" in listed.about() and "crate_00" in listed.about()
+
+
+async def test_at_80_columns_the_run_under_the_cursor_is_whole_below_the_list(several, runs):
+    name = "a run whose name takes more than the list has room for"
+    fake_moments.finished(fake_run.FakeRun(runs / f"{name}.ddenv")).close()
+    async with Listed(several, (80, 24)) as listed:
+        await listed.choose(name)
+        assert name in listed.about() and "model2model/failure-proximal" in listed.about()
+        assert listed.app.screen.query_one("#preview").region.height >= 5
 
 
 @pytest.mark.screens
@@ -201,7 +211,7 @@ async def test_the_list_is_sorted_by_any_column_and_filtered_by_state(several):
 async def test_two_runs_are_compared(several, runs):
     data = fake_run.as_printed()
     data["reduction"]["iterations"] = 7
-    fake_run.guided(fake_run.FakeRun(runs / "other.ddenv", data)).close()
+    fake_moments.guided(fake_run.FakeRun(runs / "other.ddenv", data)).close()
     async with Listed(several) as listed:
         await listed.press("c")
         assert "mark a run first" in listed.notices()[-1]
@@ -231,7 +241,7 @@ async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
     folder = tmp_path / "from a robot"
     folder.mkdir()
     path = folder / "far.ddenv"
-    fake_run.finished(fake_run.FakeRun(path)).close()
+    fake_moments.finished(fake_run.FakeRun(path)).close()
     text = {"quoted": f"'{path}' ", "url": path.as_uri()}.get(how, str(path))
     async with Listed(run) as listed:
         if how == "typed":

@@ -25,7 +25,7 @@ class Session:
 
     async def settle(self):
         # Not every worker: the file tree keeps one for as long as it lives.
-        for group in ("recent", "world", "runs", "start", "save", "cost"):
+        for group in ("recent", "world", "runs", "start", "save", "cost", "notes"):
             workers = [worker for worker in self.app.workers if worker.group == group]
             for worker in workers:
                 with suppress(WorkerCancelled):

@@ -43,6 +43,8 @@ def another(one):
         return "off" if one.default else "on"
     if one.choices:
         return next(choice for choice in one.choices if choice != one.default)
+    if one.kind is str:
+        return "tcp://head:8786"
     return "90" if one.default is None else str(one.default + (4 if one.kind is int else 0.125))
 
 

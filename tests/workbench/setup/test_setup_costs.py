@@ -42,7 +42,7 @@ def test_tests_and_time_are_told():
     assert words.startswith("about ")
     assert "with 2 jobs; baseline 4, certificate 124; 3.0 s a test in earlier runs" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown.endswith("baseline 4, certificate 124; the time is known after the baseline")
+    assert unknown.endswith("baseline 4, certificate 124; no time known yet")
     assert whole_cost(scenario(budget=9), 43, 1, known).startswith("9 tests at most, 27 s with 1 job")
 
 

@@ -6,11 +6,11 @@ import shlex
 import pytest
 from textual.widgets import Input, Static
 
+from ddenv.runs.remembered import state_file
 from ddenv.runs.scenarios import load_parts
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_list import AskRemedy, MissingList
 from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remember_remedies, remembered
-from ddenv.workbench.setup.remembered import state_file
 from ddenv.world.model import Box, Cylinder
 from tests.workbench.setup.setup_session import Opened
 

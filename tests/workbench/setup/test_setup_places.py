@@ -4,11 +4,11 @@ import fake_run
 import pytest
 import yaml
 
+from ddenv.runs.remembered import state_file
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.file_list import remember
 from ddenv.workbench.setup.places import places_of, remember_places
-from ddenv.workbench.setup.remembered import state_file
 from tests.tiers import slow
 from tests.workbench.setup.setup_session import Opened
 

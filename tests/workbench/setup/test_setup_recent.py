@@ -2,8 +2,8 @@
 
 import pytest
 
+from ddenv.runs.remembered import state_file
 from ddenv.workbench.setup.file_list import KEPT, RECENT, FileList, recent_files, remember
-from ddenv.workbench.setup.remembered import state_file
 from tests.workbench.setup.setup_session import Opened
 
 

@@ -1,5 +1,6 @@
 """The setup screen: its layout, the input that it accepts or refuses, and the run that it starts."""
 
+import fake_moments
 import fake_run
 import pytest
 import yaml
@@ -39,6 +40,9 @@ async def test_start_writes_the_run_and_attaches_to_it(scenarios, runs, started)
         assert (runs / "crates-1.ddenv").is_file()
         scenario = session.made()
         assert (scenario.reduction.iterations, scenario.reduction.seed) == (5, 7)
+    # The number of jobs is no part of a scenario: the next form begins with it.
+    async with Opened() as session:
+        assert session.value("jobs") == "3"
 
 
 @pytest.mark.screens
@@ -103,8 +107,10 @@ async def test_small_terminals_show_one_pane_at_a_time(scenarios, size):
 
 
 async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenarios, runs):
-    fake_run.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
-    fake_run.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "crates-world-1.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "a.ddenv")).close()
+    long = "A robot drives through crates and gets stuck on one of them. " * 4
+    (scenarios / "crates.yaml").write_text(yaml.safe_dump(fake_run.scenario() | {"description": long}))
     async with Opened((80, 24)) as session:
         title = session.screen.query_one("#title", Static)
         assert len(title.render().plain) < title.size.width
@@ -113,6 +119,10 @@ async def test_at_80_columns_nothing_in_the_title_or_in_the_lists_is_cut(scenari
         assert shown == {"■ crates-world-1  2/11", "■ a  2/11 finished"}
         # The keys of panes are written as those of the footer.
         assert session.told("pane-map").strip() == "f3 map"
+        # What is too long here is whole on the map's pane.
+        assert session.told("about").endswith("…") and session.told("picking").endswith(" m")
+        await session.press("f3")
+        assert session.told("about") == session.screen.preview.choice.about
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [(120, 36), (200, 60)], but=[(120, 36)]), ids=str)
@@ -239,9 +249,24 @@ async def test_the_preview_shows_what_is_wrong_with_a_scenario(scenarios, starte
         assert "choose a scenario" in session.wrong()
 
 
+@pytest.mark.parametrize("size", [(80, 24), (120, 36)])
+async def test_a_world_that_cannot_be_read_leaves_nothing_of_the_one_before(scenarios, size):
+    broken = scenarios / "broken.sdf"
+    broken.write_text("<sdf version='1.6'><model/></sdf>")
+    async with Opened(size) as session:
+        assert session.value("spawn_x") and session.told("about")
+        await session.open(broken)
+        assert "found no <world>" in session.screen.query_one(WorldMap).notice
+        assert [session.value(id) for id in ("spawn_x", "goal_y", "name")] == ["", "", ""]
+        assert [session.told(id) for id in ("about", "picking", "command")] == ["", "", ""]
+        assert session.told("cost") == "not ready: choose a scenario or a world that can be read"
+        await session.open(scenarios / "crates.yaml")
+        assert session.value("spawn_x") and session.value("name") == "crates-1"
+
+
 @pytest.mark.screens
 async def test_recent_runs_are_listed_and_opened(scenarios, runs):
-    fake_run.finished(fake_run.FakeRun(runs / "old.ddenv")).close()
+    fake_moments.finished(fake_run.FakeRun(runs / "old.ddenv")).close()
     async with Opened() as session:
         options = session.screen.query_one("#run-list", OptionList)
         assert options.option_count == 1

@@ -1,6 +1,6 @@
 """A run that needs a look rings and sends one notification; the title shows how far it is."""
 
-import fake_run
+import fake_moments
 import pytest
 from attached import Attached
 
@@ -32,7 +32,7 @@ def sent(monkeypatch):
 
 
 async def test_the_end_of_a_run_is_noticed_once_and_only_if_it_is_seen(run, sent):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     async with Attached(run) as session:
         assert sent() == []
         assert session.app.title == "▶ 0 % crates: 6 of 11 models"
@@ -63,7 +63,7 @@ async def test_a_reduction_that_waits_is_noticed(run, sent):
 
 
 async def test_who_does_not_want_it_is_left_alone(run, sent):
-    fake_run.mid_round(run).hold()
+    fake_moments.mid_round(run).hold()
     app = Workbench(run.path, config=Config(notify=False))
     async with app.run_test() as pilot:
         await app.workers.wait_for_complete()

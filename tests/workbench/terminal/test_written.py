@@ -2,7 +2,7 @@
 
 import re
 
-import fake_run
+import fake_moments
 import pytest
 from rich.cells import cell_len
 from rich.console import Console
@@ -136,7 +136,7 @@ async def updates(run, monkeypatch):
     found = []
     monkeypatch.setattr(App, "_display", lambda app, screen, update: found.append(update))
     monkeypatch.setattr(Workbench, "_display", lambda app, screen, update: found.append(update))
-    fake_run.mid_round(run)
+    fake_moments.mid_round(run)
     async with Workbench(run.path).run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         await pilot.press("down", "1", "right", "question_mark")

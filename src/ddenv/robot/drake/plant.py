@@ -19,7 +19,14 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from ddenv.robot.drake.articulation import add_joint, anchored, is_fixed, spatial_inertia, to_drake, transform
 from ddenv.robot.drake.drive import Drive
-from ddenv.robot.drake.shapes import drake_shapes, solid_bounds, surface, wheel_friction, world_friction
+from ddenv.robot.drake.shapes import (
+    drake_shapes,
+    resting_corners,
+    solid_bounds,
+    surface,
+    wheel_friction,
+    world_friction,
+)
 from ddenv.world.extent import Bounds
 from ddenv.world.model import Link, Model, World
 from ddenv.world.pose import Pose
@@ -133,7 +140,7 @@ def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Iterator[Part]:
     for number, link in enumerate(model.links):
         for collision in link.collisions:
             # Without corners: each shape that is put somewhere costs Drake half a millisecond.
-            for shape, pose in drake_shapes(collision, corners=False):
+            for shape, pose in drake_shapes(collision):
                 name = str(plant.num_collision_geometries())
                 properties = surface(world_friction(collision.mu, wheels))
                 away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
@@ -210,9 +217,10 @@ def _register(
     """Registers the collisions of `links` on `body`; `frame` is the pose of the world in the body's frame."""
     identities = []
     for link in links:
-        for collision in link.collisions:
+        rests = resting_corners(link.collisions) if corners else [()] * len(link.collisions)
+        for collision, places in zip(link.collisions, rests, strict=True):
             mu = collision.mu if wheels is None else world_friction(collision.mu, wheels)
-            for shape, pose in drake_shapes(collision, corners):
+            for shape, pose in drake_shapes(collision, places):
                 # Drake requires different names; nothing reads them.
                 name = str(plant.num_collision_geometries())
                 identities.append(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import count
 
 import numpy as np
 from pydrake.geometry import AddContactMaterial, Convex, ProximityProperties
@@ -13,6 +15,7 @@ from pydrake.geometry import Ellipsoid as DrakeEllipsoid
 from pydrake.geometry import Shape as DrakeShape
 from pydrake.geometry import Sphere as DrakeSphere
 from pydrake.multibody.plant import CoulombFriction
+from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
 from ddenv.robot.drake.articulation import to_drake
@@ -57,6 +60,8 @@ def surface(mu: float) -> ProximityProperties:
 
 
 CORNER_RADIUS = 0.002  # m
+# A link with more corners rests on the outermost ones alone.
+MOST_CORNERS = 64
 # Around a cylinder's rim, and on a convex mesh at most.
 RIM_CORNERS = 8
 MESH_CORNERS = 32
@@ -71,16 +76,32 @@ def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | Non
     return np.min(lows, axis=0), np.max(highs, axis=0)
 
 
-def drake_shapes(collision: Collision, corners: bool) -> list[tuple[DrakeShape, Pose]]:
-    """The Drake shapes of `collision` and their poses; with `corners` also the spheres on which a moving model rests.
+def drake_shapes(collision: Collision, corners: Sequence[Vector] = ()) -> list[tuple[DrakeShape, Pose]]:
+    """The Drake shapes of `collision` and their poses, with the spheres on `corners` on which a moving model rests.
 
     A face that rests on a single contact point would creep.
     """
-    shape, pose = collision.shape, collision.pose
-    shapes = [(drake_shape(shape), pose)]
-    if corners:
-        shapes += [(DrakeSphere(CORNER_RADIUS), pose @ Pose(corner)) for corner in corners_of(shape)]
-    return shapes
+    spheres = [(DrakeSphere(CORNER_RADIUS), collision.pose @ Pose(corner)) for corner in corners]
+    return [(drake_shape(collision.shape), collision.pose), *spheres]
+
+
+def resting_corners(collisions: Sequence[Collision]) -> list[list[Vector]]:
+    """For each of the collisions of a link the corners on which the link can rest, in the frame of its shape, m.
+
+    Of many corners these are the outermost: Drake takes time for each pair of shapes when it builds a plant.
+    """
+    corners = [corners_of(collision.shape) for collision in collisions]
+    if sum(map(len, corners)) <= MOST_CORNERS:
+        return corners
+    pairs = zip(collisions, corners, strict=True)
+    places = np.array([(each.pose @ Pose(corner)).position for each, found in pairs for corner in found])
+    try:
+        outermost = set(ConvexHull(places).vertices.tolist())
+    except QhullError:
+        # All in one plane.
+        return corners
+    numbers = count()
+    return [[corner for corner in found if next(numbers) in outermost] for found in corners]
 
 
 def drake_shape(shape: Shape) -> DrakeShape:

@@ -18,7 +18,7 @@ from ddenv.robot.drake.drive import Drive, find_drive, footprint
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.hull import Hull
+from ddenv.robot.listening import Heard, Listener
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled
@@ -27,6 +27,7 @@ from ddenv.robot.piles.support import supports
 from ddenv.robot.protocol import Setup
 from ddenv.robot.reached import Reached, Solids
 from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.robot_hull import Hull
 from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
@@ -133,12 +134,13 @@ class Template:
         seed: int,
         progress: Progress | None = None,
         full: bool = True,
+        listener: Listener | None = None,
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with protected models and grounds, which are always kept.
 
         `progress(time, pose)` gets the simulated time (s) and the pose of the robot (x, y, z in m, qw, qx, qy, qz) at each recorded
-        sample. A run that is not `full` is cut short as soon as the robot is stuck for good. Raises ValueError for unknown names,
-        and LeftRegion if something comes near what is not in the plant.
+        sample. A run that is not `full` is cut short as soon as the robot is stuck for good. `listener` hears the controller.
+        Raises ValueError for unknown names, and LeftRegion if something comes near what is not in the plant.
         """
         unknown = keep - self._names
         if unknown:
@@ -154,7 +156,7 @@ class Template:
                 drive=self._drive,
                 sleep=sleep,
                 notice=self._notice(sleep, kept, present),
-                autonomy=self._autonomy(suite, seed),
+                autonomy=self._autonomy(suite, seed, listener),
                 lidar=self._lidar(present, kept, suite),
                 watch=Watch(self._region, self._reach) if self._far else None,
                 stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
@@ -218,9 +220,11 @@ class Template:
         plant_context = self._context.plant_context
         return Notice(self._surroundings, self._scenario.sensors, plant_context, sleep, kept, present)
 
-    def _autonomy(self, suite: SensorSuite, seed: int) -> Autonomy:
+    def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
         controller = self._controllers(setup)
+        if listener is not None:
+            controller = Heard(controller, setup, listener)
         return Autonomy(
             scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
         )
@@ -318,10 +322,11 @@ class Variants:
         seed: int,
         progress: Progress | None = None,
         full: bool = True,
+        listener: Listener | None = None,
     ) -> RunResult:
         """As `Template.run`, in a plant that has all that comes near."""
         self._within(lambda: self._whole.learn_piles())
-        return self._within(lambda: self._template(keep).run(keep, seed, progress, full))
+        return self._within(lambda: self._template(keep).run(keep, seed, progress, full, listener))
 
     def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
         """As `Template.supports`."""

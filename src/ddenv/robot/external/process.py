@@ -30,7 +30,6 @@ MOST_LEFT = 16 * PIECE
 # How much of the end of stderr is kept, in bytes, and how much of its last line is reported, in characters.
 KEPT = 16384
 SHOWN = 200
-# Python exits with code 1 for an uncaught exception, and prints this line first.
 # Python exits with 1 for an exception that nobody catches, and says so with this line.
 TRACEBACK = b"Traceback (most recent call last):"
 STOPPED = b"KeyboardInterrupt"
@@ -59,9 +58,13 @@ class Complaints:
         self._end = (self._end + piece)[-KEPT:]
 
     def last_line(self) -> str:
+        return "".join(self.last_lines(1))
+
+    def last_lines(self, most: int) -> list[str]:
+        """At most so many lines that are not empty, each shortened."""
         lines = [line.strip() for line in self._end.decode(errors="replace").splitlines()]
-        last = next((line for line in reversed(lines) if line), "")
-        return printable(last if len(last) <= SHOWN else f"{last[: SHOWN - 3]}...")
+        last = [line for line in lines if line][-most:]
+        return [printable(line if len(line) <= SHOWN else f"{line[: SHOWN - 3]}...") for line in last]
 
     def is_exception(self) -> bool:
         """Whether it ends with a traceback. That of an interrupted program does not count: it only says that it was stopped."""
@@ -182,13 +185,13 @@ def _read(said: str) -> tuple[int | None, str]:
         case "exit":
             return int(number), ""
         case "signal":
-            return None, f"the command was ended by {_signal_name(int(number))}"
+            return None, f"the command was ended by {signal_name(int(number))}"
         case "error":
             return None, f"the command cannot be started: {os.strerror(int(number))}"
     return None, "the command's supervisor was killed"
 
 
-def _signal_name(number: int) -> str:
+def signal_name(number: int) -> str:
     try:
         return signal.Signals(number).name
     except ValueError:

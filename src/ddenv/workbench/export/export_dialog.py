@@ -10,13 +10,14 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open, is_open
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import count, plain
 
@@ -68,9 +69,7 @@ class ExportScreen(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         names = suggested(self._file)
-        with Vertical(id="export", classes="dialog") as dialog:
-            dialog.border_title = "Export"
-            dialog.border_subtitle = "enter or ctrl+s writes   escape closes"
+        with Framed("Export", "ctrl+s writes   escape closes", id="export"):
             yield Static("", id="export-left", markup=False)
             with Horizontal(classes="row"):
                 yield Static("folder", classes="name", markup=False)

@@ -10,11 +10,12 @@ from rich.table import Table
 from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import ActiveBinding, Binding
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.dom import DOMNode
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.key_names import shown
 from ddenv.workbench.wording import plain
 
@@ -144,11 +145,8 @@ class Help(ModalScreen[None]):
         self._groups = tuple(groups)
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog reading") as dialog:
-            dialog.border_title = "Keys"
-            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
-            with VerticalScroll():
-                yield Static(self._table(), markup=False)
+        with Framed("Keys", "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
+            yield Static(self._table(), markup=False)
 
     def _table(self) -> Table:
         table = Table.grid(padding=(0, 2))

@@ -8,10 +8,11 @@ from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches
 from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
 from ddenv.workbench.wording import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
@@ -58,11 +59,8 @@ class SignsDialog(ModalScreen[None]):
     ]
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog reading") as dialog:
-            dialog.border_title = "Signs"
-            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
-            with VerticalScroll():
-                yield Static(_table(), markup=False)
+        with Framed("Signs", "↑ ↓ scroll   escape closes", classes="dialog reading"), VerticalScroll():
+            yield Static(_table(), markup=False)
 
 
 def _table() -> Table:

@@ -16,6 +16,7 @@ from textual.widgets import Static
 from ddenv.guiding.course import place
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Node, RunState
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
@@ -60,9 +61,7 @@ class Compare(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         found = compare(*self._sides)
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Two environments side by side"
-            dialog.border_subtitle = "tab to the lists   escape closes"
+        with Framed("Two environments side by side", "tab to the lists   escape closes"):
             with Horizontal(classes="sides"):
                 for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
                     with Vertical(classes="side"):

@@ -10,22 +10,23 @@ from typing import ClassVar, Literal
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical
+from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
 from ddenv.claims import of_runs, seen
-from ddenv.guiding.commands import refusal
+from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Decision, Node
 from ddenv.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
-from ddenv.workbench.run.log import NOTHING_DECIDED, decision_line
+from ddenv.workbench.run.log import NOTHING_DECIDED, as_it_is, decision_line
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
@@ -82,16 +83,13 @@ class History(Screen[int | None]):
         self._here = -1
         self._rows: list[branches.Row] = []
         self._marked: int | None = None
-        self._decided: tuple[tuple[Decision, ...], int] = ((), 0)
 
     def compose(self) -> ComposeResult:
         with Horizontal(id="both"):
-            with Vertical(id="tree-panel", classes="panel") as panel:
-                panel.border_title = "Reductions"
+            with Framed("Reductions", id="tree-panel", classes="panel"):
                 yield Tree(id="tree", cursor_type="row", cell_padding=1)
-            with Vertical(id="past-decisions", classes="panel") as panel:
-                panel.border_title = "What you decided"
-                yield Lines(_as_it_is, nothing=NOTHING_DECIDED, tail=True, id="decisions")
+            with Framed("What you decided", id="past-decisions", classes="panel"):
+                yield Lines(as_it_is, nothing=NOTHING_DECIDED, tail=True, parts=decision_lines, id="decisions")
         yield Static("", id="about", markup=False)
         shown = ("history.go", "history.mark", "history.compare", "history.help", "history.close")
         yield KeyFooter(shown, shown)
@@ -113,15 +111,9 @@ class History(Screen[int | None]):
             self._fill(self._here if stays is None else stays)
 
     def _show_decisions(self, decisions: tuple[Decision, ...]) -> None:
-        """Shows them in full, in lines that fit."""
         lines = self.query_one(Lines)
-        made_of = decisions, lines.scrollable_content_region.width
-        if made_of != self._decided and made_of[1] > 0:
-            at_end = lines.scroll_offset.y >= lines.max_scroll_y or not self._decided[1]
-            self._decided = made_of
-            lines.show([line for each in decisions for line in decision_lines(each, made_of[1])])
-            if at_end:
-                lines.call_after_refresh(lines.scroll_end, animate=False)
+        if decisions != lines.items:
+            lines.show(decisions)
 
     def _fill(self, cursor: int) -> None:
         table = self.query_one(Tree)
@@ -159,8 +151,7 @@ class History(Screen[int | None]):
         self.call_after_refresh(self._arrange)
 
     def _arrange(self) -> None:
-        """Fits table and lines to the size of the screen."""
-        self._show_decisions(self._look_at().state.decisions)
+        """Fits the table to the size of the screen."""
         at = self.under_cursor
         if at is None:
             self._look()
@@ -179,7 +170,7 @@ class History(Screen[int | None]):
             return
         names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
-        text = Text(f"{place(node)}: {how}", "bold", no_wrap=True)
+        text = Text(f"{place(node)}: {how}", "bold")
         text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")
         text.append(f", by {plain(node.method)}" if node.method else "", "not bold")
         sliced = f"\n{slice_in_short(self._look_at().state, node)}" if node.how == "sliced" else ""
@@ -196,13 +187,12 @@ class History(Screen[int | None]):
         if why := refusal(command, now):
             self._refuse(why)
             return
-        question = command.words(now.state).question
 
         def answered(yes: bool | None) -> None:
             if yes:
                 self.dismiss(node.number)
 
-        self.app.push_screen(Question(question), answered)
+        self.app.push_screen(Question(question(command, now.state)), answered)
 
     def action_mark(self) -> None:
         node = self.under_cursor
@@ -235,10 +225,6 @@ def decision_lines(decision: Decision, width: int) -> list[Text]:
     first, *rest = wrap(plain(decision.words), max(width - INDENT, 12)) or [""]
     lines = [decision_line(replace(decision, words=first), width)]
     return lines + [Text(" " * INDENT + line) for line in rest]
-
-
-def _as_it_is(line: Text, width: int) -> Text:
-    return line.copy()
 
 
 def _side(name: str) -> Literal["left", "right"]:

@@ -7,8 +7,8 @@ from textual.app import ComposeResult
 from textual.containers import VerticalScroll
 from textual.widgets import Static
 
-from ddenv.learn.course import LETTERS, Page
 from ddenv.learn.lesson import Question
+from ddenv.learn.lesson_course import LETTERS, Page
 from ddenv.learn.markup import Block
 from ddenv.workbench.wording import plain
 
@@ -22,12 +22,19 @@ class LessonPane(VerticalScroll):
         yield Static("", id="lesson-text", markup=False)
 
     def show(self, page: Page) -> None:
-        """Another page, from its beginning; once a question is answered, from the question on."""
+        """Another page, from its beginning; with a hint or an answer, its end: that is new."""
         self.query_one("#lesson-text", Static).update(page_text(page))
-        if page.chosen is None:
+        if page.chosen is None and not page.hint:
             self.scroll_home(animate=False)
         else:
             self.call_after_refresh(self.scroll_end, animate=False)
+
+    def read_on(self) -> bool:
+        """Scrolls on to what was not in sight; False if all of the page was."""
+        if self.scroll_y >= self.max_scroll_y:
+            return False
+        self.scroll_page_down(animate=False)
+        return True
 
 
 def page_text(page: Page) -> Text:
@@ -35,6 +42,7 @@ def page_text(page: Page) -> Text:
     parts = [_block(each) for each in page.text]
     if page.question is not None:
         parts.append(_question(page.question, page))
+    parts += [_block(each) for each in page.after]
     return Text("\n\n").join(parts)
 
 

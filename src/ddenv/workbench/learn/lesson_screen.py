@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
-from textual import work
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Container, Vertical
@@ -14,40 +14,39 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.learn.course import Course
+from ddenv.learn.attempt import Attempt
+from ddenv.learn.lesson_course import Course
 from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step
-from ddenv.workbench.background import call_if_open
+from ddenv.runfile.state import Test
+from ddenv.runfile.store import COLUMNS, Live
+from ddenv.runfile.tested import told
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane
-from ddenv.workbench.learn.progress import all_scores, keep_score
+from ddenv.workbench.learn.race_screen import RaceScreen
+from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.learn.variables_pane import Variables
+from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
-from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.observed import Observed
+from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 
 SMALLEST = (64, 20)
-SHOWN = (
-    *(
-        "lesson.on",
-        "lesson.back",
-        "lesson.skip",
-        "lesson.hint",
-        "lesson.run_back",
-        "lesson.run_on",
-        "lesson.next_decision",
-    ),
-    *("lesson.next_reduction", "lesson.predict", "lesson.variables", "lesson.help", "lesson.close"),
-)
-FIRST = (
-    *("lesson.help", "lesson.close", "lesson.on", "lesson.skip", "lesson.run_back", "lesson.run_on", "lesson.predict"),
-    *("lesson.hint", "lesson.variables", "lesson.next_reduction", "lesson.next_decision", "lesson.back"),
-)
+
+
+def _ids(names: str) -> tuple[str, ...]:
+    return tuple(f"lesson.{name}" for name in names.split())
+
+
+# The keys in the footer: in their order, and which of them go first where there is room for a few only.
+SHOWN = _ids("on back skip activity hint run_back run_on next_decision next_reduction predict variables help close")
+FIRST = _ids("help close on skip activity run_back run_on predict hint variables next_reduction next_decision back")
 
 
 def _answer(place: int) -> Binding:
@@ -106,6 +105,13 @@ class LessonScreen(Screen[None]):
             tooltip="the run: to the reduction before",
             show=False,
         ),
+        Binding(
+            "t",
+            "activity",
+            "try",
+            id="lesson.activity",
+            tooltip="search yourself, or watch the race, where a step has one",
+        ),
         Binding("p", "predict", "predict", id="lesson.predict", tooltip="predict what comes next in the run"),
         Binding(
             "v",
@@ -135,6 +141,7 @@ class LessonScreen(Screen[None]):
         else:
             position, score = opened.position, all_scores().get(opened.lesson.name)
         self.course = Course(position, opened, score)
+        self._kept = self.course.score
         self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
 
     def compose(self) -> ComposeResult:
@@ -155,18 +162,10 @@ class LessonScreen(Screen[None]):
     def on_mount(self) -> None:
         self._show()
         # What it needs takes long to load: the first paint comes before.
-        self.call_after_refresh(self._read_world)
+        self.call_after_refresh(read_world, self, self._run, [self._map])
 
     def on_unmount(self) -> None:
         self._file.close()
-
-    @work(thread=True, group="world", exclusive=True)
-    def _read_world(self) -> None:
-        try:
-            place, notice = place_of_run(self._run), ""
-        except UserError as error:
-            place, notice = Place(), str(error)
-        call_if_open(self, self._map.set_place, place, notice)
 
     # What is shown.
 
@@ -174,8 +173,15 @@ class LessonScreen(Screen[None]):
         self._show_run()
         self.query_one(LessonPane).show(self.course.page)
         self.query_one("#lesson-header", Static).update(self._heading())
-        if self._opened is not None:
+        footer, due = self.query_one(KeyFooter), self.course.due and not self.course.is_open
+        footer.say("lesson.activity", self.course.activity or "")
+        footer.say("lesson.on", f"{self.course.activity if due else 'go on'}")
+        self._keep_score()
+
+    def _keep_score(self) -> None:
+        if self._opened is not None and self.course.score != self._kept:
             keep_score(self._opened.lesson.name, self.course.score)
+            self._kept = self.course.score
 
     def _show_run(self) -> None:
         try:
@@ -187,12 +193,23 @@ class LessonScreen(Screen[None]):
             return
         words = what_happened(moment)
         snapshot = self._moments.of(moment, f"{words[:1].upper()}{words[1:].rstrip('.')}.")
+        test = told(moment)
+        if test is not None:
+            snapshot = self._with_way(snapshot, test)
+        self.query_one("#lesson-world").border_title = "World" if test is None else f"World: way of test {test.id}"
         self.query_one(Happening).show(snapshot)
         self.query_one(Variables).show(variables(moment))
         self._map.show(snapshot, snapshot.pointed)
         self._legend.show(0, snapshot.pointed, (), self._map.legend)
         number, all_moments = self.course.position.place
         self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
+
+    def _with_way(self, snapshot: Snapshot, test: Test) -> Snapshot:
+        """With the way of the test that is told, as far as it is recorded, and the robot where it ended."""
+        ended = (
+            () if test.end_pose is None or len(test.end_pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, test.end_pose),)
+        )
+        return replace(snapshot, evidence=self._moments.path(test.id), live=ended)
 
     def _heading(self) -> Text:
         course, score = self.course, self.course.score
@@ -215,7 +232,11 @@ class LessonScreen(Screen[None]):
     # What is done.
 
     def action_on(self) -> None:
-        if self.course.go_on():
+        if self.query_one(LessonPane).read_on():
+            return
+        if self.course.due and not self.course.is_open:
+            self.action_activity()
+        elif self.course.go_on():
             self._show()
         elif self.course.page.question is not None and self.course.page.chosen is None:
             self._say("choose an answer by its letter, or skip the question with s")
@@ -248,6 +269,28 @@ class LessonScreen(Screen[None]):
         else:
             self._say("there is no hint here")
 
+    def action_activity(self) -> None:
+        course, opened = self.course, self._opened
+        here, moment = course.here, course.position.moment(course.at)
+        if opened is None or here is None or moment is None or course.activity is None:
+            self._say("there is nothing to try here")
+            return
+        base = self._moments.of(moment, "")
+        if (attempt := course.attempt) is not None:
+            search = TryScreen(self._run, base, attempt, course.plays, self._keep)
+            self.app.push_screen(search, lambda _: self._show())
+        else:
+            racers = opened.racers(here)
+            self.app.push_screen(RaceScreen(racers, [base] * len(racers), self._run), lambda _: self._watched())
+
+    def _keep(self, attempt: Attempt) -> None:
+        self.course.keep(attempt)
+        self._keep_score()
+
+    def _watched(self) -> None:
+        self.course.watched()
+        self._show()
+
     def action_move(self, what: Step, by: int) -> None:
         if self.course.move(what, by):
             self._show()
@@ -255,7 +298,9 @@ class LessonScreen(Screen[None]):
             self._say("this is the end of the run" if by > 0 else "there is none before this moment")
 
     def action_predict(self) -> None:
-        if self.course.foretell():
+        if self.course.must_answer:
+            self._say("first answer the question of this step, or skip it with s")
+        elif self.course.foretell():
             self._show()
         else:
             self._say("nothing is left to predict: go back in the run first")

@@ -14,9 +14,10 @@ from textual.widgets import OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.learn.lesson import Lesson
-from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.learn.progress import all_scores, in_words
+from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.learn.kept_scores import all_scores, in_words
 from ddenv.workbench.wording import plain, shorten
 
 SHOWN = ("lessons.open", "lessons.help", "lessons.back")
@@ -41,8 +42,7 @@ class LessonsScreen(Screen[None]):
     def compose(self) -> ComposeResult:
         heading = Text(" Lessons", "bold").append("  each with a recorded run: no Drake, no internet", "not bold")
         yield Static(heading, id="lessons-header")
-        with Vertical(id="lessons-panel", classes="panel") as panel:
-            panel.border_title = "Lessons"
+        with Framed("Lessons", id="lessons-panel", classes="panel"):
             yield OptionList(id="lessons-list")
         with Vertical(classes="panel", id="lesson-about-panel") as panel:
             panel.styles.height = 8
@@ -53,7 +53,7 @@ class LessonsScreen(Screen[None]):
     def on_mount(self) -> None:
         for file in bundled():
             try:
-                self._lessons.append(open_lesson(file).lesson)
+                self._lessons.append(glance(file))
             except UserError as error:
                 self.notify(str(error), severity="warning", markup=False)
         self._fill()

@@ -13,7 +13,7 @@ from typing import TextIO
 
 from ddenv import processor
 from ddenv.errors import UserError, printable
-from ddenv.guiding.commands import Command, data_of, said, starts_engine
+from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
 from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import RunState
@@ -138,9 +138,9 @@ class LineMode:
             self._say(f"not possible: {offered.why_not}")
         elif isinstance(offered.command, StartEngine):
             self._start()
-        elif question := offered.command.words(self._poll.snapshot.state).question:
+        elif words := question(offered.command, self._poll.snapshot.state):
             self._asked = offered.command
-            self._say(f"{question} Type yes to do it.")
+            self._say(f"{words} Type yes to do it.")
         else:
             self._send(offered.command)
 

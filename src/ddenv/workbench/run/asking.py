@@ -15,7 +15,7 @@ from textual.screen import Screen
 
 from ddenv import processor
 from ddenv.errors import UserError
-from ddenv.guiding.commands import Command, data_of, refusal, said, starts_engine
+from ddenv.guiding.commands import Command, data_of, question, refusal, said, starts_engine
 from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
@@ -25,6 +25,7 @@ from ddenv.workbench.wording import attach_name, count, duration, plain
 
 # After this time without an answer the screen says that there is none, s.
 PATIENCE = 5
+UNTRUSTED = "not done: it starts a program that you do not trust"
 
 
 class Asking:
@@ -118,21 +119,27 @@ class Asking:
             self.refuse(why)
         elif isinstance(command, StartEngine):
             self._start_engine()
-        elif sure or not (question := command.words(now.state).question):
+        elif sure or not (asked := question(command, now.state)):
             self.send(command)
         else:
             from ddenv.workbench.widgets.question import Question
 
-            self._screen.app.push_screen(Question(question), lambda yes: self.send(command) if yes else None)
+            self._screen.app.push_screen(Question(asked), lambda yes: self.send(command) if yes else None)
 
     def send(self, command: Command, then: Callable[[], None] | None = None) -> None:
         """Sends a command in the background; `then` is called once it is written.
 
-        If no engine is running, the next one obeys it; one is started if the command needs it.
+        If no engine is running, the next one obeys it; one starts if the command needs it, and what that starts is trusted.
         """
+        now = self.situation
         if self._poll.watch:
             self.refuse(self.barred)
-            return
+        elif now.engine == "absent" and starts_engine(command, now.state):
+            self._once_trusted(lambda: self._send(command, then))
+        else:
+            self._send(command, then)
+
+    def _send(self, command: Command, then: Callable[[], None] | None) -> None:
         now = self.situation
         if words := said(command, now):
             self.say(words)
@@ -186,6 +193,23 @@ class Asking:
             self._start_engine()
 
     def _start_engine(self) -> None:
+        self._once_trusted(self._start)
+
+    def _once_trusted(self, then: Callable[[], None]) -> None:
+        """Calls `then` if the user trusts what an engine starts for this run, or says that nothing was done."""
+        from ddenv.runs.creation import read_scenario
+        from ddenv.workbench.widgets.trust_question import once_trusted
+
+        try:
+            scenario = read_scenario(self._poll.file)
+        except UserError as error:
+            self._screen.notify(str(error), severity="error", markup=False)
+        else:
+            once_trusted(
+                self._screen.app, scenario, self._poll.path, lambda yes: then() if yes else self.refuse(UNTRUSTED)
+            )
+
+    def _start(self) -> None:
         state = self._poll.snapshot.state
         try:
             self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode)

@@ -77,15 +77,16 @@ class Moments:
         first = state.f_test.id if state.f_test is not None else None
         return Snapshot(
             state,
-            evidence=self._path(state.evidence_test),
+            evidence=self.path(state.evidence_test),
             spent=_spent(state),
-            original=self._path(first),
+            original=self.path(first),
             past=True,
             pointed=pointed(moment),
             happened=words,
         )
 
-    def _path(self, test: int | None) -> array[float] | None:
+    def path(self, test: int | None) -> array[float] | None:
+        """The robot's path in a test, as rows of `COLUMNS`; None if it is not recorded."""
         if test is None:
             return None
         if test not in self._paths:

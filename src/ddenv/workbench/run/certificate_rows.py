@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ddenv.claims import short
+from ddenv.claims import fresh_runs_made, in_the_making, made_of_usual, short
 from ddenv.map.names import shortened
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
@@ -32,8 +32,10 @@ def certificate_title(state: RunState) -> tuple[str, str]:
         return "", ""
     number = f" {certificate.number}" if certificate.number > 1 else ""
     keeps = f"has to keep {percent(certificate.keep_rate)}"
-    made = sum(test.is_finished for test in state.confirm_tests if test.run >= certificate.first_run)
-    return f"Certificate{number}: fresh runs", f"{keeps} · {count(made, 'run')}"
+    far = (
+        made_of_usual(state, certificate) if in_the_making(state) else count(fresh_runs_made(state, certificate), "run")
+    )
+    return f"Certificate{number}: {keeps}", far
 
 
 def words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:

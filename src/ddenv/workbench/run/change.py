@@ -8,7 +8,7 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Horizontal, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Select, Static
 
@@ -20,6 +20,7 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Value
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.methods import KINDS, note, paragraph
 from ddenv.workbench.widgets.entry import Entry
 from ddenv.workbench.wording import plain
@@ -52,9 +53,7 @@ class Change(ModalScreen[course.Change | None]):
         self._texts = {name: "" if value is None else str(value) for name, value in now.items()}
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Change settings, from the next round on"
-            dialog.border_subtitle = "ctrl+s changes   escape cancels"
+        with Framed("Change settings, from the next round on", "ctrl+s changes   escape cancels"):
             with VerticalScroll(can_focus=False, classes="fields"):
                 for kind in KINDS:
                     with Horizontal(classes="row"):

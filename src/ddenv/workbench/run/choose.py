@@ -9,12 +9,12 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.map.names import shortened
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.wording import count, plain, shorten
 
@@ -33,20 +33,27 @@ class ChooseModels(ModalScreen[tuple[str, ...] | None]):
         Binding("tab", "mark", show=False, id="choose.toggle", tooltip="choose this model, too, or no longer"),
     ]
 
-    def __init__(self, title: str, names: Sequence[str], *, several: bool, pinned: Iterable[str] = ()) -> None:
-        """`title` says what they are for; `pinned` ones are marked with +."""
+    def __init__(
+        self,
+        title: str,
+        names: Sequence[str],
+        *,
+        several: bool,
+        pinned: Iterable[str] = (),
+        chosen: Iterable[str] = (),
+    ) -> None:
+        """`title` says what they are for; `pinned` ones are marked with +; `chosen` ones come first."""
         super().__init__()
-        self._title, self._names, self._several = title, tuple(names), several
+        self._title, self._several = title, several
         self._pinned = frozenset(pinned)
-        self._chosen: set[str] = set()
+        self._chosen = set(chosen)
+        self._names = tuple(sorted(names, key=lambda name: name not in self._chosen))
         self._listed: list[str] = []
         self._part: str | None = None
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = Text(self._title)
-            keys = "tab or click chooses more   enter takes them" if self._several else "enter takes it"
-            dialog.border_subtitle = f"{keys}   escape cancels"
+        keys = "tab or click chooses more   enter takes them" if self._several else "enter takes it"
+        with Framed(Text(self._title), f"{keys}   escape cancels"):
             yield Input(placeholder="part of a name", id="filter", compact=True)
             yield OptionList(id="names", compact=True, markup=False)
             yield Static("", id="found", markup=False)
@@ -154,9 +161,7 @@ class Layers(ModalScreen[None]):
         self._world, self._names = world, names
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "What the map shows"
-            dialog.border_subtitle = "space or click shows or hides   escape closes"
+        with Framed("What the map shows", "space or click shows or hides   escape closes"):
             yield OptionList(*(Option(self._prompt(name)) for name in self._names), compact=True, markup=False)
 
     def _prompt(self, name: str) -> Text:
@@ -192,9 +197,7 @@ class Copy(ModalScreen[None]):
         self._texts = tuple(texts)
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Copy"
-            dialog.border_subtitle = "enter or click copies   escape closes"
+        with Framed("Copy", "enter or click copies   escape closes"):
             yield OptionList(*(Option(_prompt(*each)) for each in self._texts), compact=True, markup=False)
 
     @on(OptionList.OptionSelected)

@@ -11,10 +11,11 @@ from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Horizontal, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Button, Static
 
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.processes import Scene
 from ddenv.workbench.wording import plain
 
@@ -35,11 +36,8 @@ class Method(ModalScreen[None]):
         self._algorithm, self._pair = algorithm, pair
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog reading") as dialog:
-            dialog.border_title = "How this run is reduced"
-            dialog.border_subtitle = "escape closes"
-            with VerticalScroll():
-                yield Static(self._words(), markup=False)
+        with Framed("How this run is reduced", "escape closes", classes="dialog reading"), VerticalScroll():
+            yield Static(self._words(), markup=False)
 
     def _words(self) -> Text:
         from ddenv.workbench.run.methods import chosen
@@ -70,9 +68,7 @@ class Quit(ModalScreen[str]):
     ]
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Quit"
-            dialog.border_subtitle = "l let it run on   s stop   c cancel"
+        with Framed("Quit", "l let it run on   s stop   c cancel"):
             yield Static("The engine is a separate process; it can go on without this screen.", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Let it run on", id="leave", variant="primary")
@@ -102,9 +98,7 @@ class SceneDialog(ModalScreen[None]):
         self._scene = scene
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Scene in 3-D"
-            dialog.border_subtitle = "c copy address   s copy ssh line   x stop   escape close"
+        with Framed("Scene in 3-D", "c copy address   s copy ssh line   x stop   escape close"):
             yield Static("", id="address", markup=False)
 
     def on_mount(self) -> None:
@@ -134,9 +128,9 @@ class SceneDialog(ModalScreen[None]):
     def _copy(self, text: str, what: str) -> None:
         if text:
             self.app.copy_to_clipboard(text)
-            self.notify(f"{what} copied, if the terminal allows it", timeout=3)
+            self.query_one(Framed).say(f"{what} copied, if the terminal allows it")
         else:
-            self.notify("the scene has no address yet", severity="warning", timeout=3)
+            self.query_one(Framed).say("the scene has no address yet")
 
     def action_stop(self) -> None:
         self._scene.stop()

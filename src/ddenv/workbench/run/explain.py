@@ -107,11 +107,14 @@ def baseline_sentence(state: RunState, iterations: int) -> str:
 
 
 def _with_pause(state: RunState, happening: Happening) -> Happening:
+    step, sentences = happening
+    if state.needs_room and not state.ended:
+        free = f"{state.needs_room / 1e6:.0f} MB"
+        return step, (f"The disk is full: no new test starts until {free} are free. Nothing is lost.", *sentences)
     if not state.paused:
         return happening
     rest = "running tests finish first" if state.tally["running"] else "none is running"
     first = f"Paused: no new test starts; {rest}. space resumes, s runs one test."
-    step, sentences = happening
     return step, (first, *sentences)
 
 
@@ -174,7 +177,8 @@ def _between(snapshot: Snapshot, options: Settings) -> tuple[str, ...]:
     number = 1 if state.round is None else state.round.number + 1
     first = f"Round {number}: {beginning(options, len(state.environment))}"
     if free := sliced(state):
-        return (*free, first)
+        # An earlier moment says itself what the slice left out, and nothing can be taken back there.
+        return (*(free[:1] if snapshot.past else free), first)
     arrived = arrival(state)
     if arrived:
         return (arrived, first)
@@ -298,7 +302,7 @@ def _otherwise(test: Test) -> str:
 
 def _reduced(state: RunState, candidate: Candidate, options: Settings) -> Happening:
     before, after = len(candidate.split.environment), candidate.size
-    gone = "the others take no part in f" if before - after > 1 else "the other one takes no part in f"
+    gone = "f shows without the others" if before - after > 1 else "f shows without the other one"
     return "reduced", (
         f"{candidate.label} shows f: {_ended(state, candidate, options)}",
         f"E is now {candidate.label}: {before} → {count(after, 'model')}; {gone}.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import of_runs, terms
+from ddenv.claims import fresh_runs_made, of_runs, terms, usual_runs
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
@@ -20,6 +20,7 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return (_after(certificate), *_now(snapshot, certificate))
     return (
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
+        f"That usually takes {usual_runs(state, certificate)}; {fresh_runs_made(state, certificate)} are made.",
         *_so_far(state),
         *_now(snapshot, certificate),
     )
@@ -40,7 +41,8 @@ def _so_far(state: RunState) -> tuple[str, ...]:
 
 
 def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
-    running = [test for test in snapshot.running if test.phase == "certify"]
+    # A test of the certificate before may still run.
+    running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
     if not running:
         return ()
     return (f"Now run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)

@@ -40,7 +40,7 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     said = (
         ("end", _end(test)),
         ("place", _place(test)),
-        ("seed", f"{test.seed} (run {test.run} of its kind)"),
+        ("seed", f"{test.seed} (run {test.run})"),
         ("time", _took(test)),
         ("started", time.strftime("%-d %b %Y, %H:%M:%S", time.localtime(start.event.time))),
         ("models", f"{len(models)} of {count(len(state.elements), 'model')}: {_names(models)}"),

@@ -7,13 +7,15 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.facts import Facts, facts
+from ddenv.workbench.wording import plain
 
 WIDTH = 11
 
@@ -36,10 +38,9 @@ class FactsDialog(ModalScreen[None]):
         self._facts: Facts | None = None
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog reading") as dialog:
-            dialog.border_subtitle = "← → other tests   c copies the command   escape closes"
-            with VerticalScroll():
-                yield Static("", id="facts", markup=False)
+        hints = "← → other tests   c copies the command   escape closes"
+        with Framed("", hints, classes="dialog reading"), VerticalScroll():
+            yield Static("", id="facts", markup=False)
 
     def on_mount(self) -> None:
         self._show(self._test)
@@ -48,7 +49,7 @@ class FactsDialog(ModalScreen[None]):
         try:
             found = facts(self._position, test, self._run)
         except UserError as error:
-            self.notify(str(error), severity="warning", markup=False)
+            self.query_one(Framed).say(plain(str(error)))
             return
         if found is not None:
             self._test, self._facts = test, found
@@ -62,7 +63,7 @@ class FactsDialog(ModalScreen[None]):
     def action_copy(self) -> None:
         if self._facts is not None:
             self.app.copy_to_clipboard(self._facts.command)
-            self.notify("command copied, if the terminal allows it", timeout=3)
+            self.query_one(Framed).say("command copied, if the terminal allows it")
 
 
 def _text(found: Facts) -> Text:

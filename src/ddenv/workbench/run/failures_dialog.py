@@ -10,18 +10,18 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.guiding.commands import refusal
+from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.selections import AcceptOther
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.atlas import OtherFailure, atlas, models_of
 from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
 from ddenv.words import first_of
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten
 
@@ -57,9 +57,7 @@ class FailuresMet(ModalScreen[int | None]):
         self._made_of: tuple[object, ...] = ()
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Other failures met"
-            dialog.border_subtitle = "enter reduces it in a branch   escape closes"
+        with Framed("Other failures met", "enter reduces it in a branch   escape closes"):
             yield Static(_line("failure", "tests", "smallest environment"), id="head", markup=False)
             yield OptionList(id="failures", compact=True, markup=False)
             yield Static("", id="failure", markup=False)
@@ -110,14 +108,14 @@ class FailuresMet(ModalScreen[int | None]):
             return
         now, command = self._look_at(), AcceptOther(one.smallest, instead=True)
         if why := refusal(command, now):
-            self.notify(why, severity="warning", timeout=4, markup=False)
+            self.query_one("#failure", Static).update(Text(f"✗ {plain(why)}", "bold"))
             return
 
         def answered(yes: bool | None) -> None:
             if yes:
                 self.dismiss(one.smallest)
 
-        self.app.push_screen(Question(command.words(now.state).question), answered)
+        self.app.push_screen(Question(question(command, now.state)), answered)
 
 
 def _line(failure: str, tests: str, smallest: str) -> Text:

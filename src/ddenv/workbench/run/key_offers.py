@@ -15,9 +15,9 @@ from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_keys import GUIDING
 
-# These ask for models if none are selected.
+# These ask for models if none are selected. A pin always asks: it ends the search.
 TITLES = {
-    "pin": "Pin or unpin models: pinned ones stay; a new search begins",
+    "pin": "Pin or unpin models (+): pinned ones stay; a new search begins",
     "without": "Try without these models",
     "only": "Try only these models",
 }
@@ -64,18 +64,18 @@ class KeyOffers:
         self._asking.refuse(self.offer(name).why_not)
 
     def use(self, name: str) -> None:
-        """Does what a key means now; it asks for models if none are selected but some are needed."""
+        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
         if self._browsing.is_past:
             self._asking.refuse(NOT_NOW)
             return
         command = self.offer(name).command
-        if command is not None:
+        if command is not None and name != "pin":
             self._asking.ask(command)
         elif name == "change":
             self._opening.change()
         elif name in TITLES:
             environment = self._poll.snapshot.state.environment
-            self._opening.choose(TITLES[name], environment, True, partial(self._chosen, name))
+            self._opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
 
     def _chosen(self, name: str, models: Collection[str]) -> None:
         now = offer(name, self._asking.situation, Pointed(models=tuple(models)))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from bisect import bisect_right
 from dataclasses import dataclass
+from textwrap import wrap
 
 from rich.text import Text
 
@@ -12,15 +13,16 @@ from ddenv.runfile.state import Decision, RunState
 from ddenv.words import news
 from ddenv.workbench.wording import plain
 
-# Maximum number of lines; the oldest go first.
-MOST = 2000
+# Where the words begin, after the time.
+BEGIN = " " * 10
 NOTHING_DECIDED = "you decided nothing yet"
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """`time` is Unix time, s."""
+    """`event` is the id of its event, `time` is Unix time, s."""
 
+    event: int
     time: float
     words: str
 
@@ -29,18 +31,14 @@ class Log:
     """What happened, from a run's events as they come."""
 
     def __init__(self) -> None:
-        self._entries: deque[Entry] = deque(maxlen=MOST)
+        self._entries: list[Entry] = []
         self._revision = 0
-        self._changed = False
 
-    @property
-    def entries(self) -> tuple[Entry, ...]:
-        return tuple(self._entries)
-
-    def changed(self) -> bool:
-        """Whether there is anything new since the last call."""
-        changed, self._changed = self._changed, False
-        return changed
+    def until(self, event: int | None) -> list[Entry]:
+        """The entries of an event and of all before it; all there are for None."""
+        if event is None:
+            return self._entries[:]
+        return self._entries[: bisect_right(self._entries, event, key=lambda entry: entry.event)]
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
         """One more event; the same event again changes nothing."""
@@ -53,14 +51,20 @@ class Log:
             # A damaged scenario has no words; the screen shows elsewhere what is wrong.
             words = ""
         if words:
-            self._entries.append(Entry(after.updated_at, words))
-            self._changed = True
+            self._entries.append(Entry(after.revision, after.updated_at, words))
 
     @staticmethod
-    def line(entry: Entry, width: int) -> Text:
-        """An entry with its time of day; what belongs to the line before stays indented."""
+    def parts(entry: Entry, width: int) -> list[Text]:
+        """An entry with its time of day, in lines that fit; what belongs to the line before stays indented."""
         indent = " " * (len(entry.words) - len(entry.words.lstrip()))
-        return _timed(entry.time, f"{indent}{plain(entry.words)}")
+        first, *more = wrap(plain(entry.words), max(20, width - len(BEGIN) - len(indent) - 2)) or [""]
+        lines = [Text(f"{BEGIN}{indent}  {words}", no_wrap=True) for words in more]
+        return [_timed(entry.time, f"{indent}{first}"), *lines]
+
+
+def as_it_is(text: Text, _: int) -> Text:
+    """A line that is ready."""
+    return text.copy()
 
 
 def decision_line(decision: Decision, width: int) -> Text:

@@ -31,14 +31,21 @@ class Opening:
     def __init__(self, screen: Screen[Any], poll: Poll, asking: Asking, world: WorldMap, scene: Scene) -> None:
         self._screen, self._poll, self._asking, self._world, self._scene = screen, poll, asking, world, scene
 
-    def choose(self, title: str, names: Sequence[str], several: bool, then: Callable[[tuple[str, ...]], None]) -> None:
-        """Asks for models by their names."""
+    def choose(
+        self,
+        title: str,
+        names: Sequence[str],
+        several: bool,
+        then: Callable[[tuple[str, ...]], None],
+        chosen: Sequence[str] = (),
+    ) -> None:
+        """Asks for models by their names; those that are `chosen` already come first."""
         from ddenv.workbench.run.choose import ChooseModels
 
         if not names:
             self._asking.refuse("there are no models to choose from")
             return
-        dialog = ChooseModels(title, names, several=several, pinned=self._poll.snapshot.state.pinned)
+        dialog = ChooseModels(title, names, several=several, pinned=self._poll.snapshot.state.pinned, chosen=chosen)
         self._screen.app.push_screen(dialog, lambda chosen: then(chosen) if chosen else None)
 
     def change(self) -> None:

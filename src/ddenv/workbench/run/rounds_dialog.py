@@ -8,12 +8,12 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.runfile.position import Chapter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.wording import count
 
 NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
@@ -34,9 +34,7 @@ class Rounds(ModalScreen[Chapter | None]):
         self._start = next((row for row, each in enumerate(chapters) if at and at <= each.last), len(chapters) - 1)
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Rounds so far"
-            dialog.border_subtitle = "enter goes to its end   escape closes"
+        with Framed("Rounds so far", "enter goes to its end   escape closes"):
             yield Static(_line("", "models", "left", "after"), id="head", markup=False)
             yield OptionList(*map(_option, self._chapters), id="rounds", compact=True, markup=False)
 

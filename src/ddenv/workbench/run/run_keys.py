@@ -46,9 +46,9 @@ _KEYS = [
     Binding(
         "p",
         "guide('pin')",
-        "pin",
+        "pins",
         id="run.pin",
-        tooltip="pin the selected models, so that they always stay; again unpins them",
+        tooltip="choose the models that always stay, from a list in which the selected ones are marked; pinned ones are unpinned",
     ),
     Binding(
         "w",

@@ -22,6 +22,7 @@ from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
@@ -31,9 +32,10 @@ from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
+from ddenv.workbench.run.guide_place import FOLLOWS, GuidePlace
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.log import NOTHING_DECIDED, Log, decision_line
+from ddenv.workbench.run.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.run.models_chart import Chart
 from ddenv.workbench.run.models_left import ModelsLeft
 from ddenv.workbench.run.noteworthy import title, worth_a_look
@@ -66,12 +68,12 @@ class RunScreen(Screen[None]):
     # What the focus changes is drawn again by the widgets themselves: the whole screen need not be.
     focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
-    def __init__(self, run: Path, engine: Engine | None = None, watch: bool = False) -> None:
-        """`engine` is the one that was just started on this run. With `watch` nothing is ever sent.
+    def __init__(self, run: Path, engine: Engine | None = None, watch: bool = False, classes: str = "") -> None:
+        """`engine` is the one that was just started on this run. With `watch` nothing is ever sent. `classes` fit the size.
 
         Raises UserError for a file that is no run file.
         """
-        super().__init__()
+        super().__init__(classes=f"-pane-map {classes}")
         self.run = run
         self.engine, self.scene, self._log = engine or Engine(run), Scene(run), Log()
         self.poll = Poll(run, starting=lambda: self.engine.starting, watch=watch, on_event=self._note)
@@ -81,6 +83,7 @@ class RunScreen(Screen[None]):
         self._footer = KeyFooter(shown, first, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
+        self._guide = GuidePlace(run, self.browsing, watch, self._browse)
         self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
         self._keys = KeyOffers(self.browsing, self.poll, self._table, self._map, self.asking, self._opening)
         self._pane = "map"
@@ -106,16 +109,15 @@ class RunScreen(Screen[None]):
                     with _panel("left", "Models left by test"):
                         yield Chart(id="chart")
                     with _panel("log-panel", "Log"):
-                        yield Lines(self._log.line, nothing="nothing happened yet", tail=True, id="log")
-                    with _panel("now", "What is happening") as panel:
-                        panel.border_subtitle = "e explains the method"
+                        yield Lines(as_it_is, nothing="nothing happened yet", tail=True, parts=Log.parts, id="log")
+                    with _panel("now", "What is happening", "e explains the method"):
                         yield Happening(id="happening")
             with Vertical(id="run-more"):
                 yield ModelsLeft(id="models-panel")
                 with _panel("decisions-panel", "What you decided"):
                     yield Lines(decision_line, nothing=NOTHING_DECIDED, tail=True, id="decisions")
         if self.poll.watch:
-            yield Static("watching only: no key changes anything in this run", id="watching", markup=False)
+            yield Static(FOLLOWS, id="watching", markup=False)
         yield Status(id="status")
         yield self._footer
         yield Static("", id="small", markup=False)
@@ -123,13 +125,13 @@ class RunScreen(Screen[None]):
     def on_mount(self) -> None:
         for id in TOOLTIPS:
             self.query_one(f"#{id}").tooltip = TOOLTIPS[id]
-        self.add_class(f"-pane-{self._pane}")
         self.query_one(Panes).mark(self._pane)
         self.following.begin()
         # What it needs takes long to load: the first paint comes before.
         self.call_after_refresh(self._read_world)
 
     def on_unmount(self) -> None:
+        self._guide.close()
         self.scene.stop()
         self.asking.close()
         self.poll.close()
@@ -177,6 +179,7 @@ class RunScreen(Screen[None]):
                 self.post_message(Attention(plain(self.run.stem), why))
 
     def _show(self, changed: bool) -> None:
+        self._guide.look()
         if changed:
             self._show_run()
             self.asking.go_on()
@@ -199,8 +202,9 @@ class RunScreen(Screen[None]):
         if above != self._title:
             panel = self.query_one("#round")
             self._title = panel.border_title, panel.border_subtitle = above
-        if self._log.changed():
-            self.query_one("#log", Lines).show(self._log.entries)
+        log, entries = self.query_one("#log", Lines), self._log.until(self.browsing.position.at)
+        if len(entries) != len(log.items):
+            log.show(entries)
         decisions = self.query_one("#decisions", Lines)
         if decisions.items != snapshot.state.decisions:
             decisions.show(snapshot.state.decisions)
@@ -286,6 +290,8 @@ class RunScreen(Screen[None]):
         except UserError as error:
             self.browsing.go(None)
             self.asking.refuse(str(error))
+        if self._guide.browsed():
+            self.query_one("#watching", Static).update(self._guide.words)
         self._table.follow()
         self._show(True)
         self._footer.say("run.follow", "now" if self.browsing.is_past else "follow")
@@ -389,7 +395,5 @@ class RunScreen(Screen[None]):
         self._map.fit()
 
 
-def _panel(id: str, title: str) -> Vertical:
-    panel = Vertical(id=id, classes="panel")
-    panel.border_title = title
-    return panel
+def _panel(id: str, title: str, hints: str = "") -> Framed:
+    return Framed(title, hints, id=id, classes="panel")

@@ -165,6 +165,8 @@ def facts(
         sign, word = "✗", "the run file is gone"
     elif status == "lost":
         word = f"{word}: r resumes"
+    elif state.needs_room and not state.ended:
+        sign, word = "!", "no room on the disk"
     mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
     said = (
         Fact("state", (f"{sign} {word}",)),

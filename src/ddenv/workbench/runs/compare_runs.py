@@ -10,11 +10,12 @@ from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.words import first_of
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
 from ddenv.workbench.wording import brief, count, plain
 
@@ -40,11 +41,8 @@ class CompareRuns(ModalScreen[None]):
         self._sides = (first, second)
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Two runs side by side"
-            dialog.border_subtitle = "↑ ↓ scroll   escape closes"
-            with VerticalScroll():
-                yield Static(self._table(), markup=False)
+        with Framed("Two runs side by side", "↑ ↓ scroll   escape closes"), VerticalScroll():
+            yield Static(self._table(), markup=False)
 
     def _table(self) -> Table:
         table = Table.grid(padding=(0, 2), expand=True)

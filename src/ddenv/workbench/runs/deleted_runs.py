@@ -13,7 +13,7 @@ from ddenv.runs.folder import SUFFIX
 
 FOLDER = ".deleted"
 # The endings of files beside a run file that go with it.
-BESIDE = (*LOGS, ".log", ".scene.log")
+BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 # How long a deleted run is kept, s.
 KEPT = 7 * 86_400.0
 

@@ -9,21 +9,24 @@ from rich.text import Text
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Horizontal, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import DataTable, Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open, is_open
 from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.messages import ShowRun, ShowSetup
 from ddenv.workbench.runs.deleted_runs import bring_back, delete_run
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
-from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about
+from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
 from ddenv.workbench.wording import count, plain, shorten
 
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3
+# From this width on what is said of a run stands beside the table, else below it.
+WIDE = 110
 # The footer's keys in the order of the screen, then by priority.
 SHOWN = (
     *("runs.open", "runs.watch", "runs.like", "runs.filter", "runs.sort", "runs.mark", "runs.compare", "runs.delete"),
@@ -39,8 +42,8 @@ class RunsScreen(Screen[None]):
     """Reads the folder repeatedly in a thread; writes only on the user's command."""
 
     CSS_PATH = "runs.tcss"
-    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (110, "-wide"), (160, "-huge")]
-    VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (30, "-tall")]
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (64, "-narrow"), (WIDE, "-wide"), (160, "-huge")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (12, "-short"), (20, "-low"), (30, "-tall")]
     BINDINGS: ClassVar = [
         Binding("w", "watch", "watch", id="runs.watch", tooltip="watch it without changing anything"),
         Binding("n", "copy", "new like it", id="runs.like", tooltip="a new run with its scenario and other settings"),
@@ -73,8 +76,7 @@ class RunsScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         with Horizontal(id="body"):
-            with Vertical(id="list", classes="panel") as panel:
-                panel.border_title = "Runs"
+            with Framed("Runs", id="list", classes="panel"):
                 yield RunTable(id="table")
                 yield Static("reading ...", id="empty", markup=False)
                 yield Input(placeholder="a part of name, scenario, method or state", id="filter", compact=True)
@@ -143,7 +145,11 @@ class RunsScreen(Screen[None]):
     def _show_title(self) -> None:
         run = self._chosen
         width = self.query_one("#about").size.width or 30
-        self.query_one("#about", Static).update(Text("") if run is None else about(run, width))
+        words = Text("") if run is None else about(run, width) if self.size.width >= WIDE else in_few_lines(run)
+        self.query_one("#about", Static).update(words)
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._show_title)
 
     @property
     def _chosen(self) -> Recent | None:

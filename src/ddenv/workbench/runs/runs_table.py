@@ -14,6 +14,7 @@ from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.map.names import shortened
+from ddenv.words import first_of
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
@@ -43,6 +44,11 @@ class RunList(OptionList):
         self._folder = self._folder or RunsFolder(runs_folder())
         runs = self._folder.look(most=SHOWN)
         call_if_open(self, self._show, runs)
+
+    def on_focus(self) -> None:
+        """The cursor is on the newest run, so that enter opens something."""
+        if self.highlighted is None and self._runs:
+            self.highlighted = 0
 
     def on_resize(self) -> None:
         at = self.highlighted
@@ -85,6 +91,19 @@ def about(run: Recent, width: int) -> Text:
         text.append(f"  {shortened(plain(name), max(8, width - 2))}\n", "not bold")
     more = len(run.kept) - MOST_NAMES
     return text.append(f"  and {more} more\n" if more > 0 else "", "not bold dim")
+
+
+def in_few_lines(run: Recent) -> Text:
+    """What the table has no room for at 80 columns."""
+    text = Text(plain(run.path.stem), "bold")
+    said = run.trouble or "; ".join(part for part in (f"{run.sign} {run.state_words}", run.reason) if part)
+    text.append(f"\n{plain(said)}", "not bold")
+    if run.trouble:
+        return text
+    text.append(f"\n{plain(run.scenario)} by {plain(run.algorithm)}, {plain(run.pair)}", "not bold")
+    return text.append(
+        f"\nleft: {first_of([plain(name) for name in run.kept], MOST_NAMES)}" if run.kept else "", "not bold dim"
+    )
 
 
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.

@@ -30,6 +30,7 @@ def arrange(screen: SetupScreen, pane: str) -> None:
     screen.query_one("#choice").display = all or pane == "choose"
     screen.form.show_fields(all or pane == "settings")
     screen.form.set_class(not all and pane == "settings", "-alone")
+    screen.preview.set_class(not all and pane == "map", "-alone")
     screen.form.set_class(not all, "-frameless")
     panes = screen.query_one(Panes)
     panes.display = not all

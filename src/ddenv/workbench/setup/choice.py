@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +41,19 @@ class Choice:
     options: Mapping[str, Any] = field(default_factory=dict)
     missing: tuple[Missing, ...] = ()
 
+    @cached_property
+    def robot(self) -> Model:
+        """Raises UserError if its file cannot be read."""
+        from ddenv.runs.creation import read_parts
+        from ddenv.world.read import read_model
+
+        if not self.run:
+            return read_model(self.settings.robot.model, self.reading)
+        from ddenv.runfile.store import RunFile
+
+        with RunFile(self.path) as run:
+            return read_parts(run)[2]
+
     def check_remedies(self) -> None:
         """Raises UserError while a missing file has no remedy: its guess is shown, but only run with if the user takes it."""
         undecided = sum(not each.remedy for each in self.missing)
@@ -64,8 +78,15 @@ class Choice:
         if self.run:
             return f"{models} As in the run {plain(self.path.stem)}. {plain(self.settings.description)}"
         if self.scenario is not None:
-            return f"{models} {plain(self.scenario.description)}"
-        return f"{models} A world without a scenario: set the robot's spawn and goal, on the map or as numbers."
+            return f"{models} {plain(self.scenario.description)}{self._where}"
+        return f"{models} A world without a scenario: set the robot's spawn and goal, on the map or as numbers.{self._where}"
+
+    @property
+    def _where(self) -> str:
+        """The file, unless it is a bundled one: the list has only its name."""
+        from ddenv.world.load import SCENARIOS
+
+        return "" if self.path.parent == SCENARIOS else f" {plain(str(self.path))}"
 
     @property
     def _removable(self) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # The maximum number of runs to read, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
-UNKNOWN_TIME = "the time is known after the baseline"
+UNKNOWN_TIME = "no time known yet"
 
 
 @dataclass(frozen=True, slots=True)

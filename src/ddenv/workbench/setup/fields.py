@@ -21,6 +21,7 @@ from ddenv.schemas import Kind, names, uses
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
+from ddenv.workbench.setup.places import remembered_jobs
 from ddenv.workbench.widgets.entry import Entry
 from ddenv.workbench.wording import plain
 
@@ -111,8 +112,8 @@ class OptionsForm(Vertical):
         def can_replace(self, message: Message) -> bool:
             return isinstance(message, OptionsForm.Edited) and self.place >= message.place
 
-    def __init__(self, *, id: str, classes: str) -> None:
-        super().__init__(id=id, classes=classes)
+    def __init__(self, *, id: str) -> None:
+        super().__init__(id=id)
         self._name_given = False
         self._suggested = ""
         # What is wrong with the fields that are marked, by id, and what else is wrong.
@@ -141,8 +142,17 @@ class OptionsForm(Vertical):
         yield Static("", id="command", markup=False)
 
     def on_mount(self) -> None:
+        self.watch(self.screen, "focused", self._mark)
         self.query_one("#jobs", Input).value = _default_jobs()
         self.show_message("")
+
+    def _mark(self, focused: Widget | None) -> None:
+        """Marks the form while the focus is in it."""
+        within = focused is not None and self in focused.ancestors
+        if within != self.has_class("-within"):
+            # Its fields look the same with it.
+            self.set_class(within, "-within", update=False)
+            self.app.stylesheet.update_nodes([self])
 
     # The content.
 
@@ -194,6 +204,11 @@ class OptionsForm(Vertical):
             if isinstance(field, Input | Select) and str(field.value) != text:
                 field.value = text
         self._show_problems()
+
+    def forget_world(self) -> None:
+        """Empties what belonged to the world that was shown."""
+        self.suggest_name("")
+        self.set_texts({field.id: "" for field in form.PLACES})
 
     def show_fields(self, show: bool) -> None:
         """The whole form; without the settings only the cost, the command, the name and Start."""
@@ -254,12 +269,14 @@ class OptionsForm(Vertical):
 
     def show_cost(self, words: str) -> None:
         """Shows the tests and the time that the settings need."""
-        self.query_one("#cost", Static).update(Text(words, no_wrap=True, overflow="ellipsis"))
+        self.query_one("#cost", Static).update(Text(words))
 
     def tell_command(self, words: str, typed: bool = True) -> None:
         """Shows the command that does the same; if it is not `typed`, why there is none."""
-        line = Text("$ " if typed and words else "", "bold", no_wrap=True, overflow="ellipsis")
-        self.query_one("#command", Static).update(line.append(plain(words), "not bold"))
+        line = Text("$ " if typed and words else "", "bold")
+        command = self.query_one("#command", Static)
+        command.update(line.append(plain(words), "not bold"))
+        command.tooltip = plain(words) or None
 
     def complain(self, error: UserError) -> None:
         """Shows an error below the fields, until it is corrected; the wrong field is marked and gets the cursor."""
@@ -348,7 +365,7 @@ class OptionsForm(Vertical):
 
 
 def _default_jobs() -> str:
-    return str(processor.usable_cores())
+    return str(remembered_jobs() or processor.usable_cores())
 
 
 def _text(widget: Any) -> str:

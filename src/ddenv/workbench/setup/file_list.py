@@ -10,7 +10,7 @@ from textual.message import Message
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.workbench.setup.remembered import read_state, write_state
+from ddenv.runs.remembered import read_state, write_state
 from ddenv.workbench.wording import plain
 
 # The maximum number of recent files: in a longer list files are hard to find.

@@ -9,13 +9,13 @@ from rich.text import Text
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.message import Message
 from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ddenv.errors import UserError
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.remedies import Missing, remedy
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import count, plain
@@ -98,9 +98,7 @@ class AskRemedy(ModalScreen[str | None]):
         self._row = row
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "A remedy for a missing file"
-            dialog.border_subtitle = "enter takes it   escape cancels"
+        with Framed("A remedy for a missing file", "enter takes it   escape cancels"):
             yield Static(Text(plain(self._row.uri)), markup=False)
             yield Static(Text(f"now: {plain(self._row.words)}", "dim"), markup=False)
             yield PathEntry(self._row.remedy or "auto", id="remedy")

@@ -11,11 +11,11 @@ from rich.text import Text, TextType
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import DirectoryTree, Input, Static
 
 from ddenv.errors import shortened
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.file_list import is_file
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import plain
@@ -58,9 +58,9 @@ class OpenFile(ModalScreen[Path | None]):
         self._folder = folder
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Open a scenario (.yaml) or a world (.sdf, .world)"
-            dialog.border_subtitle = "tab completes   enter opens   escape cancels"
+        with Framed(
+            "Open a scenario (.yaml) or a world (.sdf, .world)", "tab completes   enter opens   escape cancels"
+        ):
             yield PathEntry(placeholder="path of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)
             yield WorldTree(self._folder, id="tree")

@@ -1,14 +1,16 @@
-"""Start and goal in worlds without a scenario, remembered by the world's file."""
+"""What the form remembers: start and goal in worlds without a scenario, by the world's file; and the number of jobs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
+from ddenv import processor
+from ddenv.runs.remembered import read_state, write_state
+from ddenv.settings import JOBS
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.remembered import read_state, write_state
 
-PLACES = "places.json"
+PLACES, JOBS_FILE = "places.json", "jobs.json"
 KEPT = 200  # worlds
 
 
@@ -27,6 +29,17 @@ def remember_places(world: Path, texts: Mapping[str, str]) -> None:
     others = {key: each for key, each in _known().items() if key != name}
     now = {name: {field.id: texts[field.id] for field in form.PLACES}}
     write_state(PLACES, dict(list((others | now).items())[-KEPT:]))
+
+
+def remembered_jobs() -> int | None:
+    """The number of jobs of the last run that was started here; None if it was the usual one."""
+    found = read_state(JOBS_FILE)
+    return found if type(found) is int and JOBS.allows(found) else None
+
+
+def remember_jobs(jobs: int) -> None:
+    """Remembers it, unless it is as many as this machine has cores for."""
+    write_state(JOBS_FILE, None if jobs == processor.usable_cores() else jobs)
 
 
 def _known() -> dict[str, object]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from ddenv.workbench.setup.file_list import remember
 from ddenv.workbench.setup.missing_list import MissingList
 from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.remedies import remember_remedies
+from ddenv.workbench.setup.start_notes import StartNotes
 from ddenv.workbench.wording import plain, shorten
 
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
@@ -76,6 +77,13 @@ class Preview(Vertical):
         """Whether the chosen world has no start yet."""
         return self.choice is not None and self.choice.scenario is None and self.picker.spawn is None
 
+    def show_places(self) -> None:
+        """Shows the form's start and goal, and what is wrong with the start."""
+        self.picker.show_places()
+        spawn = form.place("spawn", self.picker.form.texts)
+        known = bool(spawn) and all(map(math.isfinite, spawn or ()))
+        self.query_one(StartNotes).look(self.choice, spawn if known else None)
+
     def places_for(self, keep: bool) -> dict[str, str]:
         """Start and goal of a world without a scenario: as the last time, or as they are if the user wants to `keep` them."""
         texts = self.picker.form.texts
@@ -92,6 +100,7 @@ class Preview(Vertical):
         yield self.map
         yield self.missing
         yield self.picker
+        yield StartNotes(id="start-notes")
         yield About(id="about")
 
     def read(self, path: Path, *, opened: bool) -> None:
@@ -106,6 +115,7 @@ class Preview(Vertical):
         self.picker.pick("")
         self.query_one(About).show("")
         self.missing.show(())
+        self.query_one(StartNotes).look(None, None)
         self.map.set_place(Place(), why)
 
     def _choose(self, choice: Choice | None) -> None:
@@ -138,8 +148,7 @@ class Preview(Vertical):
             call_if_open(self, self.post_message, self.PastRead(choice, past))
 
     def _fail(self, why: str) -> None:
-        self._choose(None)
-        self.map.set_place(Place(), why)
+        self.show_nothing(why)
         self.post_message(self.Failed())
 
     def _show(self, choice: Choice, place: Place, name: str, again: bool) -> None:
@@ -231,11 +240,18 @@ class PlacePicker(Static):
             self._map.set_marks(self.spawn, self.goal)
             self._show_words()
 
+    def on_resize(self) -> None:
+        self._show_words()
+
     def _show_words(self) -> None:
+        """Where start and goal are, in the longest words that fit."""
         self.set_class(bool(self.picked_next), "-on")
         if self.picked_next:
             words = Text("▶ ", "bold", no_wrap=True, overflow="ellipsis").append(ASKS[self.picked_next])
             self.update(words.append("   escape stops", "dim"))
+            return
+        if self.choice is None:
+            self.update("")
             return
         spawn, goal = self.spawn, self.goal
         if spawn is None and goal is None and self.choice is not None and self.choice.scenario is None:
@@ -243,21 +259,20 @@ class PlacePicker(Static):
             self.update(words.append("s", "bold").append(" sets them on the map"))
             return
         heading = f"{arrow(spawn[2])} {math.degrees(spawn[2]):.0f}°" if spawn else "?"
-        text = Text(no_wrap=True, overflow="ellipsis")
-        for what, where in (("start", _point(spawn)), ("heading", heading), ("goal", _point(goal))):
-            text.append(KEYS[what], "bold").append(f" {what} {where}   ")
-        self.update(text)
+        where = {"start": _point(spawn), "heading": heading, "goal": _point(goal)}
+        forms = [_places(where, where), _places(where, ("start", "goal"), "  "), _places(where, (), "  ")]
+        self.update(next((form for form in forms if form.cell_len <= self.content_size.width), forms[-1]))
 
 
 class About(Static):
-    """A text of at most `max-height` lines; an ellipsis marks a longer text."""
+    """A text of at most `max-height` lines; an ellipsis marks a longer text, and the tooltip has all of it."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__("", id=id, markup=False)
         self._words = ""
 
     def show(self, words: str) -> None:
-        self._words = words
+        self._words, self.tooltip = words, words or None
         self.on_resize()
 
     def on_resize(self) -> None:
@@ -270,6 +285,16 @@ class About(Static):
         if len(last) + len(MORE) > width:
             last = last.rpartition(" ")[0]
         self.update(Text("\n".join([*shown, f"{last}{MORE}"])))
+
+
+def _places(where: Mapping[str, str], named: Collection[str], gap: str = "   ") -> Text:
+    """The keys that pick a place, with where it is; the `named` ones with what it is."""
+    text = Text(no_wrap=True, overflow="ellipsis")
+    for what, at in where.items():
+        text.append(gap if text else "").append(KEYS[what], "bold").append(
+            f" {what} {at}" if what in named else f" {at}"
+        )
+    return text
 
 
 def _metres(value: float) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
-from ddenv.workbench.setup.remembered import read_state, write_state
+from ddenv.runs.remembered import read_state, write_state
 
 if TYPE_CHECKING:
     from ddenv.world.model import World

@@ -9,12 +9,12 @@ from rich.text import Text
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import plain
 
@@ -88,9 +88,7 @@ class SaveScenario(ModalScreen[Path | None]):
         self._replace: Path | None = None
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Save as a scenario"
-            dialog.border_subtitle = "enter saves   escape cancels"
+        with Framed("Save as a scenario", "enter saves   escape cancels"):
             yield Static("A YAML file with all of these settings, for 'ddenv run' and for this list.", markup=False)
             yield PathEntry(_suggested(self._scenario.name), placeholder="name of a file", id="path")
             yield Static("", id="wrong", classes="wrong", markup=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from textual.binding import Binding, BindingType
+from textual.widget import Widget
 
 KEYS: list[BindingType] = [
     Binding("ctrl+s,f5", "start", "start", id="setup.start", tooltip="start the reduction", key_display="^s"),
@@ -47,3 +48,11 @@ KEYS: list[BindingType] = [
     Binding("escape", "home", "back", id="setup.home", tooltip="stop picking; back to the list of files", show=False),
     Binding("q", "app.leave", "quit", id="setup.quit", tooltip="leave"),
 ]
+# In the footer.
+SHOWN = tuple(each.id or "" for each in KEYS if isinstance(each, Binding) and each.show)
+
+
+def keys_at(focused: Widget | None) -> tuple[str, ...]:
+    """The ids of the keys in the footer: those of what has the focus come first."""
+    bindings = () if focused is None else Binding.make_bindings(focused.BINDINGS)
+    return (*dict.fromkeys(each.id for each in bindings if each.show and each.id), *SHOWN)

@@ -11,11 +11,15 @@ from rich.text import Text
 from textual import events, on, work
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
+from textual.reactive import Reactive
 from textual.screen import Screen
-from textual.widgets import Button, Footer, Input, OptionList, Static
+from textual.widget import Widget
+from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.workbench.background import call_if_open
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
@@ -25,15 +29,8 @@ from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
 from ddenv.workbench.setup.file_list import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
-from ddenv.workbench.setup.setup_keys import KEYS
-from ddenv.workbench.setup.start_run import (
-    NO_COMMAND,
-    NewRun,
-    Saved,
-    command_words,
-    create,
-    run_file,
-)
+from ddenv.workbench.setup.setup_keys import KEYS, SHOWN, keys_at
+from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
 from ddenv.workbench.widgets.panes import Panes
 from ddenv.workbench.wording import plain
 
@@ -57,18 +54,24 @@ class SetupScreen(Screen[None]):
     ]
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low"), (ROOMY[1], "-tall"), (VAST[1], "-high")]
     BINDINGS = KEYS
+    # As on the run screen, the widgets draw what the focus changes.
+    focused: Reactive[Widget | None] = Reactive(None, repaint=False)
 
     def __init__(
-        self, reading: Mapping[str, Any] | None = None, like: Path | None = None, file: Path | None = None
+        self,
+        reading: Mapping[str, Any] | None = None,
+        like: Path | None = None,
+        file: Path | None = None,
+        classes: str = "",
     ) -> None:
-        """`reading` holds the command line's options for reading worlds.
+        """`reading` holds the command line's options for reading worlds. `classes` fit the size.
 
         The form starts with the settings of the run `like`, or of the scenario or world `file`.
         """
-        super().__init__()
+        super().__init__(classes=classes)
         self._reading = reading or {}
         self._like, self._file = like, file
-        self.form = OptionsForm(id="options", classes="panel")
+        self.form = OptionsForm(id="options")
         self.preview = Preview(self.form, self._reading, id="preview")
         # Whether the choice is still being read, as is the first file when the screen opens.
         self._awaited = True
@@ -86,17 +89,13 @@ class SetupScreen(Screen[None]):
             yield Panes(PANES, id="panes")
         with Horizontal(id="body"):
             with Vertical(id="choice"):
-                with Vertical(id="scenarios", classes="panel") as panel:
-                    panel.border_title = "Scenarios and worlds"
-                    panel.border_subtitle = "^o opens a file"
+                with Framed("Scenarios and worlds", "^o opens a file", id="scenarios", classes="panel"):
                     yield FileList(id="scenario-list")
-                with Vertical(id="runs", classes="panel") as panel:
-                    panel.border_title = "Recent runs"
-                    panel.border_subtitle = "enter opens"
+                with Framed("Recent runs", "enter opens", id="runs", classes="panel"):
                     yield RunList(id="run-list")
             yield self.preview
         yield self.form
-        yield Footer(compact=True, show_command_palette=False)
+        yield KeyFooter(SHOWN, SHOWN, lambda: keys_at(self.focused))
         yield Static("", id="small", markup=False)
 
     def on_mount(self) -> None:
@@ -172,10 +171,12 @@ class SetupScreen(Screen[None]):
     def _cannot_be_read(self) -> None:
         self._awaited = False
         self.form.show_message("")
+        self.form.forget_world()
+        self._show_outcome()
 
     @on(Preview.Read)
     def _was_read(self, event: Preview.Read) -> None:
-        choice, picker = event.choice, self.preview.picker
+        choice = event.choice
         if choice is not self.preview.choice:
             return
         self._awaited = False
@@ -183,13 +184,13 @@ class SetupScreen(Screen[None]):
         self.form.show_message("")
         self.form.suggest_name(event.free_name)
         if event.again:
-            picker.show_places()
+            self.preview.show_places()
             self._show_outcome()
             return
         placed = choice.scenario is not None
         places = None if placed else self.preview.places_for(self._keep_places)
         self.form.show_settings(choice.settings, places)
-        picker.show_places()
+        self.preview.show_places()
         if self.preview.asks and choice.path == self._opened_now:
             self.action_pick("start")
 
@@ -224,18 +225,18 @@ class SetupScreen(Screen[None]):
     @on(OptionsForm.Edited)
     def _edited(self, event: OptionsForm.Edited) -> None:
         if event.place:
-            self.preview.picker.show_places()
+            self.preview.show_places()
         self._show_outcome()
 
     def _show_outcome(self) -> None:
         """Shows the cost and the command for the form, or its error."""
         self.workers.cancel_group(self, "cost")
         cost, words, typed = "", "", True
-        if self.preview.choice is not None:
+        if self.preview.choice is not None or not self._awaited:
             try:
                 scenario, command = self._scenario(), self._command()
                 words, typed = shlex.join(command) or NO_COMMAND, bool(command)
-                self._reckon(scenario, self.preview.choice.models, form.jobs(self.form.texts["jobs"]), self._past)
+                self._reckon(scenario, self._chosen().models, form.jobs(self.form.texts["jobs"]), self._past)
             except UserError as error:
                 cost = f"not ready: {error}"
         if cost or not words:
@@ -263,7 +264,7 @@ class SetupScreen(Screen[None]):
             return self.preview.choice
         if self._awaited:
             raise UserError("the world is still being read: try again in a moment")
-        raise UserError("choose a scenario or a world that can be read first")
+        raise UserError("choose a scenario or a world that can be read")
 
     def _command(self) -> list[str]:
         """The words of the command that does the same, empty if there is none. Raises UserError."""
@@ -308,7 +309,13 @@ class SetupScreen(Screen[None]):
         self.preview.remember_places()
         self._busy = True
         self.form.show_message("checking ...")
-        self._create(new, only_baseline)
+        ask_trust(self.app, new, lambda yes: self._answered(yes, new, only_baseline))
+
+    def _answered(self, trusts: bool, new: NewRun, only_baseline: bool) -> None:
+        if trusts:
+            self._create(new, only_baseline)
+        else:
+            self._complain(UserError("not started: it needs a program that you do not trust"))
 
     @work(thread=True, group="start", exclusive=True)
     def _create(self, new: NewRun, only_baseline: bool) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from textual.app import App
 
 from ddenv.errors import UserError
 from ddenv.workbench.run.processes import Engine
@@ -13,6 +15,7 @@ from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.equivalent_command import command, source_of
 from ddenv.workbench.setup.file_list import remember
+from ddenv.workbench.setup.places import remember_jobs
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -39,6 +42,16 @@ class Saved:
     scenario: Scenario
 
 
+def ask_trust(app: App[Any], new: NewRun, then: Callable[[bool], None]) -> None:
+    """Calls `then` with whether what the run starts is trusted. A run file is never the user's own: somebody may have sent it."""
+    from ddenv.runs.trust import trust_own
+    from ddenv.workbench.widgets.trust_question import once_trusted
+
+    if not new.choice.run:
+        trust_own(new.scenario, new.choice.path)
+    once_trusted(app, new.scenario, new.choice.path, then)
+
+
 def create(new: NewRun, only_baseline: bool) -> Engine:
     """Writes the run file and starts its engine. Raises UserError."""
     from ddenv.runs.creation import create_like, create_run
@@ -50,6 +63,7 @@ def create(new: NewRun, only_baseline: bool) -> Engine:
         create_run(new.scenario, new.path)
         remember(new.choice.path)
     engine.start(new.jobs, new.accept_mode)
+    remember_jobs(new.jobs)
     if only_baseline:
         _pause_after_baseline(new.path)
     return engine

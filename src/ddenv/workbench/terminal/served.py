@@ -1,8 +1,13 @@
-"""The workbench in a browser: textual-serve starts one for each page, only on this machine's own address."""
+"""The workbench in a browser: textual-serve starts one for each page, only on this machine's own address.
+
+The address has a token, so that other users of this machine cannot act as this one.
+"""
 
 from __future__ import annotations
 
 import getpass
+import hmac
+import secrets
 import shlex
 import socket
 import sys
@@ -10,12 +15,19 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
+from ddenv.page.policy import of_scripts, policy
 
 HOST = "127.0.0.1"
+TOKEN_BYTES = 16
+# textual-serve's own page fetches fonts from elsewhere.
+PAGE = Path(__file__).with_name("served_page")
+
+# The page's own, in pixels.
+FONT_SIZE = 16
 
 
-def serve(port: int, run: str | None = None) -> None:
-    """Serves until interrupted; each page has its own workbench, attached to `run` if given.
+def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None:
+    """Serves until interrupted; each page has its own workbench, attached to `run` if given, in letters of `font_size` pixels.
 
     Raises UserError if textual-serve is not installed, the port is taken, or the run does not exist.
     """
@@ -30,52 +42,81 @@ def serve(port: int, run: str | None = None) -> None:
         words += ["open", str(_existing(find_run(run)))]
     _check_free(port)
 
+    token = secrets.token_urlsafe(TOKEN_BYTES)
+
     class Guarded(Server):
         """Answers only requests of its own pages, and prints only ddenv's lines."""
 
         async def _make_app(self) -> Any:
-            app = await super()._make_app()
-            app.middlewares.append(guard(port))
+            from aiohttp import web
+
+            app = web.Application(middlewares=[guard(port, token)])
+            app.add_subapp(f"/{token}", await super()._make_app())
             return app
 
         async def on_startup(self, app: Any) -> None:
-            print("\n".join(address_lines(port)), flush=True)
+            print("\n".join(address_lines(port, token, font_size)), flush=True)
 
         def initialize_logging(self) -> None:
             """Requests are not logged."""
 
-    Guarded(shlex.join(words), host=HOST, port=port, title="ddenv").serve()
+    Guarded(shlex.join(words), host=HOST, port=port, title="ddenv", templates_path=PAGE).serve()
 
 
-def address_lines(port: int) -> list[str]:
+def address_lines(port: int, token: str, font_size: int = FONT_SIZE) -> list[str]:
     """The address, and who can use it."""
+    size = "" if font_size == FONT_SIZE else f"?fontsize={font_size}"
     return [
-        f"The workbench is at http://{HOST}:{port} (ctrl+c ends it).",
-        f"Any user of this machine who opens that address acts as {getpass.getuser()}: the workbench can read, write and "
-        "start programs in your name.",
+        f"The workbench is at http://{HOST}:{port}/{token}/{size} (ctrl+c ends it).",
+        f"Whoever has that address acts as {getpass.getuser()} on this machine: the workbench can read, write and start "
+        "programs in your name.",
         "Other machines cannot reach it. From yours, type there first:",
         f"  ssh -L {port}:{HOST}:{port} {getpass.getuser()}@{socket.gethostname()}",
     ]
 
 
-def guard(port: int) -> Any:
-    """Refuses requests of other web pages in a browser on this machine."""
+def guard(port: int, token: str) -> Any:
+    """Refuses requests without the token, and those of other web pages in a browser on this machine."""
     from aiohttp import web
 
     own = {f"{host}:{port}" for host in (HOST, "localhost")}
+    sources = " ".join(f"ws://{host}" for host in sorted(own))
 
     @web.middleware
     async def only_own(request: Any, handler: Any) -> Any:
         origin = request.headers.get("Origin")
+        given = request.path.encode().split(b"/")[1]
+        if not hmac.compare_digest(given, token.encode()):
+            raise web.HTTPForbidden(
+                text="the address of this workbench has a token; take all of it from 'ddenv serve'\n"
+            )
         if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
-            raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself")
+            raise web.HTTPForbidden(text=f"open http://{HOST}:{port} itself\n")
         response = await handler(request)
         if not response.prepared:
             # Other pages must not show it in a frame to catch clicks.
             response.headers["X-Frame-Options"] = "DENY"
+            response.headers["Referrer-Policy"] = "no-referrer"
+            response.headers["Content-Security-Policy"] = _policy(response, sources)
         return response
 
     return only_own
+
+
+def _policy(response: Any, sources: str) -> str:
+    """What a page may load and run: the terminal of textual-serve, and the connection to the workbench."""
+    text = response.text if response.content_type == "text/html" and hasattr(response, "text") else ""
+    return policy(
+        {
+            "script-src": f"'self' {of_scripts(text or '')}".strip(),
+            # The terminal writes the style of each cell.
+            "style-src": "'self' 'unsafe-inline'",
+            "font-src": "'self'",
+            "img-src": "'self' data:",
+            "connect-src": f"'self' {sources}",
+            "frame-ancestors": "'none'",
+        }
+    )
 
 
 def _existing(run: Path) -> Path:

@@ -22,7 +22,10 @@ def changed_lines(before: Text, now: Text, width: int) -> list[Region]:
 
 
 class Lines(ScrollView, can_focus=True):
-    """One line for each item, made by `line(item, width)` when it becomes visible. With `tail` the last ones are shown."""
+    """One line for each item, made by `line(item, width)` when it becomes visible. With `tail` the last ones are shown.
+
+    With `parts` an item takes several lines: `parts(item, width)` are what `line` is called with.
+    """
 
     class Clicked(Message):
         """A line was clicked; `item` is what it shows."""
@@ -36,12 +39,21 @@ class Lines(ScrollView, can_focus=True):
             return self.lines
 
     def __init__(
-        self, line: Callable[[Any, int], Text], *, nothing: str = "", tail: bool = False, id: str | None = None
+        self,
+        line: Callable[[Any, int], Text],
+        *,
+        nothing: str = "",
+        tail: bool = False,
+        parts: Callable[[Any, int], Sequence[Any]] | None = None,
+        id: str | None = None,
     ) -> None:
         """`nothing` is shown when there are no items."""
         super().__init__(id=id)
-        self._line, self._nothing, self._tail = line, nothing, tail
+        self._line, self._nothing, self._tail, self._parts = line, nothing, tail, parts
         self._items: Sequence[Any] = ()
+        # What each line is made of, and how many columns the items were taken apart for.
+        self._rows: Sequence[Any] = ()
+        self._columns = 0
 
     @property
     def items(self) -> Sequence[Any]:
@@ -50,18 +62,35 @@ class Lines(ScrollView, can_focus=True):
     def show(self, items: Sequence[Any]) -> None:
         """Other items."""
         at_end = self.scroll_offset.y >= self.max_scroll_y
-        self._items = items
+        before, self._items = self._items, items
         if not self.size.width:
             # Not visible: the screen needs no new layout for each line.
+            self._columns = 0
             return
-        self.virtual_size = Size(0, len(items))
+        self._take_apart(before)
+        self.virtual_size = Size(0, len(self._rows))
         if self._tail and at_end and self.is_attached:
             # Forced: the first line that does not fit has no scroll bar yet.
             self.scroll_end(animate=False, immediate=True, force=True)
         self.refresh()
 
+    def _take_apart(self, before: Sequence[Any]) -> None:
+        """Makes the rows; only those of new items where the ones `before` are still the first."""
+        if self._parts is None:
+            self._rows = self._items
+            return
+        # The scroll bar may come and go.
+        columns = max(1, self.size.width - self.styles.scrollbar_size_vertical)
+        known = len(before)
+        goes_on = columns == self._columns and known <= len(self._items) and known > 0
+        goes_on = goes_on and before[0] is self._items[0] and before[-1] is self._items[known - 1]
+        new = self._items[known:] if goes_on else self._items
+        rows = [row for item in new for row in self._parts(item, columns)]
+        self._rows, self._columns = [*self._rows, *rows] if goes_on else rows, columns
+
     def on_resize(self) -> None:
-        self.virtual_size = Size(0, len(self._items))
+        self._take_apart(())
+        self.virtual_size = Size(0, len(self._rows))
         if self._tail:
             self.scroll_end(animate=False, force=True)
 
@@ -71,14 +100,14 @@ class Lines(ScrollView, can_focus=True):
 
     def on_click(self, event: events.Click) -> None:
         place = int(event.y + self.scroll_offset.y)
-        if 0 <= place < len(self._items):
-            self.post_message(self.Clicked(self, self._items[place]))
+        if 0 <= place < len(self._rows):
+            self.post_message(self.Clicked(self, self._rows[place]))
 
     def render_line(self, y: int) -> Strip:
         width, base = self.scrollable_content_region.width, self.rich_style
         place = y + self.scroll_offset.y
-        if 0 <= place < len(self._items):
-            text = self._line(self._items[place], width)
+        if 0 <= place < len(self._rows):
+            text = self._line(self._rows[place], width)
         elif place == 0:
             text = Text(self._nothing, "dim")
         else:

@@ -7,9 +7,11 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical
+from textual.containers import Horizontal
 from textual.screen import ModalScreen
 from textual.widgets import Button, Static
+
+from ddenv.workbench.help.hints import Framed
 
 
 class Question(ModalScreen[bool]):
@@ -32,9 +34,7 @@ class Question(ModalScreen[bool]):
         self._text, self._final = text, final
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="dialog") as dialog:
-            dialog.border_title = "Sure?"
-            dialog.border_subtitle = "y yes   n no"
+        with Framed("Sure?", "y yes   n no"):
             yield Static(Text(self._text), markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Yes", id="yes", variant="primary")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ddenv.learn.score import Score, data_of, score_of
-from ddenv.workbench.setup.remembered import read_state, write_state
+from ddenv.runs.remembered import read_state, write_state
 
 FILE = "lessons.json"
 

@@ -1,4 +1,4 @@
-"""What the workbench remembers from one time to the next, in files of its own."""
+"""What this machine remembers from one time to the next, in files of its own."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ddenv.errors import UserError
 
 
 def state_file(name: str) -> Path:
-    """The path of what the workbench remembers: in `$DDENV_HOME`, or in the user's state folder."""
+    """The path of what is remembered: in `$DDENV_HOME`, or in the user's state folder."""
     import platformdirs
 
     home = os.environ.get("DDENV_HOME")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.world.files.access import read_bytes
@@ -16,17 +17,38 @@ OUTCOMES = ("similar", "other", "pass")
 MOST_MODELS = 14
 
 
+@dataclass(frozen=True, slots=True)
+class RecordedRound:
+    """The parts of a round that an algorithm made, and the labels of the candidates that it tested, such as "without A"."""
+
+    parts: tuple[tuple[str, ...], ...]
+    tested: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Oracle:
-    """`outcomes` of the sets of `models` that do not end `otherwise`; every other set does."""
+    """`outcomes` of the sets of `models` that do not end `otherwise`; every other set does.
+
+    `rates` of f, 0..1, are of sets where luck decides; elsewhere it is 0.
+    `rounds` is what algorithms did in this world, by their names.
+    """
 
     models: tuple[str, ...]
     outcomes: dict[frozenset[str], str]
     otherwise: str
+    rates: dict[frozenset[str], float] = field(default_factory=dict)
+    rounds: Mapping[str, tuple[RecordedRound, ...]] = field(default_factory=dict)
 
     def outcome(self, kept: Iterable[str]) -> str:
         """How a test with these models ends: one of `OUTCOMES`."""
         return self.outcomes.get(frozenset(kept), self.otherwise)
+
+    def rate(self, kept: Iterable[str]) -> float:
+        """How often f shows with these models, 0..1. Raises UserError for a model that the world does not have."""
+        there = frozenset(kept)
+        if unknown := there.difference(self.models):
+            raise UserError(f"the oracle's world has no model '{min(unknown)}'")
+        return self.rates.get(there, 1.0 if self.outcome(there) == "similar" else 0.0)
 
     @cached_property
     def showing(self) -> frozenset[frozenset[str]]:
@@ -40,6 +62,11 @@ class Oracle:
         ordered = (tuple(name for name in self.models if name in kept) for kept in found)
         return tuple(sorted(ordered, key=lambda kept: (len(kept), kept)))
 
+    def could_go(self, kept: Iterable[str]) -> tuple[str, ...]:
+        """The models of `kept` that can each be left out alone: f still shows."""
+        there = frozenset(kept)
+        return tuple(name for name in self.models if name in there and there - {name} in self.showing)
+
 
 def read_oracle(path: Path) -> Oracle:
     """The oracle in a JSON file. Raises UserError if it is not one."""
@@ -48,12 +75,20 @@ def read_oracle(path: Path) -> Oracle:
         models = tuple(map(str, data["models"]))
         outcomes = {frozenset(key.split()): str(value) for key, value in data["outcomes"].items()}
         otherwise = str(data["otherwise"])
+        rates = {frozenset(key.split()): float(value) for key, value in data.get("rates", {}).items()}
+        rounds = {str(name): tuple(map(_round, each)) for name, each in data.get("plays", {}).items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise UserError(f"{path}: is not an oracle; expected models, outcomes and otherwise") from None
     if len(models) > MOST_MODELS or len(set(models)) != len(models):
         raise UserError(f"{path}: models: expected up to {MOST_MODELS} different names")
     if not {*outcomes.values(), otherwise}.issubset(OUTCOMES) or otherwise == "similar":
         raise UserError(f"{path}: outcomes: expected {', '.join(OUTCOMES)}")
-    if not frozenset().union(*outcomes).issubset(models):
+    if not all(0 <= rate <= 1 for rate in rates.values()):
+        raise UserError(f"{path}: rates: expected numbers from 0 to 1")
+    if not frozenset().union(*outcomes, *rates).issubset(models):
         raise UserError(f"{path}: outcomes: a set has a model that is not among the models")
-    return Oracle(models, outcomes, otherwise)
+    return Oracle(models, outcomes, otherwise, rates, rounds)
+
+
+def _round(data: Any) -> RecordedRound:
+    return RecordedRound(tuple(tuple(part.split()) for part in data["parts"]), tuple(map(str, data["tested"])))

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
+from ddenv.learn.attempt import Attempt, in_one_sentence
 from ddenv.learn.foretelling import Foretelling, at_hand, foretelling
 from ddenv.learn.lesson import Answer, Question
+from ddenv.learn.lesson import Step as LessonStep
 from ddenv.learn.markup import Block, blocks
+from ddenv.learn.plays import Play
+from ddenv.learn.race import bet, result
 from ddenv.learn.score import Score, summary
 from ddenv.learn.shelf import Opened
 from ddenv.runfile.position import Position, Step
@@ -16,7 +21,13 @@ FREE = (
     "Step through the run: forward, back, to the next decision, to the next reduction. The marked line of the algorithm acts; "
     "the variables have the values of this moment. Press `p` to predict what comes next."
 )
+LATER = "The race to come shows how the algorithms do."
 LETTERS = "abcdef"
+DUE = {
+    "try": "Press `enter` to search yourself, or `s` to skip it.",
+    "race": "Press `enter` to watch the race, or `s` to skip it.",
+}
+Activity = Literal["try", "race"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +42,16 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None while it is open."""
+    """What the student reads. `chosen` is the place of the given answer, -1 if it was skipped, None while it is open.
+
+    `after` comes below the question: what there is to do, or what came of it.
+    """
 
     text: tuple[Block, ...]
     question: Question | None = None
     chosen: int | None = None
     hint: bool = False
+    after: tuple[Block, ...] = ()
 
     @property
     def remarks(self) -> tuple[tuple[str, str], ...]:
@@ -61,6 +76,10 @@ class Course:
         self._asked: Asked | None = None
         self._chosen: int | None = None
         self._hint = False
+        # Whether the step has something to do that was neither done nor skipped.
+        self.due = False
+        # The question of the step, with its answer, and where the run was, while a prediction stands in its place.
+        self._own: tuple[Asked | None, int | None, bool, int] | None = None
         position.go(position.ids[0])
         if opened is None:
             position.step("moment", 1)
@@ -81,14 +100,42 @@ class Course:
     def page(self) -> Page:
         """What is shown beside the run."""
         question = None if self._asked is None else self._asked.question
-        return Page(blocks(self._text()), question, self._chosen, self._hint)
+        return Page(blocks(self._text()), question, self._chosen, self._hint, blocks(self._after()))
 
     def _text(self) -> str:
         if self._opened is None:
             return FREE
         if self.step == self.last:
-            return "\n\n".join(summary(self._opened.lesson, self.score))
+            return "\n\n".join((*summary(self._opened.lesson, self.score), *self._searches()))
         return self._said(self._opened.lesson.steps[self.step].text)
+
+    def _searches(self) -> Iterator[str]:
+        """What came of the student's own searches, in sentences."""
+        if self._opened is None:
+            return
+        for number, step in enumerate(self._opened.lesson.steps):
+            attempt = self._opened.attempt(step, self.score.moves.get(str(number), ()))
+            if attempt is not None and attempt.ended:
+                yield f"Your own search: {in_one_sentence(attempt.oracle, self.plays, attempt)}"
+
+    def _after(self) -> str:
+        here, activity = self.here, self.activity
+        if activity is None or here is None or self._opened is None or self.is_open:
+            return ""
+        if self.due:
+            return DUE[activity]
+        if activity == "race":
+            return " ".join(result(self._opened.racers(here)))
+        attempt = self.attempt
+        if attempt is None or not attempt.ended:
+            return "Your search is not finished: `t` goes on with it."
+        later = "" if self.plays or not self._opened.plays else f" {LATER}"
+        return f"**{attempt.verdict}**\n\n{in_one_sentence(attempt.oracle, self.plays, attempt)}{later}"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a question waits for its answer."""
+        return self._asked is not None and self._chosen is None
 
     def _said(self, words: str) -> str:
         if self._opened is None:
@@ -98,8 +145,13 @@ class Course:
     # Moves in the lesson.
 
     def go_on(self) -> bool:
-        """To what comes next. False at the end, or while a question is open that should be answered or skipped."""
-        if self._asked is not None and self._chosen is None:
+        """To what comes next. False at the end, or while something is open that should be answered, done or skipped."""
+        if self.is_open:
+            return False
+        if self._own is not None and (self._asked is None or self._asked.then is None):
+            self._return()
+            return True
+        if self.due:
             return False
         if self._asked is not None and self._asked.then is not None:
             self._asked, self._chosen, self._hint = Asked(f"{self._asked.key}.reason", self._asked.then), None, False
@@ -113,25 +165,37 @@ class Course:
         return True
 
     def back(self) -> bool:
-        """To the step before; False at the first one."""
+        """To the step before, or from a prediction to its step; False at the first one."""
+        if self._own is not None:
+            self._return()
+            return True
         if self.step == 0:
             return False
         self._come(self.step - 1)
         return True
+
+    def _return(self) -> None:
+        """From a prediction back to the step, as it was."""
+        assert self._own is not None
+        (self._asked, self._chosen, self._hint, at), self._own = self._own, None
+        self.position.go(at)
 
     def answer(self, place: int) -> Answer | None:
         """Gives an answer; None if no question is open or it has no such answer."""
         if self._asked is None or self._chosen is not None or not 0 <= place < len(self._asked.question.answers):
             return None
         answer = self._asked.question.answers[place]
-        self.score = self.score.with_answer(self._asked.key, answer)
+        # A lesson counts its own questions.
+        if self._own is None:
+            self.score = self.score.with_answer(self._asked.key, answer)
         self._settle(place)
         return answer
 
     def skip(self) -> bool:
-        """Shows the answer of an open question without a score; False if none is open."""
+        """Shows the answer of an open question without a score, or passes over what there is to do; False if there is nothing."""
         if self._asked is None or self._chosen is not None:
-            return False
+            skipped, self.due = self.due, False
+            return skipped
         # A skipped prediction has no reason to give.
         self._asked = replace(self._asked, then=None)
         self._settle(-1)
@@ -150,7 +214,7 @@ class Course:
             self.position.go(self._asked.until)
 
     def _come(self, step: int) -> None:
-        self.step, self._asked, self._chosen, self._hint = step, None, None, False
+        self.step, self._asked, self._chosen, self._hint, self.due, self._own = step, None, None, False, False, None
         self.score = self.score.at(step, self.last)
         if self._opened is None or step == self.last:
             return
@@ -162,6 +226,51 @@ class Course:
             found = foretelling(self.position, self._opened.places[step], here.foretell)
             if found is not None:
                 self._asked = _asked(str(step), found)
+        elif here.race:
+            self.due, self._asked = True, Asked(str(step), bet(self._opened.racers(here)))
+        elif (attempt := self.attempt) is not None:
+            self.due = not attempt.ended
+
+    # What there is to do.
+
+    @property
+    def here(self) -> LessonStep | None:
+        """The step of the lesson; None at the end, or in a free walk."""
+        return None if self._opened is None or self.step == self.last else self._opened.lesson.steps[self.step]
+
+    @property
+    def activity(self) -> Activity | None:
+        """What there is to do in this step."""
+        here = self.here
+        return None if here is None else "race" if here.race else "try" if here.budget else None
+
+    @property
+    def attempt(self) -> Attempt | None:
+        """The student's own search in this step, where it was left."""
+        if self._opened is None or self.here is None:
+            return None
+        return self._opened.attempt(self.here, self.score.moves.get(str(self.step), ()))
+
+    @property
+    def plays(self) -> tuple[Play, ...]:
+        """The searches that the student's own is compared with: none that races later, before the student's bet on that race."""
+        if self._opened is None:
+            return ()
+        steps = list(enumerate(self._opened.lesson.steps))[self.step :]
+        secret = {name for number, step in steps if str(number) not in self.score.answered for name in step.race}
+        return tuple(play for name, play in self._opened.plays.items() if name not in secret)
+
+    def keep(self, attempt: Attempt) -> None:
+        """After a move of the student's own search. The first search that ends counts."""
+        self.score = self.score.with_moves(str(self.step), attempt.moves)
+        if attempt.ended:
+            found = attempt.found and len(attempt.tried) <= attempt.budget
+            self.score = self.score.with_answer(str(self.step), Answer("", found, ""))
+            self.due = False
+
+    def watched(self) -> None:
+        """After a race."""
+        self.due = False
 
     # Moves in the run.
 
@@ -173,8 +282,17 @@ class Course:
             self._asked, self._chosen, self._hint = None, None, False
         return True
 
+    @property
+    def must_answer(self) -> bool:
+        """Whether the question of the lesson's step waits: no prediction takes its place."""
+        return self._opened is not None and self._own is None and self.is_open
+
     def foretell(self) -> bool:
-        """Asks for a prediction of what comes next in the run; False if nothing is left to foretell."""
+        """Asks for a prediction of what comes next in the run; False if nothing is left to foretell.
+
+        In a lesson it counts for nothing, and going on leads back to the step.
+        """
+        before = self._asked, self._chosen, self._hint, self.at
         for id in self._ahead():
             moment = self.position.moment(id)
             what = None if moment is None else at_hand(moment)
@@ -182,6 +300,8 @@ class Course:
             if found is not None:
                 self.position.go(id)
                 self._asked, self._chosen, self._hint = _asked(f"free.{id}", found), None, False
+                if self._opened is not None:
+                    self._own = self._own or before
                 return True
         return False
 

@@ -1,0 +1,133 @@
+"""How much sooner a reduction ends with more workers, and how many tests that costs: the real engine, tests that take no time.
+
+python benchmarks/cluster.py [--models 200] [--workers 1,8,64,512]
+
+Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the engine itself
+takes is real, and shown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import random
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ddenv.engine.__main__ import _begin
+from ddenv.engine.bench import Bench
+from ddenv.engine.control import Control
+from ddenv.engine.driver import Driver
+from ddenv.engine.journal import Journal
+from ddenv.engine.worker import Start
+from ddenv.robot.result import RunResult
+from ddenv.robot.settled import Settled
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run, read_parts
+from ddenv.runs.scenarios import scenario_for_world
+
+SHORTEST, LONGEST = 20.0, 60.0  # s
+NEEDED = 3
+BOX = """<model name="box_{0}"><static>true</static><pose>{1} {2} 0.5 0 0 0</pose><link name="link">
+<collision name="c"><geometry><box><size>0.4 0.4 1</size></box></geometry></collision></link></model>"""
+GROUND = """<model name="ground_plane"><static>true</static><link name="link"><collision name="c"><geometry><plane>
+<normal>0 0 1</normal><size>500 500</size></plane></geometry></collision></link></model>"""
+
+
+def world(folder: Path, models: int) -> Path:
+    """A field of boxes, none at the start of the robot."""
+    side = round(models**0.5) + 1
+    boxes = (BOX.format(number, 2 * (number % side) + 3, 2 * (number // side) - side) for number in range(models))
+    path = folder / f"boxes-{models}.sdf"
+    path.write_text(f'<sdf version="1.9"><world name="boxes">{GROUND}{"".join(boxes)}</world></sdf>')
+    return path
+
+
+class Simulated:
+    """Stands for a pool: the test that ends first ends, and the clock is set to that."""
+
+    def __init__(self, workers: int, needed: frozenset[str]) -> None:
+        self.workers, self.needed = workers, needed
+        self.clock, self.made, self.busy_for = 0.0, 0, 0.0
+        self.running: list[tuple[float, int, bool, int]] = []
+
+    @property
+    def idle(self) -> int:
+        return self.workers - len(self.running)
+
+    @property
+    def busy(self) -> int:
+        return len(self.running)
+
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
+        takes = random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST)
+        self.made, self.busy_for = self.made + 1, self.busy_for + takes
+        heapq.heappush(self.running, (self.clock + takes, test, self.needed <= keep, seed))
+
+    def finished(self, seconds: float) -> list[tuple[int, RunResult]]:
+        if not self.running:
+            return []
+        self.clock, test, fails, seed = heapq.heappop(self.running)
+        rows = np.zeros((2, 8))
+        rows[:, 4], rows[1, :2] = 1, (1, 2 if fails else 4)
+        return [(test, RunResult("failed" if fails else "pass", "stuck" if fails else "", rows, {}, 1.0, 0.01, seed))]
+
+    def settle(self, elements: frozenset[str]):
+        return lambda: Start([], Settled())
+
+    def live(self) -> list:
+        return []
+
+    def paces(self) -> list:
+        return []
+
+
+def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int]:
+    """A reduction with so many workers: its pool, the real s that it took, and how many models are left."""
+    path = folder / f"{models}-{workers}.ddenv"
+    create_run(scenario_for_world(world(folder, models), (0, 0, 0.2, 0), (100, 0)), path)
+    chosen = random.Random(1).sample(range(models), NEEDED)
+    pool, began = Simulated(workers, frozenset(f"box_{number}" for number in chosen)), time.perf_counter()
+    with RunFile(path) as file:
+        scenario, parsed, _ = read_parts(file)
+        file.own()
+        journal = Journal(file)
+        _begin(journal, workers, None)
+        control = Control(journal, threading.Event(), time.time())
+        Driver(scenario, parsed, journal, Bench(journal, pool, control), control).reduce()
+        return pool, time.perf_counter() - began, len(journal.state.environment)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--models", type=int, default=200)
+    parser.add_argument("--workers", default="1,8,64,512")
+    options = parser.parse_args()
+    print("| workers | tests | more than with one | simulated h | times as fast | busy | engine, ms a test |")
+    print("|---|---|---|---|---|---|---|")
+    first: Simulated | None = None
+    with tempfile.TemporaryDirectory() as folder:
+        for workers in map(int, options.workers.split(",")):
+            pool, real, left = reduce(Path(folder), options.models, workers)
+            assert left == NEEDED, left
+            first = first or pool
+            row = (
+                f"{workers}",
+                f"{pool.made}",
+                f"{pool.made / first.made - 1:.0%}",
+                f"{pool.clock / 3600:.2f}",
+                f"{first.clock / pool.clock:.1f}",
+                f"{pool.busy_for / (pool.clock * workers):.0%}",
+                f"{1000 * real / pool.made:.0f}",
+            )
+            print(f"| {' | '.join(row)} |")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""Asks whether a program that a scenario or a run brings along may start."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ddenv.errors import printable
+
+if TYPE_CHECKING:
+    from ddenv.world.scenario import Scenario
+
+
+def allow(scenario: Scenario, where: Path | str, trust: bool) -> None:
+    """Returns if what `scenario` starts is trusted; asks on a terminal, unless `trust` says yes. Raises UserError if it is not."""
+    from ddenv.runs.trust import check_trusted, is_trusted, program_of
+    from ddenv.runs.trust import trust as remember
+
+    program = program_of(scenario)
+    if program is None or is_trusted(program):
+        return
+    if trust or _says_yes(f"{where} starts {program.words}. Do you trust it?"):
+        remember(program)
+    check_trusted(scenario, where)
+
+
+def _says_yes(question: str) -> bool:
+    asks = sys.stdin.isatty() and sys.stderr.isatty()
+    return asks and click.confirm(printable(question), err=True)
+
+
+def allow_named(scenario: Scenario, name: str, trust: bool) -> None:
+    """As `allow`, for a scenario that the user named: a file of the user's own is trusted."""
+    from ddenv.runs.trust import trust_own
+
+    trust_own(scenario, Path(name))
+    allow(scenario, name, trust)
+
+
+def allow_run(path: Path, trust: bool, cluster: str | None = None) -> None:
+    """As `allow`, for a run file; the user has typed another `cluster`, if any. Raises UserError for a damaged one, too."""
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.clusters import check_cluster, made_here
+    from ddenv.runs.creation import read_scenario
+
+    with RunFile(path) as file:
+        scenario = read_scenario(file)
+    check_cluster(cluster or scenario.reduction.cluster)
+    allow(made_here(scenario) if cluster else scenario, path, trust)

@@ -1,0 +1,1 @@
+"""What is well and what is not: this installation, this machine, and one run file."""

@@ -1,0 +1,144 @@
+"""Checks of the installation, the terminal, the machine and the folder of runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import locale
+import math
+import os
+import platform
+import shutil
+import socket
+import sqlite3
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ddenv import processor
+from ddenv.amounts import count
+from ddenv.doctor.finding import Finding
+from ddenv.runs.folder import SUFFIX, runs_folder
+from ddenv.version import __version__
+
+# By the names that packages are installed as, with the module that shows that they are there.
+NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
+OPTIONAL = {"textual-serve": ("textual_serve", "only 'ddenv serve' needs it: pip install 'ddenv[serve]'")}
+SMALLEST = (80, 24)
+# Less free space or memory than this is worth a line, bytes.
+LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000
+
+
+def installation() -> Iterator[Finding]:
+    """What is installed."""
+    yield Finding("installation", "ddenv", f"{__version__}, {Path(__file__).parents[1]}")
+    yield Finding("installation", "Python", f"{platform.python_version()}, {sys.executable}")
+    for name, module in NEEDED.items():
+        if importlib.util.find_spec(module) is not None:
+            yield Finding("installation", name, _version(name))
+        elif name == "drake" and sys.platform == "win32":
+            yield Finding("installation", name, "not for Windows: runs can be viewed here, not made", "note")
+        else:
+            yield Finding("installation", name, "not installed", "wrong", f"pip install {name}")
+    yield Finding("installation", "SQLite", sqlite3.sqlite_version)
+    for name, (module, why) in OPTIONAL.items():
+        there = importlib.util.find_spec(module) is not None
+        yield Finding("installation", name, _version(name) if there else f"not installed; {why}")
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "of unknown version"
+
+
+def terminal() -> Iterator[Finding]:
+    """What the workbench would be drawn on."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        yield Finding("terminal", "terminal", "none: input or output is no terminal; 'ddenv run' works without one")
+    else:
+        columns, lines = shutil.get_terminal_size()
+        small = columns < SMALLEST[0] or lines < SMALLEST[1]
+        advice = f"the workbench is made for {SMALLEST[0]} by {SMALLEST[1]} and more" if small else ""
+        yield Finding("terminal", "size", f"{columns} columns, {lines} lines", "note" if small else "ok", advice)
+    yield Finding("terminal", "colours", _colors())
+    encoding = locale.getpreferredencoding(False)
+    told = encoding.lower().replace("-", "") == "utf8"
+    yield Finding("terminal", "letters", encoding, "ok" if told else "note", "" if told else "export LANG=C.UTF-8")
+    ways = [
+        words
+        for name, words in (("SSH_CONNECTION", "ssh"), ("TMUX", "tmux"), ("STY", "screen"))
+        if os.environ.get(name)
+    ]
+    yield Finding("terminal", "by way of", ", ".join(ways) or "this machine's own")
+
+
+def _colors() -> str:
+    term = os.environ.get("TERM") or "unset"
+    if os.environ.get("NO_COLOR"):
+        return f"none, as NO_COLOR asks; TERM is {term}"
+    if os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit"):
+        return f"16 million; TERM is {term}"
+    return f"{256 if '256' in term else 16 if term not in ('unset', 'dumb') else 'none'}; TERM is {term}"
+
+
+def machine(ports: Mapping[str, int]) -> Iterator[Finding]:
+    """What may be used of the machine; `ports` are those that programs of ddenv begin with, by what they are for."""
+    cores, all_cores = processor.usable_cores(), os.cpu_count() or 1
+    yield Finding("machine", "cores", f"{cores} of {all_cores} may be used; {processor.name()}")
+    yield _memory()
+    for use, port in ports.items():
+        free = _is_free(port)
+        says = f"{port} on 127.0.0.1 is {'free' if free else 'in use; another one is taken'}"
+        yield Finding("machine", f"port, {use}", says)
+    yield _space("temporary files", Path(tempfile.gettempdir()), "machine")
+
+
+def _memory() -> Finding:
+    usable, free = processor.usable_memory(), processor.free_memory()
+    if not math.isfinite(usable + free):
+        return Finding("machine", "memory", "unknown")
+    says = f"{usable / 1e9:.1f} GB may be used, {free / 1e9:.1f} GB are free"
+    if free >= LITTLE_MEMORY:
+        return Finding("machine", "memory", says)
+    return Finding("machine", "memory", says, "note", "fewer tests at the same time: --jobs 1")
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def runs() -> Iterator[Finding]:
+    """Where runs are kept."""
+    folder = runs_folder()
+    there = len(list(folder.glob(f"*{SUFFIX}"))) if folder.is_dir() else 0
+    yield Finding("runs", "folder", f"{folder}, {count(there, 'run')}")
+    nearest = next(each for each in (folder, *folder.parents) if each.exists())
+    yield _space("room", nearest, "runs")
+
+
+def _space(what: str, folder: Path, group: str) -> Finding:
+    """Whether files can be made in a folder, and how much room there is."""
+    free = shutil.disk_usage(folder).free
+    says = f"{free / 1e9:.1f} GB free in {folder}"
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"room")
+    except OSError as error:
+        return Finding(
+            group,
+            what,
+            f"{folder} cannot be written: {error.strerror}",
+            "wrong",
+            "another folder, in DDENV_HOME or TMPDIR",
+        )
+    little = free < LITTLE_SPACE
+    return Finding(group, what, says, "note" if little else "ok", "a run needs up to some hundred MB" if little else "")

@@ -1,0 +1,183 @@
+"""Checks of one run file, and its repair into a copy. The file itself is never written, nor is anything made beside it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ddenv.amounts import count
+from ddenv.doctor.finding import Finding
+from ddenv.errors import UserError
+from ddenv.runfile.integrity import Whole, faults, rescue, whole
+from ddenv.runfile.lock import engine_is_alive, mode_beside
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import read_parts
+from ddenv.runs.programs import last_words
+from ddenv.version import __version__
+
+GROUP = "run"
+
+
+def run_health(path: Path) -> list[Finding]:
+    """What is well and what is not with a run. Raises UserError if there is no such file."""
+    alive = engine_is_alive(path)
+    found = [_file(path), _log(path, alive)]
+    try:
+        with _opened(path) as file:
+            return [*found, *_content(file, path, alive)]
+    except UserError as error:
+        if not path.is_file():
+            raise
+        return [*found, Finding(GROUP, "content", _without(str(error)), "wrong", _repair(path))]
+
+
+def repair(path: Path, copy: Path) -> list[Finding]:
+    """Writes all that is whole of a run to `copy`. Raises UserError if that is nothing, or if `copy` cannot be written."""
+    with _most(path) as file:
+        if trouble := _parts(file):
+            raise UserError(f"{path}: nothing can be repaired: {trouble}")
+        found = rescue(file, copy)
+    words = f"{count(found.events, 'event')}, {count(len(found.state.finished_tests), 'test')}"
+    if not found.trouble:
+        return [Finding("copy", "copy", f"{copy}: whole, {words}")]
+    again = f"ddenv resume {copy} makes the rest again"
+    return [Finding("copy", "copy", f"{copy}: {words}; what came after them is lost: {found.trouble}", "note", again)]
+
+
+@contextmanager
+def _opened(path: Path, with_log: bool = True) -> Iterator[RunFile]:
+    """The run to be read: a copy of it, if a log of an engine that is gone belongs to it."""
+    log = path.with_name(f"{path.name}-wal")
+    if engine_is_alive(path):
+        with RunFile(path) as file:
+            yield file
+    elif not with_log or not log.exists() or not log.stat().st_size:
+        with RunFile(path, untouched=True) as file:
+            yield file
+    else:
+        with tempfile.TemporaryDirectory(prefix="ddenv-doctor-") as folder:
+            for each in (path, log):
+                shutil.copyfile(each, Path(folder) / each.name)
+            with RunFile(Path(folder) / path.name) as file:
+                yield file
+
+
+@contextmanager
+def _most(path: Path) -> Iterator[RunFile]:
+    """The run with its log or without it: the log of another file damages it."""
+    logged = path.with_name(f"{path.name}-wal").exists() and not engine_is_alive(path)
+    if not logged:
+        with _opened(path) as file:
+            yield file
+        return
+    counts = {}
+    for with_log in (True, False):
+        try:
+            with _opened(path, with_log) as file:
+                counts[with_log] = whole(file).events
+        except UserError:
+            if not path.is_file():
+                raise
+    if not any(counts.values()):
+        raise UserError(f"{path}: nothing can be repaired: neither with its log nor without it is an event whole")
+    with _opened(path, max(counts, key=lambda each: counts[each])) as file:
+        yield file
+
+
+def _file(path: Path) -> Finding:
+    if not path.is_file():
+        raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
+    says = f"{path}, {path.stat().st_size / 1e6:.1f} MB"
+    if mode_beside(path) & 0o022:
+        return Finding(GROUP, "file", f"{says}; others can write it", "note", f"chmod go-w {path}")
+    return Finding(
+        GROUP, "file", f"{says}; {'others can read it' if mode_beside(path) & 0o044 else 'only you can read it'}"
+    )
+
+
+def _log(path: Path, alive: bool) -> Finding:
+    log = path.with_name(f"{path.name}-wal")
+    size = log.stat().st_size if log.exists() else 0
+    if not size:
+        return Finding(GROUP, "log", "none: the run is one file")
+    says = f"{log.name}, {size / 1e6:.1f} MB"
+    if alive:
+        return Finding(GROUP, "log", f"{says}: a copy of the run needs it", "ok", "")
+    return Finding(
+        GROUP,
+        "log",
+        f"{says}: left by a killed engine, and part of the run",
+        "note",
+        "keep it beside the run; opening the run merges it",
+    )
+
+
+def _content(file: RunFile, path: Path, alive: bool) -> Iterator[Finding]:
+    found = faults(file)
+    yield Finding(GROUP, "SQLite", "; ".join(found) or "sound", *(("wrong", _repair(path)) if found else ()))
+    read = whole(file)
+    words = f"{count(read.events, 'event')}, {count(len(read.state.finished_tests), 'test')}"
+    if read.trouble:
+        yield Finding(GROUP, "events", f"{words} are whole; then: {read.trouble}", "wrong", _repair(path))
+    else:
+        yield Finding(GROUP, "events", words)
+    trouble = _parts(file)
+    yield Finding(
+        GROUP, "world", trouble or "can be read, with the scenario and the robot", "wrong" if trouble else "ok"
+    )
+    if read.bare:
+        says = f"{read.bare} of {count(len(read.state.finished_tests), 'test')} have none, and cannot be shown"
+        yield Finding(GROUP, "trajectories", says, "note")
+    yield from _made_with(read)
+    yield _engine(read, path, alive)
+
+
+def _parts(file: RunFile) -> str:
+    """What is wrong with the scenario, the world or the robot of a run; "" if all can be read."""
+    try:
+        read_parts(file)
+    except UserError as error:
+        return _without(str(error))
+    return ""
+
+
+def _made_with(read: Whole) -> Iterator[Finding]:
+    now = read.state.physics.now
+    if not now:
+        yield Finding(GROUP, "made with", "nothing yet")
+        return
+    other = read.state.engine_version not in ("", __version__)
+    advice = f"this is ddenv {__version__}: 'ddenv resume' first compares the bits" if other else ""
+    yield Finding(GROUP, "made with", now, "note" if other else "ok", advice)
+    for each in read.state.physics.mixed:
+        yield Finding(GROUP, "mixed", each, "note")
+
+
+def _engine(read: Whole, path: Path, alive: bool) -> Finding:
+    state = read.state
+    if alive:
+        return Finding(
+            GROUP,
+            "engine",
+            "waits for room on the disk" if state.needs_room else "at work",
+            "note" if state.needs_room else "ok",
+        )
+    if state.ended:
+        return Finding(GROUP, "engine", f"{state.status}: {state.reason}")
+    if state.status == "created":
+        return Finding(GROUP, "engine", "none has worked on it yet")
+    says = _without(last_words(path)).partition("; go on with")[0]
+    return Finding(GROUP, "engine", f"none is at work: {says}", "note", f"ddenv resume {path}")
+
+
+def _repair(path: Path) -> str:
+    return f"ddenv doctor {path} --repair COPY"
+
+
+def _without(words: str) -> str:
+    """What is wrong, without the name of the file: it may be that of a copy."""
+    head, separator, rest = words.partition(": ")
+    return rest if separator and "/" in head else words

@@ -1,0 +1,203 @@
+"""What runs inside a Dask worker: it makes tests as the engine does here, each in a child process that keeps the simulator.
+
+Dask cannot end a test that hangs, so the child is one of `Pool`: it has a limit of real time, and is replaced when it dies.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import platform
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from distributed import Worker, get_worker
+
+from ddenv.engine.pool import Broken, Pool
+from ddenv.engine.shared import machine, simulator
+from ddenv.robot.result import RunResult
+from ddenv.version import __version__
+from ddenv.world.command import command_words
+from ddenv.world.model import Model, World
+from ddenv.world.scenario import Scenario
+
+# How long to wait for a test before looking whether it is still wanted, s.
+LOOK = 0.2
+# The time between two reports of a running test, s.
+PERIOD = 0.5
+# A child that nobody has used for so long ends, s: its engine may have been killed.
+UNUSED = 600.0
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a test needs. They are sent once to each worker, as bytes."""
+
+    scenario: Scenario
+    world: World
+    robot: Model
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A test to make in the world of `run`, whose progress goes to `topic`. `limit` as in `Pool.submit`."""
+
+    run: str
+    topic: str
+    test: int
+    keep: frozenset[str]
+    seed: int
+    full: bool
+    limit: float | None
+
+
+@dataclass(frozen=True)
+class Hello:
+    """Who a worker is, and what it computes with."""
+
+    host: str
+    pid: int
+    version: str
+    simulator: str
+    machine: str
+
+
+class NotWanted(Exception):
+    """Nobody waits for the test any more."""
+
+
+class NotGreeted(Exception):
+    """The engine has not compared the bits of this process, which has the address of an earlier one."""
+
+
+# The topics of the engines that this process has greeted.
+_engines: set[str] = set()
+
+
+def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]:
+    """A worker's hello, and the test by which its bits are compared; none in a simulator of the user's own.
+
+    Raises UserError where that cannot be started.
+    """
+    _engines.add(asked.topic)
+    hello = Hello(platform.node(), os.getpid(), __version__, simulator(), machine())
+    if hello.version != asked_version(asked.run):
+        return hello, None
+    known: Parts = pickle.loads(parts)
+    if known.scenario.oracle is not None:
+        command_words(known.scenario)
+        return hello, None
+    return hello, make(parts, asked)
+
+
+def asked_version(run: str) -> str:
+    """The engine's version of ddenv, from its name of the run: another one may understand nothing else."""
+    return run.partition(" ")[0]
+
+
+def make(parts: bytes, asked: Asked) -> RunResult | Broken:
+    """Makes a test in a child process. Raises UserError if the world cannot be simulated, NotWanted, and NotGreeted."""
+    if asked.topic not in _engines:
+        raise NotGreeted
+    worker = get_worker()
+    key = worker.get_current_task()
+    with _child(parts, asked.run) as child:
+        child.submit(asked.test, asked.keep, asked.seed, asked.full, asked.limit)
+        due = 0.0
+        while not (ended := child.finished(LOOK)):
+            if not _is_wanted(worker, key):
+                raise NotWanted(key)
+            if time.monotonic() > due:
+                due = time.monotonic() + PERIOD
+                _report(worker, child, asked)
+    return ended[0][1]
+
+
+def _is_wanted(worker: Worker, key: Any) -> bool:
+    """Whether the scheduler still has this worker make the task: Dask itself never stops one that runs."""
+    task = worker.state.tasks.get(key)
+    return task is not None and task.state == "executing"
+
+
+def _report(worker: Worker, child: Pool, asked: Asked) -> None:
+    for live, pace in zip(child.live(), child.paces(), strict=False):
+        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "real": pace.real}
+        worker.log_event(asked.topic, row)
+
+
+@dataclass(frozen=True)
+class _Idle:
+    run: str
+    child: Pool
+    since: float
+
+
+_idle: list[_Idle] = []
+_lock = threading.Lock()
+_watched = False
+
+
+@contextmanager
+def _child(parts: bytes, run: str) -> Iterator[Pool]:
+    """A child process for `run`, kept for the next test unless this one goes wrong."""
+    child = _taken(run) or _new(parts)
+    try:
+        yield child
+    except BaseException:
+        child.close()
+        raise
+    with _lock:
+        _idle.append(_Idle(run, child, time.monotonic()))
+
+
+def _taken(run: str) -> Pool | None:
+    """An idle child of `run`. Those of other runs end where there is none: a worker has memory for one a thread."""
+    with _lock:
+        own = [each for each in _idle if each.run == run]
+        if own:
+            _idle.remove(own[-1])
+            return own[-1].child
+        others = _idle[:1]
+        del _idle[:1]
+    for other in others:
+        other.child.close()
+    return None
+
+
+def _new(parts: bytes) -> Pool:
+    global _watched
+    with _lock:
+        if not _watched:
+            _watched = True
+            threading.Thread(target=_end_unused, daemon=True).start()
+    # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
+    known: Parts = pickle.loads(parts)
+    return Pool(known.scenario, known.world, known.robot, 1, at_a_time=get_worker().state.nthreads)
+
+
+def _end_unused() -> None:
+    while True:
+        time.sleep(UNUSED / 10)
+        with _lock:
+            old = [each for each in _idle if time.monotonic() - each.since > UNUSED]
+            for each in old:
+                _idle.remove(each)
+        for each in old:
+            each.child.close()
+
+
+def forget(run: str) -> None:
+    """Ends the idle children of `run`."""
+    with _lock:
+        own = [each for each in _idle if each.run == run]
+        for each in own:
+            _idle.remove(each)
+    for each in own:
+        # This is the thread in which the worker talks with the scheduler.
+        threading.Thread(target=each.child.close).start()

@@ -1,0 +1,236 @@
+"""The figures in a lesson's texts: `{names}` from a closed set, over the recorded runs. Nothing is ever computed from a text.
+
+`{without NAME}` and `{verdict on NAME}` are a certificate's claim about a model. `{rate of NAME, NAME}` is the rate that an oracle
+knows, `{chance of NAME, NAME}` the chance that one of a candidate's runs shows f. `{OTHER.name}` is a figure of a run beside the
+lesson's own.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from ddenv import claims
+from ddenv.amounts import first_of, percent
+from ddenv.errors import UserError
+from ddenv.learn.recorded_oracle import Oracle
+from ddenv.rates import miss_chance, wilson_interval
+from ddenv.runfile.events import deed
+from ddenv.runfile.progress import Certificate, Claim, Node
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import FRESH, RunState
+from ddenv.schemas import nearest
+from ddenv.took_part import slice_words
+
+# Terms that contain a digit.
+TERMS = ("1-minimal", "Algorithm 1", "(1 − rate)")
+_FIGURE = re.compile(r"\{([^{}]*)\}")
+_NAMED = 8
+
+
+def _left_percent(state: RunState) -> str:
+    return f"{100 - round(100 * len(state.environment) / max(1, len(state.elements)))} %"
+
+
+def _search_tests(state: RunState) -> int:
+    return sum(test.phase == "round" and test.is_finished for test in state.tests)
+
+
+def _certificate(state: RunState) -> Certificate | None:
+    """The last finished certificate, also one of an environment that the run has left since."""
+    return next((each for each in reversed(state.certificates) if each.claims), None)
+
+
+def _fresh(state: RunState) -> str:
+    found = _certificate(state)
+    return "no fresh run" if found is None else claims.rate(found.claims[0])
+
+
+def _fresh_whole(state: RunState) -> str:
+    """How often f showed in the whole world, in the runs of the same certificate."""
+    found = _certificate(state)
+    first = 0 if found is None else found.first_run
+    whole = [test for test in state.tests if test.phase in FRESH and test.run >= first and test.node == 0]
+    outcomes = [test.outcome for test in whole if test.without is None and test.outcome in ("similar", "other", "pass")]
+    if not outcomes:
+        return "no fresh run"
+    shown, runs = outcomes.count("similar"), len(outcomes)
+    return claims.rate(Claim(None, "", shown, runs, *wilson_interval(shown, runs)))
+
+
+def _error(state: RunState) -> str:
+    found = _certificate(state)
+    return "" if found is None else f"{math.ceil(1000 * found.error) / 10:g} %"
+
+
+def _of_baseline(state: RunState, name: str) -> str:
+    return "" if state.baseline is None else percent(getattr(state.baseline, name))
+
+
+def _first_slice(state: RunState) -> Node | None:
+    return next((node for node in state.nodes if node.how == "sliced"), None)
+
+
+def _sliced(state: RunState) -> int:
+    """How many models the first slice left."""
+    node = _first_slice(state)
+    return len(state.elements if node is None else node.environment)
+
+
+def _slice(state: RunState) -> str:
+    node = _first_slice(state)
+    return "nothing was left out without a test" if node is None else slice_words(state, node)
+
+
+# Over the whole run, from its end.
+OF_RUN: dict[str, Callable[[RunState], object]] = {
+    "models": lambda state: len(state.elements),
+    "left": lambda state: len(state.environment),
+    "smaller": _left_percent,
+    "kept": lambda state: first_of(list(state.environment), _NAMED),
+    "tests": lambda state: state.tests_done,
+    "baseline_tests": lambda state: sum(test.phase == "baseline" for test in state.tests),
+    "search_tests": _search_tests,
+    "fresh_tests": lambda state: sum(test.phase == "certify" for test in state.tests),
+    "reruns": lambda state: state.deflake_runs,
+    "rounds": lambda state: state.rounds_done,
+    "reductions": lambda state: sum(node.how == "reduced" for node in state.nodes),
+    "failed_runs": lambda state: 0 if state.baseline is None else state.baseline.failures,
+    "baseline_runs": lambda state: 0 if state.baseline is None else state.baseline.runs,
+    "iterations": lambda state: settings(state).iterations,
+    "timeout": lambda state: f"{settings(state).timeout:g} s",
+    "epsilon": lambda state: f"{settings(state).epsilon:g} m",
+    "failure": lambda state: deed(state.failure),
+    "pair": lambda state: settings(state).pair,
+    "runs_each": lambda state: 1 + settings(state).iterations,
+    "rate": lambda state: _of_baseline(state, "rate"),
+    "rate_low": lambda state: _of_baseline(state, "low"),
+    "rate_high": lambda state: _of_baseline(state, "high"),
+    "miss_chance": lambda state: (
+        "" if state.baseline is None else percent(miss_chance(state.baseline.rate, settings(state).iterations))
+    ),
+    "keep_rate": lambda state: percent(settings(state).keep_rate),
+    "certificates": lambda state: sum(bool(each.claims) for each in state.certificates),
+    "fresh": _fresh,
+    "fresh_whole": _fresh_whole,
+    "error": _error,
+    "reason": lambda state: f"{state.reason[:1].upper()}{state.reason[1:]}",
+    "sliced": _sliced,
+    "slice": _slice,
+    "implied": lambda state: state.implied,
+    "audits": lambda state: state.audits,
+    "audit": lambda state: settings(state).audit,
+    "subsets": lambda state: f"{2 ** len(state.elements):,}" if len(state.elements) < 30 else "countless",
+}
+# At the place of the step.
+HERE: dict[str, Callable[[RunState], object]] = {
+    "here_models": lambda state: len(state.environment),
+    "here_tests": lambda state: state.tests_done,
+    "here_round": lambda state: 0 if state.round is None else state.round.number,
+    "here_n": lambda state: 0 if state.round is None else state.round.n_partitions,
+    "here_parts": lambda state: 0 if state.round is None else len(state.round.partitions),
+    "here_candidates": lambda state: 0 if state.round is None else len(state.round.candidates),
+    "here_kept": lambda state: first_of(list(state.environment), _NAMED),
+    "here_fresh": _fresh,
+    "here_fresh_whole": _fresh_whole,
+}
+# From the oracle that knows every part of the world.
+OF_ORACLE: dict[str, Callable[[Oracle], object]] = {
+    "failing": lambda oracle: len(oracle.showing),
+    "minimal_sets": lambda oracle: len(oracle.minimal),
+    "smallest": lambda oracle: min(map(len, oracle.minimal), default=0),
+    "smallest_set": lambda oracle: ", ".join(oracle.minimal[0] if oracle.minimal else ()),
+}
+
+
+# The rates that the oracle knows: of the whole world, at the place of the step, and at the run's end.
+TRUE_RATES = ("whole_rate", "here_rate", "end_rate")
+# Figures about one model, or about a set of them.
+_ABOUT_CLAIM = re.compile(r"(without|verdict on) (\S.*)")
+_BESIDE = re.compile(r"([\w-]+)\.(.+)")
+_OF_SET = re.compile(r"(rate|chance) of (\S.*)")
+
+
+def names() -> tuple[str, ...]:
+    """All names that a text may have between braces."""
+    return (*OF_RUN, *HERE, *OF_ORACLE, *TRUE_RATES)
+
+
+def named(text: str) -> Iterator[str]:
+    """The names between braces in a text."""
+    return iter(_FIGURE.findall(text))
+
+
+def check(text: str) -> None:
+    """Raises UserError if `text` has a digit of its own, or a name that is not known."""
+    for name in named(text):
+        other, bare = _parts(name)
+        about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
+        if bare not in (OF_RUN if other else names()) and not about:
+            raise UserError(f"unknown figure '{{{name}}}'{nearest(name, names())}; known are {', '.join(names())}")
+    bare = _FIGURE.sub("", text)
+    for term in TERMS:
+        bare = bare.replace(term, "")
+    if found := re.search(r"\S*\d\S*", bare):
+        raise UserError(f"'{found[0]}' is a bare figure; write one of the {{names}}, so that it stays true")
+    if found := re.search(r"[{}]", bare):
+        raise UserError(f"a single '{found[0]}'; figures are {{names}} between braces")
+
+
+def _parts(name: str) -> tuple[str, str]:
+    """The run beside the lesson's own that a name is about, or "", and the rest."""
+    found = _BESIDE.fullmatch(name)
+    return (found[1], found[2]) if found else ("", name)
+
+
+def filled(text: str, value: Callable[[str], str]) -> str:
+    """`text` with its figures: `value` says what a name stands for."""
+    return _FIGURE.sub(lambda found: value(found[1]), text)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What names stand for in a step: `end` is the state at the run's end, `here` at the step's place, `others` have the ends of
+    other runs by name.
+    """
+
+    end: RunState
+    here: RunState
+    oracle: Oracle | None = None
+    others: Mapping[str, RunState] = field(default_factory=dict)
+
+    def __call__(self, name: str) -> str:
+        """Raises UserError where the run or the oracle does not know it."""
+        other, bare = _parts(name)
+        if other and other not in self.others:
+            raise UserError(
+                f"{{{name}}}: the lesson has no run '{other}' beside its own; give it under the key 'beside'"
+            )
+        end = self.others[other] if other else self.end
+        if bare in OF_RUN:
+            return str(OF_RUN[bare](end))
+        if bare in HERE:
+            return str(HERE[bare](self.here))
+        if about := _ABOUT_CLAIM.fullmatch(bare):
+            claim = _claim(end, about[2])
+            return claims.rate(claim) if about[1] == "without" else claims.short(claim)
+        if self.oracle is None:
+            raise UserError(f"{{{name}}} needs an oracle; give the key 'oracle'")
+        if bare in TRUE_RATES:
+            sets = (self.end.elements, self.here.environment, self.end.environment)
+            return percent(self.oracle.rate(sets[TRUE_RATES.index(bare)]))
+        if of_set := _OF_SET.fullmatch(bare):
+            rate = self.oracle.rate(of_set[2].split(", "))
+            return percent(rate if of_set[1] == "rate" else 1 - miss_chance(rate, settings(self.end).iterations))
+        return str(OF_ORACLE[bare](self.oracle))
+
+
+def _claim(state: RunState, model: str) -> Claim:
+    """The last certificate's claim about a model."""
+    certificate = _certificate(state)
+    found = next((each for each in certificate.claims if each.without == model), None) if certificate else None
+    if found is None:
+        raise UserError(f"{{without {model}}}: the last certificate says nothing about '{model}'")
+    return found

@@ -1,0 +1,76 @@
+"""Places in a run by words: `start`, `baseline`, `round 2`, `test 5`, `result 5`, `reduction 1`, `certificate 1` ..."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from ddenv.errors import UserError
+from ddenv.runfile.position import Position
+from ddenv.runfile.store import Event
+
+ALONE = ("start", "baseline", "end")
+COUNTED = ("round", "test", "result", "verdict", "reduction", "certificate", "claims", "back")
+EXPECTED = f"expected {', '.join((*ALONE[:-1], *(f'{word} N' for word in COUNTED)))} or {ALONE[-1]}"
+_WORDS = re.compile(rf"({'|'.join(ALONE)})|({'|'.join(COUNTED)}) (\d{{1,6}})")
+# Of these events each is a place of its own.
+_EACH = {"certificate_finished": "claims", "rate_lost": "back"}
+_Found = dict[tuple[str, int], int]
+
+
+class Places:
+    """Finds the events of a run by the words of a lesson."""
+
+    def __init__(self, position: Position, events: Sequence[Event]) -> None:
+        """`events` are all of those that the position was made of."""
+        found = _of_tests(events) | _of_run(events)
+        for chapter in position.chapters:
+            if chapter.kind != "baseline":
+                found[chapter.kind, chapter.number] = chapter.first
+        for number, id in enumerate(position.stops("reduction"), 1):
+            found["reduction", number] = id
+        found["end", 0] = position.end.revision
+        self._found = found
+
+    def event(self, words: str) -> int:
+        """The event that `words` name. Raises UserError."""
+        found = _WORDS.fullmatch(words.strip())
+        if found is None:
+            raise UserError(f"'{words[:40]}' is no place in a run; {EXPECTED}")
+        key = (found[1], 0) if found[1] else (found[2], int(found[3]))
+        if key not in self._found:
+            most = max((number for kind, number in self._found if kind == key[0]), default=0)
+            raise UserError(f"the run has no {words.strip()}{f'; the last one is {key[0]} {most}' if most else ''}")
+        return self._found[key]
+
+
+def _of_tests(events: Sequence[Event]) -> _Found:
+    """Where each test begins and ends, and where its candidate is judged after it."""
+    found: _Found = {}
+    tests = ended = 0
+    for event in events:
+        if event.kind in ("test_started", "implied"):
+            tests += 1
+            found["test", tests] = event.id
+        if event.kind in ("test_finished", "implied"):
+            ended = tests if event.kind == "implied" else int(event.data["test"])
+            found["result", ended] = event.id
+        elif event.kind == "candidate_judged":
+            # A later candidate may be judged at once, by what is known.
+            found.setdefault(("verdict", ended), event.id)
+    return found
+
+
+def _of_run(events: Sequence[Event]) -> _Found:
+    found: _Found = {}
+    numbers: Counter[str] = Counter()
+    for event in events:
+        if word := _EACH.get(event.kind):
+            numbers[word] += 1
+            found[word, numbers[word]] = event.id
+        elif event.kind == "baseline_finished":
+            found["baseline", 0] = event.id
+        elif event.kind == "engine_started":
+            found.setdefault(("start", 0), event.id)
+    return found

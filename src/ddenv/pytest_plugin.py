@@ -1,0 +1,38 @@
+"""A fixture for pytest: minimal worlds as regression tests.
+
+def test_the_robot_no_longer_gets_stuck_at_the_corner(ddenv_reproduce):
+    assert ddenv_reproduce("corner.ddenv").fails is False
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from ddenv.engine.reproducing import Reproduction
+
+Reproduce = Callable[..., "Reproduction"]
+
+
+@pytest.fixture
+def ddenv_reproduce(request: pytest.FixtureRequest) -> Reproduce:
+    """Runs what a run file has left until it is known whether it still fails at the rate of its certificate.
+
+    `ddenv_reproduce(run, folder=None, most=60, trust=False)`: `run` is a path, relative to the test's folder; `folder` has the
+    user's own controller or simulator, by default that of the run's scenario; with `trust` it is started unasked. The result has
+    `fails` (None: the runs do not say), `shown`, `runs` and `broken`; printed, it says the same in words. Raises UserError.
+    """
+
+    def reproduce(
+        run: str | Path, folder: str | Path | None = None, most: int = 60, trust: bool = False
+    ) -> Reproduction:
+        from ddenv.engine.reproducing import last_of
+
+        here = request.path.parent
+        return last_of(here / run, None if folder is None else here / folder, most, 1, trust)
+
+    return reproduce

@@ -1,0 +1,149 @@
+"""What is wrong with a run file, and a copy of all that is whole."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runfile.events import moment
+from ddenv.runfile.fold import apply
+from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.store import Event, Motions, RunFile, create
+
+# How many faults SQLite lists.
+MOST_FAULTS = 3
+
+
+@dataclass(frozen=True)
+class Whole:
+    """The events of a run file that make sense, from the first one on; `trouble` says what is wrong with the next, "" if none is.
+
+    `events` counts them, `state` is what they come to. So many of the tests are `bare`: they have no trajectory, as in a recorded
+    run that was made small.
+    """
+
+    events: int
+    state: RunState
+    trouble: str
+    bare: int
+
+
+def faults(file: RunFile) -> list[str]:
+    """What SQLite finds wrong with the file; nothing if it is sound."""
+    try:
+        with closing(_connected(file)) as db:
+            rows = db.execute(f"PRAGMA integrity_check({MOST_FAULTS})").fetchall()
+    except sqlite3.Error as error:
+        return [str(error)]
+    return [] if rows == [("ok",)] else [" ".join(str(words).split()) for (words,) in rows]
+
+
+def whole(file: RunFile) -> Whole:
+    """How much of the run can be used."""
+    return _read(file, lambda _: None)
+
+
+def _read(file: RunFile, keep: Callable[[Event], None]) -> Whole:
+    """Calls `keep` with each event that makes sense, up to the first one that does not."""
+    state, count, bare, trouble = RunState(), 0, 0, ""
+    try:
+        for event in _events(file):
+            state = apply(state, event)
+            bare += _is_bare(file, event)
+            keep(event)
+            count += 1
+    except UserError as error:
+        trouble = str(error).removeprefix(f"{file.path}: ")
+    return Whole(count, state, trouble, bare)
+
+
+def rescue(file: RunFile, copy: Path) -> Whole:
+    """Writes the events that make sense, with their trajectories, to a new run file; returns what is in it.
+
+    Raises UserError if `copy` exists or cannot be written, or if even the world of the run cannot be read.
+    """
+    if copy.exists():
+        raise UserError(f"{copy}: exists already; choose another name for the copy")
+    try:
+        first = next(_events(file), None)
+    except UserError:
+        first = None
+    if first is None or first.kind != "created":
+        raise UserError(f"{file.path}: nothing can be repaired: its first event is lost")
+    try:
+        documents = file.documents("")
+    except UserError:
+        raise UserError(f"{file.path}: nothing can be repaired: its world and settings cannot be read") from None
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{copy.name}.", dir=copy.parent) as folder:
+            made = Path(folder) / copy.name
+            create(made, documents, first.data)
+            found = _fill(file, made)
+            copy.hardlink_to(made)
+    except (OSError, sqlite3.Error) as error:
+        raise UserError(f"{copy}: cannot be written: {getattr(error, 'strerror', None) or error}") from None
+    return found
+
+
+def _fill(file: RunFile, made: Path) -> Whole:
+    with closing(_connected(file)) as source, closing(sqlite3.connect(made, isolation_level=None)) as db:
+
+        def keep(event: Event) -> None:
+            samples = _samples(source, event).items()
+            db.execute("INSERT INTO event VALUES (?, ?, ?, ?)", _row(event))
+            db.executemany("INSERT INTO motion VALUES (?, ?, ?)", [(event.data["test"], *each) for each in samples])
+
+        db.execute("BEGIN")
+        db.execute("DELETE FROM event")
+        found = _read(file, keep)
+        with suppress(UserError):
+            db.executemany("INSERT INTO command VALUES (?, ?, ?, ?)", map(_row, file.commands()))
+        db.execute("COMMIT")
+    return found
+
+
+def _is_bare(file: RunFile, event: Event) -> bool:
+    """Whether a test has ended without a trajectory. Raises UserError if it has one that is damaged."""
+    if event.kind != "test_finished" or event.data["outcome"] in BROKEN:
+        return False
+    test = event.data["test"]
+    return not file.motion(test) or not file.trajectory(test)
+
+
+def _events(file: RunFile) -> Iterator[Event]:
+    """One after the other, so that those before a fault can be read. Raises UserError at the first that is damaged."""
+    try:
+        with closing(_connected(file)) as db:
+            for id, at, kind, data in db.execute("SELECT id, time, kind, data FROM event ORDER BY id"):
+                found = json.loads(data)
+                if not isinstance(found, dict):
+                    raise ValueError(id)
+                yield Event(id, moment(at), str(kind), found)
+    except (sqlite3.Error, ValueError, TypeError, RecursionError) as error:
+        raise UserError(f"{file.path}: damaged run file: {error}") from None
+
+
+def _connected(file: RunFile) -> sqlite3.Connection:
+    db = sqlite3.connect(file.address, uri=True)
+    db.execute("PRAGMA trusted_schema = OFF")
+    return db
+
+
+def _row(event: Event) -> tuple[int, float, str, str]:
+    return event.id, event.time, event.kind, json.dumps(event.data, allow_nan=False, separators=(",", ":"))
+
+
+def _samples(source: sqlite3.Connection, event: Event) -> Motions:
+    """What the file has beside an event, as it is in the file."""
+    if event.kind not in ("test_finished", "implied"):
+        return {}
+    try:
+        return dict(source.execute("SELECT model, samples FROM motion WHERE test = ?", (event.data["test"],)))
+    except sqlite3.Error as error:
+        raise UserError(f"damaged run file: {error}") from None

@@ -1,0 +1,198 @@
+"""Why what is left makes the robot fail: what happens without each of its models, from the certificate's fresh runs alone."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from ddenv.amounts import count, percent
+from ddenv.claims import current
+from ddenv.errors import UserError
+from ddenv.rates import wilson_interval
+from ddenv.runfile.progress import Certificate
+from ddenv.runfile.state import BROKEN, RunState, Test
+from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.runfile.supports import stack_with
+
+# What a run shows, beside f ("similar"): the robot reached its goal, or it failed otherwise.
+F, GOAL = "similar", "pass"
+# What the robot does, by the `failure` of a run.
+DOES = {
+    "stuck": "gets stuck",
+    "tipped over": "tips over",
+    "fell": "falls",
+    "lost": "is lost",
+    "out of time": "runs out of time",
+}
+# Two runs have visibly parted when the robots are this far from each other, m.
+APART = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
+
+    `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
+    """
+
+    kind: str
+    number: int
+    seconds: float
+    place: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """Where two runs with the same seed part: one of what is left, which shows f, and one without a model.
+
+    The robot moves alike to the last bit until `equal`, s, and is `APART` at `apart`, s, at `place`, x and y, m; None if it never
+    is. It touched the model, or else sensed it, for the first time at `met`, s; None if it did not.
+    """
+
+    with_test: int
+    without_test: int
+    seed: int
+    equal: float
+    apart: float | None
+    place: tuple[float, float] | None
+    met: float | None
+    touched: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """What happens without the model `without` and what rests on it, all of `gone`.
+
+    `ends` are those of the `runs` fresh runs, the most frequent one first. `parting` is None where no pair of runs shows it.
+    """
+
+    without: str
+    gone: tuple[str, ...]
+    runs: int
+    ends: tuple[End, ...]
+    parting: Parting | None
+
+
+def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
+    """A reason for each model that the current certificate left out.
+
+    Raises UserError where there is none, or where trajectories are damaged.
+    """
+    certificate = current(state)
+    if certificate is None:
+        raise UserError(
+            f"{file.path}: no certificate is finished for what is left, and only its fresh runs show why the robot fails; "
+            f"make one first: ddenv certify {file.path}"
+        )
+    tests = [test for test in _fresh(state, certificate) if test.is_finished and test.outcome not in BROKEN]
+    left = {test.run: test for test in tests if test.without is None and test.outcome == F}
+    names = [claim.without for claim in certificate.claims if claim.without is not None]
+    return tuple(_reason(file, state, certificate, name, tests, left) for name in names)
+
+
+def _fresh(state: RunState, certificate: Certificate) -> Iterator[Test]:
+    own = (test for test in state.confirm_tests if test.node == certificate.node)
+    return (test for test in own if test.run >= certificate.first_run)
+
+
+def _reason(
+    file: RunFile, state: RunState, certificate: Certificate, name: str, tests: Sequence[Test], left: dict[int, Test]
+) -> Reason:
+    mine = [test for test in tests if test.without == name]
+    ends = _ends(mine)
+    gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
+    pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == ends[0].kind != F)
+    pair = next(pairs, None)
+    return Reason(name, gone, len(mine), ends, None if pair is None else _parting(file, *pair, gone))
+
+
+def _kind(test: Test) -> str:
+    return test.outcome if test.outcome in (F, GOAL) else test.failure
+
+
+def _ends(tests: Sequence[Test]) -> tuple[End, ...]:
+    kinds: dict[str, list[Test]] = {}
+    for test in tests:
+        kinds.setdefault(_kind(test), []).append(test)
+    ends = [
+        End(kind, len(them), median(test.simulated_seconds for test in them), _middle(them))
+        for kind, them in kinds.items()
+    ]
+    return tuple(sorted(ends, key=lambda end: -end.number))
+
+
+def _middle(tests: Sequence[Test]) -> tuple[float, float]:
+    places = [test.end_pose[:2] for test in tests if test.end_pose is not None] or [(math.nan, math.nan)]
+    return median(place[0] for place in places), median(place[1] for place in places)
+
+
+def _parting(file: RunFile, with_it: Test, without: Test, gone: Sequence[str]) -> Parting:
+    equal, apart, place = parted(file.trajectory(with_it.id), file.trajectory(without.id))
+    touched = [at for model, at in with_it.first_touched if model in gone]
+    met = touched or [at for model, at in with_it.first_sensed if model in gone]
+    seed = with_it.seed
+    return Parting(with_it.id, without.id, seed, equal, apart, place, min(met, default=None), bool(touched))
+
+
+def parted(first: array[float], second: array[float]) -> tuple[float, float | None, tuple[float, float] | None]:
+    """Until when two trajectories (flat rows of `COLUMNS`) are equal, s; when and where the second is `APART` from the first."""
+    equal = 0.0
+    same = True
+    for row in range(0, min(len(first), len(second)), COLUMNS):
+        one, other = first[row : row + COLUMNS], second[row : row + COLUMNS]
+        same = same and one == other
+        if same:
+            equal = one[0]
+        elif math.dist(one[1:3], other[1:3]) >= APART:
+            return equal, other[0], (other[1], other[2])
+    return equal, None, None
+
+
+def sentence(reason: Reason) -> str:
+    """What happens without the models, in one sentence, from the runs that show it."""
+    without = f"Without {reason.without}" + (
+        f" and what rests on it ({count(len(reason.gone) - 1, 'model')})" if len(reason.gone) > 1 else ""
+    )
+    if not reason.ends:
+        return f"{without}: no fresh run came to an end."
+    most, *others = reason.ends
+    low, high = wilson_interval(most.number, reason.runs)
+    share = f"{most.number} of {count(reason.runs, 'fresh run')}, {percent(low)} to {percent(high)}"
+    more = "".join(f"; it {_does(end)} in {end.number}" for end in others)
+    return f"{without} the robot {_does(most)} ({share}){more}."
+
+
+def _does(end: End) -> str:
+    if end.kind == GOAL:
+        return f"reaches its goal after {end.seconds:.0f} s"
+    if end.kind == F:
+        return "still fails as in f"
+    return f"{DOES.get(end.kind, 'fails')} elsewhere, near {_point(end.place)}"
+
+
+def _point(place: tuple[float, float]) -> str:
+    # Adding zero makes -0.0 the same as 0.0.
+    return f"({round(place[0], 2) + 0.0:.2f}, {round(place[1], 2) + 0.0:.2f}) m"
+
+
+def parting_sentence(reason: Reason) -> str:
+    """Where the ways with and without the models part, in one or two sentences; "" if no pair of runs shows it."""
+    one = reason.parting
+    if one is None:
+        return ""
+    start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
+    apart = (
+        ""
+        if one.apart is None or one.place is None
+        else (f", and are {APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}")
+    )
+    it = "it" if len(reason.gone) == 1 else "one of them"
+    met = (
+        ""
+        if one.met is None
+        else (f" With {it} there, the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s.")
+    )
+    return f"With seed {one.seed} the two runs differ {start}{apart}.{met}"

@@ -1,0 +1,148 @@
+"""Programs that a scenario brings along: its own controller, the command of another simulator, or a cluster for its tests.
+
+They start only if the user trusts them: a run file holds its scenario, so one that came by mail can name any program of this
+machine. What is trusted is remembered with the contents of the files that the command names, or of the controller's own module.
+Where one of these changes, the user is asked again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shlex
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.runs.clusters import HERE
+from ddenv.runs.remembered import read_state, write_state
+from ddenv.world.scenario import Scenario
+
+FILE = "trusted.json"
+# Maximum number of files of one program that are looked at.
+MOST_FILES = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What a scenario starts, in words for the user, and digests of it with its files: of a program, of a cluster, or of both."""
+
+    words: str
+    digests: tuple[str, ...]
+
+
+def program_of(scenario: Scenario) -> Program | None:
+    """The program that tests of `scenario` start; None if they start only what ddenv brings."""
+    own, cluster = _own_program(scenario), _cluster_of(scenario)
+    if own is None or cluster is None:
+        return own or cluster
+    return Program(f"{own.words}, and {cluster.words}", own.digests + cluster.digests)
+
+
+def _cluster_of(scenario: Scenario) -> Program | None:
+    cluster = scenario.reduction.cluster
+    if cluster == HERE:
+        return None
+    return _program(f"its tests on the cluster {cluster}; whoever controls that can start any program here", [])
+
+
+def _own_program(scenario: Scenario) -> Program | None:
+    folder = scenario.folder.absolute()
+    if scenario.oracle is not None:
+        command = scenario.oracle.command
+        return _program(f"the command '{command}' in {folder}", _named(folder, command))
+    use = scenario.controller.use
+    if ":" not in use:
+        return None
+    return _program(
+        f"the controller {use}, searched in {folder} first", _modules(folder, use.partition(":")[0].partition(".")[0])
+    )
+
+
+def _program(words: str, files: Iterable[Path]) -> Program:
+    contents = [(str(path), _content(path)) for path in islice(files, MOST_FILES)]
+    return Program(words, (hashlib.sha256(json.dumps([words, contents]).encode()).hexdigest(),))
+
+
+def _named(folder: Path, command: str) -> list[Path]:
+    """The files that a command names."""
+    try:
+        words = shlex.split(command)
+    except ValueError:
+        return []
+    return [folder / word for word in words if _is_file(folder / word)]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        # A word can be too long for a file name, or hold a NUL byte.
+        return False
+
+
+def _modules(folder: Path, module: str) -> list[Path]:
+    """The files of a module in `folder`, in every form that Python looks for; an installed one is the user's own choice."""
+    found = [*folder.glob(f"{module}.*"), *(folder / module).rglob("*")]
+    # Python itself writes into this folder.
+    return sorted(path for path in found if "__pycache__" not in path.parts and _is_file(path))
+
+
+def _content(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def is_trusted(program: Program) -> bool:
+    """Whether the user has trusted it as it is now."""
+    return _trusted().issuperset(program.digests)
+
+
+def trust(program: Program) -> None:
+    """Remembers that the user trusts it."""
+    write_state(FILE, sorted({*_trusted(), *program.digests}))
+
+
+def _trusted() -> set[str]:
+    known = read_state(FILE)
+    return {digest for digest in known if isinstance(digest, str)} if isinstance(known, list) else set()
+
+
+def is_own(path: Path) -> bool:
+    """Whether a file and its folder belong to the user, and others cannot write there."""
+    if not hasattr(os, "getuid"):
+        # Windows says it in other ways.
+        return False
+    try:
+        found = (path.stat(), path.absolute().parent.stat())
+    except (OSError, ValueError):
+        return False
+    return all(each.st_uid == os.getuid() and not each.st_mode & stat.S_IWOTH for each in found)
+
+
+def trust_own(scenario: Scenario, path: Path) -> None:
+    """Trusts what a scenario starts whose file the user named, and owns."""
+    program = program_of(scenario)
+    if program is not None and is_own(path):
+        trust(program)
+
+
+def trust_cluster(scenario: Scenario) -> None:
+    """Trusts the cluster of `scenario`, which the user has typed."""
+    cluster = _cluster_of(scenario)
+    if cluster is not None:
+        trust(cluster)
+
+
+def check_trusted(scenario: Scenario, where: Path | str) -> None:
+    """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted."""
+    program = program_of(scenario)
+    if program is not None and not is_trusted(program):
+        raise UserError(f"{where}: would start {program.words}; if you trust it, give --trust")

@@ -1,0 +1,108 @@
+"""The frame of dialogs and panes: a title above, keys below. A click on a key presses it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rich.text import Text
+from textual import events
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.content import Content
+from textual.style import Style
+
+from ddenv.workbench.help.key_names import shown_key
+
+# Keys with names; a single character is a key, too.
+NAMED = {"↑": "up", "↓": "down", "←": "left", "→": "right"} | {
+    name: name for name in ("enter", "escape", "space", "tab")
+}
+# What may stand between the keys of one hint.
+BETWEEN = ("or", "click")
+GAP = "   "
+# What a dialog says of a key stands in place of the keys for so long, s.
+SAID = 3.0
+
+
+class Framed(Vertical):
+    """`hints` are keys with what they do, three spaces apart: `enter opens   escape cancels`."""
+
+    def __init__(self, title: str | Text, hints: str = "", *, id: str | None = None, classes: str = "dialog") -> None:
+        super().__init__(id=id, classes=classes)
+        self.border_title = title
+        self._hints = hints
+
+    def on_mount(self) -> None:
+        self._show_hints()
+
+    def _show_hints(self) -> None:
+        if self._hints:
+            self.border_subtitle = clickable(self._hints, self._own_keys())
+
+    def say(self, words: str) -> None:
+        """Says what a key did, in place of the keys for a moment: a notice would wait until the dialog is closed."""
+        self.border_subtitle = Content(words)
+        self.set_timer(SAID, self._show_hints)
+
+    def _own_keys(self) -> dict[str, str]:
+        """The user's own keys of this screen, by the usual ones."""
+        own = self.app._keymap
+        bindings = Binding.make_bindings(self.screen.BINDINGS) if own else ()
+        return {each.key: own[each.id].split(",")[0] for each in bindings if each.id and each.id in own}
+
+    def action_press(self, key: str) -> None:
+        """Presses a key here: a pane without the focus gets it first."""
+        focused = self.screen.focused
+        if focused is None or self not in focused.ancestors:
+            inside = next((node for node in self.screen.focus_chain if self in node.ancestors), None)
+            if inside is not None:
+                self.screen.set_focus(inside)
+        # By the app itself: a key that this widget sends would not come further up than to it.
+        self.app.call_later(self.app.simulate_key, key)
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        self._explain(event.style.meta.get("key", ""))
+
+    def on_leave(self) -> None:
+        self._explain("")
+
+    def _explain(self, key: str) -> None:
+        """The tooltip of a hint. Only another one is set: it is drawn at once."""
+        active = self.screen.active_bindings.get(key) if key else None
+        words = (active.tooltip or None) if active is not None else None
+        if words != self.tooltip:
+            self.tooltip = words
+
+
+def clickable(hints: str, own: Mapping[str, str] = {}) -> Content:
+    """Hints with keys to click; `own` has the user's keys by the usual ones."""
+    parts: list[str | tuple[str, Style]] = []
+    for hint in hints.split(GAP):
+        if parts:
+            parts.append(GAP)
+        for key, words in _by_key(hint, own):
+            said = words.rstrip()
+            parts.append((said, Style.from_meta({"@click": f"press({key!r})", "key": key})) if key else said)
+            parts.append(words[len(said) :])
+    return Content.assemble(*parts)
+
+
+def _by_key(hint: str, own: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """A hint's words by the key that they are about: from this key to the next one. "" is no key."""
+    key, said, leading = "", "", True
+    for word in hint.split():
+        usual = _key(word) if leading else ""
+        leading = bool(usual) or (leading and word in BETWEEN)
+        if usual and key:
+            yield key, said
+            said = ""
+        key = own.get(usual, usual) or key
+        said += f"{shown_key(own[usual]) if usual in own else word} "
+    yield key, said.rstrip()
+
+
+def _key(word: str) -> str:
+    """Textual's name of the key that a word is, or ""."""
+    if word.startswith(("^", "ctrl+")):
+        return f"ctrl+{word[-1]}"
+    return NAMED.get(word, word if len(word) == 1 else "")

@@ -1,0 +1,184 @@
+"""Searches of one world side by side, test by test; at the end, who needed the fewest tests, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Container, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import Static
+
+from ddenv.learn.plays import Play, plays_of_runs
+from ddenv.learn.race import Race, result, tally
+from ddenv.runfile.position import position_in
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.learn.racer_pane import RacerPane
+from ddenv.workbench.learn.world_maps import read_world
+from ddenv.workbench.run.browsing import Moments
+from ddenv.workbench.run.observed import Observed
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import plain, shorten
+
+SMALLEST = (64, 20)
+# Time between two tests while the race runs, s.
+PACE = 0.7
+# Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
+BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
+SIGNS = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
+# What the tests were good for; the rest is rare.
+COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
+NAME = 24
+
+
+def _ids(names: str) -> tuple[str, ...]:
+    return tuple(f"race.{name}" for name in names.split())
+
+
+SHOWN = _ids("run back on begin end help close")
+FIRST = _ids("help close run on back end begin")
+
+
+class RaceScreen(Screen[None]):
+    """The race of `plays`, each drawn over its own of the `bases`, in the world of `run`."""
+
+    CSS_PATH = "learn.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar = [
+        Binding("space", "run", "run/pause", id="race.run", tooltip="run the race, or pause it"),
+        Binding("left", "move(-1)", "back", id="race.back", tooltip="one test of each back"),
+        Binding("right,enter", "move(1)", "one test on", id="race.on", tooltip="one test of each on", key_display="→"),
+        Binding("home", "go(0)", "start", id="race.begin", tooltip="to the beginning"),
+        Binding("end", "go(-1)", "result", id="race.end", tooltip="to the end: who needed the fewest tests, and why"),
+        Binding("question_mark,f1", "app.help", "help", id="race.help", tooltip="show every key", key_display="?"),
+        Binding("escape,q", "close", "leave", id="race.close", tooltip="back, or leave", key_display="esc"),
+    ]
+
+    def __init__(self, plays: Sequence[Play], bases: Sequence[Snapshot], run: Path) -> None:
+        super().__init__()
+        self.race, self._run = Race(tuple(plays)), run
+        self._panes = [RacerPane(play, base) for play, base in zip(plays, bases, strict=True)]
+
+    def compose(self) -> ComposeResult:
+        yield Static("", id="race-header", markup=False)
+        with Container(id="race-body"):
+            yield from self._panes
+        with VerticalScroll(id="race-panel", classes="panel", can_focus=False):
+            yield Static("", id="race-said", markup=False)
+        yield KeyFooter(SHOWN, FIRST)
+        yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
+
+    def on_mount(self) -> None:
+        self._clock = self.set_interval(PACE, self._tick, pause=True)
+        self._runs_on = False
+        self._arrange()
+        self._show()
+        self.call_after_refresh(read_world, self, self._run, [pane.map for pane in self._panes])
+
+    def on_resize(self) -> None:
+        self._arrange()
+        self.call_after_refresh(self._show)
+
+    def _arrange(self) -> None:
+        """Up to three racers beside each other; their maps where there is room for them."""
+        width, height = self.size
+        columns = 3 if len(self._panes) == 3 and width >= 110 else 2
+        rows = -(-len(self._panes) // columns)
+        each = (height - AROUND - SAID - len(self._panes)) // rows
+        maps = each >= WITH_MAP
+        body = self.query_one("#race-body")
+        body.styles.grid_size_columns, body.styles.grid_size_rows = columns, rows
+        body.styles.height = rows * (each if maps else BARE)
+        for pane in self._panes:
+            pane.map.display = maps
+
+    # What is shown.
+
+    def _show(self) -> None:
+        race = self.race
+        for pane in self._panes:
+            pane.show(race)
+        state = "over" if race.over else "runs: space pauses it" if self._runs_on else "space runs it"
+        header = Text(" Race", "bold", no_wrap=True, overflow="ellipsis").append(f" · {state}", "not bold")
+        header.append(f" · test {race.at}" if race.at else "", "not bold")
+        self.query_one("#race-header", Static).update(header)
+        panel = self.query_one("#race-panel", VerticalScroll)
+        panel.border_title = "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
+        panel.border_subtitle = SIGNS
+        said = _table(race)
+        if race.over:
+            said.append("\n").append("\n".join(map(plain, result(race.plays))), "bold not dim")
+        self.query_one("#race-said", Static).update(said)
+
+    # What is done.
+
+    def _tick(self) -> None:
+        if not self.race.go(self.race.at + 1) or self.race.over:
+            self._pause()
+        self._show()
+
+    def _pause(self) -> None:
+        self._runs_on = False
+        self._clock.pause()
+
+    def action_run(self) -> None:
+        if self._runs_on:
+            self._pause()
+        else:
+            if self.race.over:
+                self.race.go(0)
+            self._runs_on = True
+            self._clock.resume()
+        self._show()
+
+    def action_move(self, by: int) -> None:
+        self._pause()
+        if self.race.go(self.race.at + by):
+            self._show()
+        else:
+            self.notify("the race is over" if by > 0 else "the race begins here", timeout=3, markup=False)
+
+    def action_go(self, at: int) -> None:
+        self._pause()
+        self.race.go(at if at >= 0 else self.race.longest)
+        self._show()
+
+    def action_close(self) -> None:
+        if len(self.app.screen_stack) > 2:
+            self.dismiss(None)
+        else:
+            self.app.exit(0)
+
+
+def race_of_runs(runs: Sequence[Path]) -> RaceScreen:
+    """The searches of two to four run files. Raises UserError, also if they are not of one world."""
+    plays, bases = plays_of_runs(runs), []
+    for run in runs:
+        with Observed(run) as file:
+            position = position_in(file.events())
+            baseline = position.moment(position.chapters[0].last)
+            bases.append(Snapshot() if baseline is None else Moments(file).of(baseline, ""))
+    return RaceScreen(plays, bases, runs[0])
+
+
+def _table(race: Race) -> Text:
+    """A line for each search: its tests so far, those that showed f, and those that did not, by kind."""
+    width = min(NAME, max(len(play.name) for play in race.plays))
+    heads = "".join(f"{head:>{_wide(head)}}" for head in COLUMNS.values())
+    text = Text(f"{'':<{width}}{'tests':>7}{heads}", "dim", no_wrap=True)
+    for play in race.plays:
+        spent = tally(play, race.at).spent
+        cells = "".join(f"{spent[kind] or '':>{_wide(head)}}" for kind, head in COLUMNS.items())
+        name = shorten(plain(play.name), width)
+        text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
+    return text
+
+
+def _wide(head: str) -> int:
+    return len(head) + 2

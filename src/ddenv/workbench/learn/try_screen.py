@@ -1,0 +1,238 @@
+"""A student's own search: models are marked on the map, tests are run by a key, and at the end comes an honest verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Container, Vertical, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import Static
+
+from ddenv.errors import UserError
+from ddenv.learn.attempt import BOUND, Attempt, Line, Tried, comparison, in_one_sentence
+from ddenv.learn.plays import Play
+from ddenv.learn.variables import SIGNS
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.learn.world_maps import read_world, snapshot_of
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.wording import count, plain, shorten
+
+SMALLEST = (64, 20)
+NAME = 16
+
+
+def _ids(names: str) -> tuple[str, ...]:
+    return tuple(f"try.{name}" for name in names.split())
+
+
+SHOWN = ("map.pick", "map.next", *_ids("without only back done again help close"))
+FIRST = (*_ids("help close without done"), "map.pick", *_ids("only"), "map.next", *_ids("back again"))
+SAID = {
+    "similar": "f again without {out}: you hold {held} now.",
+    "other": "another failure. That is not f, so nothing goes.",
+    "pass": "the goal was reached: something that f needs was missing.",
+}
+
+
+class TryScreen(Screen[None]):
+    """The search `attempt` in the world of `run`; `keep` is called after each move. `plays` are compared with it at the end."""
+
+    CSS_PATH = "learn.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-tall")]
+    AUTO_FOCUS = "WorldMap"
+    BINDINGS: ClassVar = [
+        Binding(
+            "space", "mark", "mark", id="try.mark", tooltip="mark or unmark the model under the crosshair", show=False
+        ),
+        Binding(
+            "w", "test(False)", "test without", id="try.without", tooltip="test what is held without the marked models"
+        ),
+        Binding("o", "test(True)", "test only", id="try.only", tooltip="test the marked models alone"),
+        Binding("u", "back", "undo", id="try.back", tooltip="undo: hold again what the last reduction took away"),
+        Binding("m", "done", "minimal", id="try.done", tooltip="say that no single model can go: the verdict"),
+        Binding("n", "again", "new search", id="try.again", tooltip="begin again; the first result counts"),
+        Binding("question_mark,f1", "app.help", "help", id="try.help", tooltip="show every key", key_display="?"),
+        Binding(
+            "escape,q", "close", "leave", id="try.close", tooltip="back to the lesson; it is kept", key_display="esc"
+        ),
+    ]
+
+    def __init__(
+        self, run: Path, base: Snapshot, attempt: Attempt, plays: tuple[Play, ...], keep: Callable[[Attempt], None]
+    ) -> None:
+        super().__init__()
+        self._run, self._base, self._plays, self._keep = run, base, plays, keep
+        self.attempt = attempt
+        self._map = WorldMap(id="try-map")
+        self._asked = False
+
+    def compose(self) -> ComposeResult:
+        yield Static("", id="try-header", markup=False)
+        with Container(id="try-body"):
+            with Vertical(id="try-world", classes="panel") as world:
+                world.border_title = "World"
+                yield self._map
+            with VerticalScroll(id="try-tests", classes="panel", can_focus=False):
+                yield Static("", id="try-table", markup=False)
+            with VerticalScroll(id="try-now", classes="panel", can_focus=False) as now:
+                now.border_title = "Now"
+                yield Static("", id="try-said", markup=False)
+        yield KeyFooter(SHOWN, FIRST)
+        yield Static(f"ddenv learn needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
+
+    def on_mount(self) -> None:
+        self._show()
+        self.call_after_refresh(read_world, self, self._run, [self._map])
+
+    # What is shown.
+
+    def _show(self) -> None:
+        attempt = self.attempt
+        self._map.show(snapshot_of(self._base, attempt.held), None)
+        header = Text(" Do it yourself", "bold", no_wrap=True)
+        header.append(f" · {len(attempt.held)} of {count(len(attempt.oracle.models), 'model')} held", "not bold")
+        header.append(f" · {attempt.tests_left} of {count(attempt.budget, 'test')} left", "not bold")
+        self.query_one("#try-header", Static).update(header)
+        tests = self.query_one("#try-tests", VerticalScroll)
+        tests.border_title, tests.border_subtitle = "Your tests", "● f  ◇ other  ○ goal"
+        if attempt.ended:
+            tests.border_title, tests.border_subtitle = "Side by side", ""
+        table = self.query_one("#try-table", Static)
+        if attempt.ended:
+            table.update(_side_by_side(list(comparison(attempt.oracle, self._plays, attempt)), tests.size.width))
+        else:
+            table.update(
+                Text("\n").join(_row(number, each) for number, each in enumerate(attempt.tried, 1)) or Text(NO_TESTS)
+            )
+            tests.scroll_end(animate=False)
+        self._say_where()
+
+    def _say_where(self) -> None:
+        """What happened last, and the models that are held, with the marked ones."""
+        said, attempt = self.query_one("#try-said", Static), self.attempt
+        if attempt.ended:
+            sign = "✓" if attempt.found else "✗"
+            verdict = Text(f"{sign} {plain(attempt.verdict)}", "bold")
+            sentence = in_one_sentence(attempt.oracle, self._plays, attempt)
+            said.update(Text("\n\n").join((verdict, Text(plain(sentence)))))
+            return
+        many = count(len(attempt.held), "model")
+        sure = Text(f"Sure that no single one of {many} can go? m again says so, and ends the search.", "bold")
+        said.update(Text("\n").join((sure if self._asked else _last(attempt), *self._models())))
+
+    def _models(self) -> tuple[Text, Text]:
+        marked = self._map.selection
+        models = Text("Held: ")
+        for name in self.attempt.held:
+            sign = "*" if name in marked else ""
+            word = Text(f"{sign}{shorten(plain(name), NAME)}", "bold reverse" if sign else "bold")
+            word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
+            models.append_text(word).append("  ")
+        if not self.attempt.tests_left:
+            return models, Text("No test is left. m: the verdict on what you hold.", "dim")
+        if not marked:
+            return models, Text("Mark with enter or a click. m: no single one can go.", "dim")
+        left = len(self.attempt.held) - len(marked)
+        return models, Text(f"{len(marked)} marked (*): w tests the other {left}, o tests these alone.", "dim")
+
+    def on_world_map_selection_changed(self) -> None:
+        self._asked = False
+        self._say_where()
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._show)
+
+    # What is done.
+
+    def action_mark(self) -> None:
+        self._map.action_pick()
+
+    def action_mark_one(self, place: int) -> None:
+        self._map.select(self._map.selection ^ {self.attempt.oracle.models[place]})
+
+    def action_test(self, only: bool) -> None:
+        marked, held = self._map.selection, frozenset(self.attempt.held)
+        if not marked:
+            self._say("mark some models first: enter or a click on the map")
+            return
+        self._do(lambda: self.attempt.test(marked if only else held - marked))
+
+    def action_back(self) -> None:
+        self._do(self.attempt.back)
+
+    def action_done(self) -> None:
+        if self.attempt.ended:
+            self._say("this search is over: n begins a new one")
+        elif not self._asked:
+            self._asked = True
+            self._say_where()
+        else:
+            self._do(self.attempt.end)
+
+    def action_again(self) -> None:
+        if not self.attempt.moves:
+            self._say("nothing was tested yet")
+            return
+        self.attempt = Attempt(self.attempt.oracle, self.attempt.budget)
+        self._do(lambda: None)
+
+    def _do(self, move: Callable[[], object]) -> None:
+        """A move of the student: what it says no to is said."""
+        try:
+            move()
+        except UserError as error:
+            self._say(str(error))
+            return
+        self._asked = False
+        self._map.clear_selection()
+        self._keep(self.attempt)
+        self._show()
+
+    def action_close(self) -> None:
+        self.dismiss(None)
+
+    def _say(self, why: str) -> None:
+        self.notify(why, timeout=4, markup=False)
+
+
+NO_TESTS = "None yet. Each one runs the robot with some of the models that you hold."
+
+
+def _row(number: int, tried: Tried) -> Text:
+    text = Text(f"{number:>2} ", no_wrap=True, overflow="ellipsis")
+    text.append(f"{SIGNS[tried.outcome]} ", "bold")
+    # The shorter list says it best.
+    kept, out = (", ".join(shorten(plain(name), NAME) for name in names) for names in (tried.kept, tried.out))
+    words = f"without {out}" if len(tried.out) <= len(tried.kept) else f"only {kept or 'no model'}"
+    return text.append(words, "bold" if tried.outcome == "similar" else "")
+
+
+def _last(attempt: Attempt) -> Text:
+    if not attempt.tried:
+        return Text("You hold the whole world, and it shows f. Which models does f need?")
+    last = attempt.tried[-1]
+    out = ", ".join(shorten(plain(name), NAME) for name in last.out)
+    said = SAID[last.outcome].format(out=out, held=count(len(attempt.held), "model"))
+    return Text(f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {said}", "bold")
+
+
+def _side_by_side(lines: list[Line], room: int) -> Text:
+    """The names of what is left stand where there is room for them."""
+    width = max(len(line.name) for line in lines)
+    text = Text(f"{'':<{width}}  tests  left\n", "dim")
+    for line in lines:
+        left = "" if line.left is None else f"{len(line.left):>6}{' ✗' if line.can_go else '  '}"
+        row = f"{plain(line.name):<{width}} {line.tests:>6}{left}"
+        names = shorten(", ".join(map(plain, line.left or ())), max(0, room - len(row) - 1))
+        row += f" {names}" if len(names) > 8 else ""
+        text.append(f"{row}\n", "bold not dim" if line.name == "you" else "not dim")
+    if any(line.can_go for line in lines):
+        text.append("✗ one of these can still go.\n", "dim")
+    return text.append(BOUND, "dim")

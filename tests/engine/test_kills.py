@@ -1,0 +1,130 @@
+"""Engines and workers are killed at random moments: the run ends as if nothing had happened."""
+
+import math
+import os
+import random
+import signal
+import time
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from ddenv.engine.journal import Journal
+from ddenv.runfile.state import BROKEN
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.programs import last_words, start_engine
+from ddenv.runs.trust import program_of, trust
+from ddenv.world.load import load_scenario
+from ddenv.world.scenario import Oracle
+from tests.conftest import DATA
+from tests.engine.killing import story
+from tests.waiting import PATIENCE, PERIOD
+
+KILLS = int(os.environ.get("DDENV_KILLS", "6"))
+# An engine is killed within this time after its workers were started, and so is one of them, s: some before they are ready.
+LIFE = 4.0
+
+# Fails where the deck and the wall are. It starts no Python: a test takes a few hundredths of a second.
+ROBOT = """
+echo 0,0,0,0,0,0,0,1
+grep -q 'model name="deck"' "$1" && grep -q 'model name="wall"' "$1" && exit 1
+exit 0
+"""
+
+
+def new_run(folder: Path, name: str) -> Path:
+    (folder / "robot.sh").write_text(ROBOT)
+    scenario = load_scenario(DATA / "wall.yaml")
+    more = {"iterations": 9, "growth": "paper", "skip": "known", "baseline_runs": 6}
+    scenario = scenario.model_copy(
+        update={
+            "oracle": Oracle(command="sh robot.sh {world}"),
+            "folder": folder,
+            "reduction": scenario.reduction.model_copy(update=more),
+        }
+    )
+    run = folder / f"{name}.ddenv"
+    create_run(scenario, run)
+    trust(program_of(scenario))
+    return run
+
+
+def children(pid: int) -> list[int]:
+    found = []
+    with suppress(OSError):
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            found += map(int, (thread / "children").read_text().split())
+    return found
+
+
+def workers(engine: int) -> list[int]:
+    found = []
+    with suppress(OSError):
+        found += [pid for pid in children(engine) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    return found
+
+
+def lives(run: Path, dice: random.Random, most: int) -> int:
+    """One engine's life on a run: a worker is killed, and then the engine. Returns how many kills there were, at most `most`."""
+    engine = start_engine(run, 2, anyway="yes")
+    kills, began = 0, math.inf
+    moments = sorted(dice.uniform(0.0, LIFE) for _ in range(min(2, most)))
+    while engine.poll() is None and kills < len(moments):
+        time.sleep(PERIOD)
+        if began == math.inf and workers(engine.pid):
+            began = time.monotonic()
+        if time.monotonic() - began < moments[kills]:
+            continue
+        # One worker in a life: a test that breaks twice would rightly be unknown.
+        victims = workers(engine.pid) if kills < len(moments) - 1 else [engine.pid]
+        with suppress(OSError):
+            if victims:
+                os.kill(dice.choice(victims), signal.SIGKILL)
+                kills += 1
+    assert engine.wait(PATIENCE) in (0, -signal.SIGKILL), last_words(run)
+    return kills
+
+
+def what_became(run: Path):
+    with RunFile(run) as file:
+        journal = Journal(file)
+        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+    verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in judged]
+    sound = [test for test in journal.state.finished_tests if test.outcome not in BROKEN]
+    made = Counter((journal.keep_of_test(test.id), test.run) for test in sound)
+    assert set(made.values()) == {1}, "a finished test was made again"
+    assert journal.state.status == "finished"
+    return story(journal.state), verdicts
+
+
+def came_of(run: Path) -> Counter:
+    """How many engines worked on a run, how many of its tests ended, and how many were broken or lost by kills."""
+    with RunFile(run) as file:
+        state = Journal(file).state
+        engines = sum(event.kind == "engine_started" for event in file.events())
+    outcomes = Counter(test.outcome for test in state.tests)
+    broken, lost = outcomes.pop("error", 0), outcomes.pop("lost", 0)
+    return Counter(engines=engines, ended=outcomes.total(), broken=broken, lost=lost)
+
+
+@pytest.mark.programs
+def test_killed_at_random_moments_it_ends_as_if_nothing_had_happened(tmp_path, monkeypatch):
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path / "home"))
+    undisturbed = new_run(tmp_path, "undisturbed")
+    assert start_engine(undisturbed, 2).wait(PATIENCE) == 0, last_words(undisturbed)
+    expected, dice = what_became(undisturbed), random.Random(KILLS)
+    left, number, came = KILLS, 0, Counter()
+    while left > 0:
+        number += 1
+        run = new_run(tmp_path, f"run-{number}")
+        finished = False
+        while not finished:
+            left -= lives(run, dice, left)
+            with RunFile(run) as file:
+                finished = Journal(file).state.status == "finished"
+        assert what_became(run) == expected, number
+        came += came_of(run)
+    print(f"{KILLS} kills in {number} runs: {dict(came)}")

@@ -1,0 +1,260 @@
+"""What a night brings: a full disk, a clock that jumps, a run file that is copied, deleted or replaced under an engine."""
+
+import errno
+import shutil
+import sqlite3
+import threading
+import time
+from collections import namedtuple
+
+import pytest
+
+from ddenv.engine import room
+from ddenv.engine.bench import Bench
+from ddenv.engine.clock_jumps import ClockJumps
+from ddenv.engine.control import Control
+from ddenv.engine.driver import Driver
+from ddenv.engine.journal import Journal
+from ddenv.engine.room import NEEDED, Room
+from ddenv.errors import UserError
+from ddenv.runfile import lock
+from ddenv.runfile.fold import fold
+from ddenv.runfile.integrity import faults, whole
+from ddenv.runfile.lock import engine_is_alive, engine_lock
+from ddenv.runfile.store import LOGS, NoRoom, RunFile
+from ddenv.runs.creation import read_parts
+from ddenv.words import news
+from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.killing import story
+from tests.engine.oracles import needs
+
+Usage = namedtuple("Usage", "free")
+
+
+oracle = needs("deck", "wall")
+
+
+def watched(path, terminated=None):
+    """Works on a run as `drive` does, with an eye on the disk."""
+    from ddenv.engine.__main__ import _begin
+
+    terminated = terminated or threading.Event()
+    with RunFile(path) as file:
+        scenario, world, _ = read_parts(file)
+        watch = Room(file, terminated)
+        file.own(watch.wait)
+        journal = Journal(file)
+        pool = FakePool(oracle, 2)
+        _begin(journal, pool.jobs, None)
+        control = Control(journal, terminated, room=watch)
+        Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
+        return journal.state
+
+
+@pytest.fixture
+def undisturbed(tmp_path):
+    """What the run comes to on a good night."""
+    folder = tmp_path / "good"
+    folder.mkdir()
+    return story(drive(new_run(folder), FakePool(oracle, 2)))
+
+
+def disk(monkeypatch, free):
+    monkeypatch.setattr(room, "PERIOD", 0.0)
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(free()))
+
+
+def told(path):
+    """The lines that a follower reads, and the kinds of events."""
+    lines, kinds, state = [], [], None
+    with RunFile(path) as file:
+        for event in file.events():
+            before, state = state, fold([event], state)
+            kinds.append(event.kind)
+            if before is not None and (line := news(event.kind, before, state)):
+                lines.append(line.strip())
+    return lines, kinds
+
+
+def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_there_is_room(
+    tmp_path, monkeypatch, undisturbed
+):
+    looks = iter([10 * NEEDED] * 5 + [NEEDED - 1] * 7)
+    disk(monkeypatch, lambda: next(looks, 10 * NEEDED))
+    path = new_run(tmp_path)
+    assert story(watched(path)) == undisturbed
+    lines, kinds = told(path)
+    first, last = (number for number, kind in enumerate(kinds) if kind == "room")
+    assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
+    assert "no room on the disk: waits until 32 MB are free" in lines and "there is room on the disk again" in lines
+
+
+def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path, monkeypatch, capsys, undisturbed):
+    path = new_run(tmp_path)
+    looks = []
+    original = RunFile._append
+
+    def full_for_a_while(file, kind, data, motions):
+        if kind == "test_finished" and data["test"] == 3 and len(looks) < 4:
+            # Even less than a result.
+            file._db.execute("PRAGMA max_page_count = 1")
+        return original(file, kind, data, motions)
+
+    def look():
+        looks.append(1)
+        return 0 if len(looks) < 4 else 10 * NEEDED
+
+    def waits(self, full):
+        again = original_wait(self, full)
+        if len(looks) < 4:
+            look()
+        else:
+            self._file._db.execute("PRAGMA max_page_count = 1000000")
+        return again
+
+    original_wait = Room.wait
+    monkeypatch.setattr(RunFile, "_append", full_for_a_while)
+    monkeypatch.setattr(Room, "wait", waits)
+    disk(monkeypatch, lambda: 10 * NEEDED)
+    assert story(watched(path)) == undisturbed
+    assert capsys.readouterr().err.count("waits until 32 MB are free") == 1
+    with RunFile(path) as file:
+        assert whole(file).trouble == "" and faults(file) == []
+
+
+def test_an_engine_that_waits_for_room_can_be_ended(tmp_path, monkeypatch):
+    path = new_run(tmp_path)
+    terminated = threading.Event()
+    disk(monkeypatch, lambda: 10 * NEEDED)
+
+    def full(file, kind, data, motions):
+        terminated.set()
+        raise NoRoom(f"{path}: cannot be written: full")
+
+    monkeypatch.setattr(RunFile, "_append", full)
+    with pytest.raises(UserError, match="cannot be written"):
+        watched(path, terminated)
+
+
+def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path):
+    path = new_run(tmp_path)
+    now = [1e9, 50.0]
+    with RunFile(path) as file:
+        file.own()
+        journal = Journal(file)
+        journal.record("engine_started", pid=1, jobs=1, version="1", simulator="x")
+        jumps = ClockJumps(journal, lambda: now[0] + now[1], lambda: now[1])
+        for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
+            now[0], now[1] = now[0] + jump, now[1] + passed
+            jumps.look()
+        found = [event.data["seconds"] for event in file.events() if event.kind == "clock_jumped"]
+        assert found == pytest.approx([8 * 3600.0, -3 * 86400.0])
+    assert "the machine slept, or its clock was set: that time does not count" in told(path)[0]
+
+
+def test_a_stop_for_an_earlier_engine_stops_no_later_one_although_the_clock_was_set_back(tmp_path, monkeypatch):
+    path = new_run(tmp_path)
+    with RunFile(path) as file:
+        monkeypatch.setattr(time, "time", lambda: 4e9)
+        after = file.send("stop")
+        monkeypatch.undo()
+        file.own()
+        journal = Journal(file)
+        control = Control(journal, threading.Event(), after)
+        control.poll()
+        assert journal.state.last_command == after
+
+
+@pytest.mark.parametrize("fate", ["deleted", "moved", "replaced by another file"])
+def test_an_engine_whose_run_file_is_gone_says_so_and_touches_no_other(tmp_path, fate):
+    path = new_run(tmp_path)
+    other = tmp_path / "other.ddenv"
+    shutil.copy(path, other)
+    content, moved = other.read_bytes(), tmp_path / "moved.ddenv"
+
+    def disturb(file):
+        append, count = file.append, [0]
+
+        def counted(*values):
+            count[0] += 1
+            if count[0] == 12:
+                {"deleted": path.unlink, "moved": lambda: path.rename(moved)}.get(fate, lambda: other.replace(path))()
+            return append(*values)
+
+        file.append = counted
+
+    with pytest.raises(UserError, match=f"{path}: the run file was .*{fate}.* while an engine worked on it"):
+        drive(path, FakePool(oracle, 2), prepare=disturb)
+    assert path.exists() == (fate == "replaced by another file")
+    assert not any(path.with_name(path.name + ending).exists() for ending in LOGS)
+    if path.exists():
+        assert path.read_bytes() == content
+    if moved.exists():
+        with RunFile(moved) as file:
+            assert len(file.events()) >= 12 and whole(file).trouble == ""
+
+
+def test_a_run_that_is_copied_while_an_engine_works_is_readable(tmp_path):
+    path = new_run(tmp_path)
+    copies = tmp_path / "with log", tmp_path / "alone"
+    counts = []
+
+    def disturb(file):
+        append = file.append
+
+        def counted(*values):
+            event = append(*values)
+            if event.id == 20:
+                for folder in copies:
+                    folder.mkdir()
+                    shutil.copy(path, folder)
+                shutil.copy(f"{path}-wal", copies[0])
+                counts.append(len(file.events()))
+            return event
+
+        file.append = counted
+
+    drive(path, FakePool(oracle, 2), prepare=disturb)
+    for folder, events in zip(copies, (counts[0], 1), strict=True):
+        with RunFile(folder / path.name) as file:
+            found = whole(file)
+            assert (found.trouble, found.events) == ("", events)
+    drive(copies[1] / path.name, FakePool(oracle, 2))
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP])
+def test_a_folder_without_locks_is_told_in_one_line(tmp_path, monkeypatch, number):
+    path = new_run(tmp_path)
+
+    def refuse(*_):
+        raise OSError(number, "No locks available")
+
+    monkeypatch.setattr(lock.fcntl, "flock", refuse)
+    with (
+        pytest.raises(UserError, match=r"no engine can work here: its folder has no file locks .* copy the run"),
+        engine_lock(path),
+    ):
+        pass
+    assert not engine_is_alive(path)
+
+
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(tmp_path, monkeypatch):
+    path = new_run(tmp_path)
+
+    def refuse(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(lock.os, "open", refuse)
+    with pytest.raises(UserError, match="no engine can work here: Permission denied; copy the run"), engine_lock(path):
+        pass
+
+
+def test_an_error_of_writing_that_is_no_full_disk_is_not_waited_for(tmp_path):
+    path = new_run(tmp_path)
+    with RunFile(path) as file:
+        file.own(lambda _: pytest.fail("waits"))
+        file._db.execute("PRAGMA query_only = ON")
+        with pytest.raises(UserError, match="cannot be written") as told_once:
+            file.append("paused", {})
+    assert not isinstance(told_once.value, NoRoom)
+    assert sqlite3.connect(path).execute("SELECT count(*) FROM event").fetchone() == (1,)

@@ -1,0 +1,75 @@
+"""Why what is left makes the robot fail: every sentence says what the certificate's runs show, and where two of them part."""
+
+from array import array
+from dataclasses import replace
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.runs.reasons import APART, GOAL, F, Parting, parted, parting_sentence, reasons, sentence
+from tests.workbench import fake_moments, fake_run
+
+
+@pytest.fixture
+def found(tmp_path):
+    path = fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv")).path
+    with RunFile(path) as file:
+        state = fold(file.events())
+        return state, reasons(file, state)
+
+
+def test_there_is_a_reason_for_each_model_that_was_left_out_with_the_numbers_of_its_runs(found):
+    state, each = found
+    assert [one.without for one in each] == ["crate_00", "crate_01"]
+    for one in each:
+        tests = [test for test in state.confirm_tests if test.without == one.without]
+        assert one.runs == len(tests) == sum(end.number for end in one.ends)
+        counts = {end.kind: end.number for end in one.ends}
+        assert counts.get(F, 0) == sum(test.outcome == "similar" for test in tests)
+        assert counts.get(GOAL, 0) == sum(test.outcome == "pass" for test in tests)
+
+
+def test_the_sentence_begins_with_what_happens_most_often(found):
+    first, second = map(sentence, found[1])
+    assert first.startswith("Without crate_00 the robot reaches its goal after ")
+    assert "(9 of 11 fresh runs, 52 % to 95 %); it tips over elsewhere, near (" in first
+    assert second.endswith("; it still fails as in f in 1.")
+
+
+def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):
+    state, each = found
+    for one in each:
+        mine, other = (state.tests[test - 1] for test in (one.parting.with_test, one.parting.without_test))
+        assert mine.seed == other.seed == one.parting.seed
+        assert (mine.outcome, mine.without) == ("similar", None)
+        assert (other.outcome, other.without) == ("pass", one.without)
+
+
+def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_metre():
+    def way(*ys):
+        return array("d", [value for number, y in enumerate(ys) for value in (0.1 * number, number, y, 0, 1, 0, 0, 0)])
+
+    same = way(0, 0, 0, 0)
+    assert parted(same, same) == (pytest.approx(0.3), None, None)
+    # Equal again later does not count.
+    equal, apart, place = parted(same, way(0, 0.01, 0, APART))
+    assert (equal, apart, place) == (0.0, pytest.approx(0.3), (3.0, APART))
+    assert parted(same, way(0, 0, 0))[1] is None
+
+
+def test_it_says_when_the_robot_met_the_model_and_nothing_where_no_pair_shows_it(found):
+    one = found[1][0]
+    met = Parting(1, 2, 7, 1.2, 2.0, (-0.001, 3.0), 1.1, True)
+    assert parting_sentence(replace(one, parting=met)) == (
+        "With seed 7 the two runs differ after 1.2 s, and are 0.1 m apart after 2.0 s, at (0.00, 3.00) m. "
+        "With it there, the robot touches it after 1.1 s."
+    )
+    assert parting_sentence(replace(one, parting=None)) == ""
+
+
+def test_without_a_certificate_it_says_how_to_make_one(tmp_path):
+    path = fake_moments.uncertified(fake_run.FakeRun(tmp_path / "one.ddenv")).path
+    with RunFile(path) as file, pytest.raises(UserError, match="make one first: ddenv certify"):
+        reasons(file, fold(file.events()))

@@ -1,0 +1,165 @@
+"""What starts programs runs only if the user trusts it."""
+
+import json
+import os
+
+import pytest
+import yaml
+
+from ddenv.errors import UserError
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import create_run
+from ddenv.runs.trust import check_trusted, program_of, trust, trust_own
+from ddenv.world.load import load_scenario
+from tests.conftest import DATA
+from tests.tiers import slow
+
+HUSKY = DATA.parents[1] / "sdf" / "robots" / "husky.sdf"
+CONTROLLER = "import pathlib\n\npathlib.Path({mark!r}).touch()\n\n\nclass Mine:\n    pass\n"
+BRINGS = {
+    "command": {"oracle": {"command": "./sim.sh {world}"}},
+    "controller": {"controller": {"use": "mine:Mine"}},
+    "package": {"controller": {"use": "whole.part:Mine"}},
+    "installed": {"controller": {"use": "subprocess:Popen"}},
+}
+
+
+@pytest.fixture
+def scenario(home):
+    """Writes a scenario in a folder of the user's own; whatever of it starts leaves `home/started`."""
+    folder = home / "own"
+    folder.mkdir()
+    (folder / "sim.sh").write_text(f"#!/bin/sh\ntouch {home / 'started'}\nexit 1\n")
+    (folder / "sim.sh").chmod(0o755)
+    (folder / "whole").mkdir()
+    for file in (folder / "mine.py", folder / "whole" / "part.py"):
+        file.write_text(CONTROLLER.format(mark=str(home / "started")))
+
+    def written(brings):
+        data = yaml.safe_load((DATA / "wall.yaml").read_text()) | brings
+        data["world"], data["robot"]["model"] = str(DATA / "wall.sdf"), str(HUSKY)
+        (folder / "s.yaml").write_text(yaml.safe_dump(data))
+        return folder / "s.yaml"
+
+    return written
+
+
+@pytest.mark.parametrize("brings", BRINGS.values(), ids=BRINGS)
+def test_what_is_brought_along_is_trusted_as_it_is(scenario, brings):
+    loaded = load_scenario(scenario(brings))
+    with pytest.raises(UserError, match=r"mail\.ddenv: would start the (command|controller) .* give --trust"):
+        check_trusted(loaded, "mail.ddenv")
+    trust(program_of(loaded))
+    check_trusted(loaded, "mail.ddenv")
+
+
+@pytest.mark.parametrize(
+    ("brings", "file"), [("command", "sim.sh"), ("controller", "mine.py"), ("package", "whole/part.py")]
+)
+def test_a_program_that_has_changed_is_not_what_was_trusted(scenario, brings, file):
+    path = scenario(BRINGS[brings])
+    trust(program_of(load_scenario(path)))
+    with (path.parent / file).open("a") as changed:
+        changed.write("# changed\n")
+    with pytest.raises(UserError):
+        check_trusted(load_scenario(path), path)
+
+
+@pytest.mark.parametrize("name", ["mine/__init__.py", "mine.cpython-311-x86_64-linux-gnu.so"])
+def test_what_python_would_import_first_is_not_what_was_trusted(scenario, name):
+    path = scenario(BRINGS["controller"])
+    trust(program_of(load_scenario(path)))
+    first = path.parent / name
+    first.parent.mkdir(exist_ok=True)
+    first.write_text("class Mine: ...")
+    with pytest.raises(UserError):
+        check_trusted(load_scenario(path), path)
+
+
+def test_what_ddenv_brings_needs_no_trust():
+    assert program_of(load_scenario(DATA / "wall.yaml")) is None
+
+
+def test_a_file_of_the_users_own_is_trusted_and_one_that_others_can_write_is_not(scenario):
+    path = scenario(BRINGS["controller"])
+    path.chmod(0o666)
+    trust_own(load_scenario(path), path)
+    with pytest.raises(UserError):
+        check_trusted(load_scenario(path), path)
+    path.chmod(0o644)
+    trust_own(load_scenario(path), path)
+    check_trusted(load_scenario(path), path)
+
+
+@pytest.mark.parametrize("damage", ["{", "[1, {}]", '{"a": 1}', ""])
+def test_damaged_memory_trusts_nothing(scenario, home, damage):
+    loaded = load_scenario(scenario(BRINGS["command"]))
+    (home / "trusted.json").write_text(damage)
+    with pytest.raises(UserError):
+        check_trusted(loaded, "a run")
+
+
+COMMANDS = {
+    "resume": ["resume", "RUN"],
+    "resume again": ["resume", "RUN", "--again"],
+    "test": ["test", "RUN"],
+    "certify": ["certify", "RUN"],
+}
+
+
+@pytest.mark.parametrize("words", slow(pytest.mark.programs, COMMANDS, but=["resume", "test"]))
+@pytest.mark.parametrize("brings", ["command", "controller"])
+def test_a_mailed_run_starts_nothing(scenario, home, monkeypatch, capsys, words, brings):
+    from tests.command import in_process
+
+    run = home / "mail.ddenv"
+    create_run(load_scenario(scenario(BRINGS[brings])), run)
+    done = in_process(monkeypatch, capsys, *[str(run) if word == "RUN" else word for word in COMMANDS[words]])
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "mail.ddenv" in done.stderr and "--trust" in done.stderr
+    assert not (home / "started").exists()
+
+
+@pytest.mark.programs
+@pytest.mark.parametrize("brings", ["command", "controller"])
+def test_no_engine_starts_it_either(scenario, home, brings):
+    from ddenv.runs.programs import last_words, start_engine
+
+    run = home / "mail.ddenv"
+    create_run(load_scenario(scenario(BRINGS[brings])), run)
+    assert start_engine(run, 1).wait(60) == 2
+    assert "would start the" in last_words(run)
+    assert not (home / "started").exists()
+
+
+@pytest.mark.programs
+def test_what_the_user_trusts_starts_and_is_not_asked_about_again(scenario, home):
+    from tests.command import ddenv
+
+    path, run = scenario(BRINGS["command"]), home / "mail.ddenv"
+    create_run(load_scenario(path), run)
+    env = os.environ | {"DDENV_HOME": str(home)}
+    done = ddenv("test", run, "--trust", "--json", env=env)
+    assert done.returncode == 0, done.stderr
+    assert (home / "started").exists()
+    assert len(json.loads(ddenv("test", run, "--json", env=env).stdout)["runs"]) == 1
+
+
+@pytest.mark.programs
+def test_a_scenario_of_the_users_own_starts_by_its_name(scenario, home):
+    from tests.command import ddenv
+
+    done = ddenv("test", scenario(BRINGS["command"]), "--json", env=os.environ | {"DDENV_HOME": str(home)})
+    assert done.returncode == 0, done.stderr
+    assert (home / "started").exists()
+
+
+def test_a_run_file_is_the_users_own_until_it_is_opened_to_others(home):
+    run = home / "run.ddenv"
+    create_run(load_scenario(DATA / "wall.yaml"), run)
+    assert run.stat().st_mode & 0o777 == 0o600
+    run.chmod(0o640)
+    with RunFile(run) as file:
+        file.append("accept_mode", {"mode": "ask"})
+    assert run.stat().st_mode & 0o777 == 0o640

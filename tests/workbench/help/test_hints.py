@@ -1,0 +1,92 @@
+"""Keys that stand in the borders of dialogs and panes: each can be clicked, and does what the key does."""
+
+import fake_moments
+import fake_run
+import pytest
+from test_snapshots import OPENED, SMALL, USUAL
+from textual.widgets import Tooltip
+
+from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.hints import Framed, clickable
+from ddenv.workbench.runs.runs_table import RunList
+from tests.tiers import slow
+from tests.waiting import eventually
+
+# What an input or a scrolled text does with them is no binding of the screen.
+OF_WIDGETS = {"enter", "up", "down", "tab"}
+
+
+def hints(screen):
+    """Where each key of the screen's borders can be clicked: the last cell of its words, by key."""
+    found = {}
+    for framed in screen.query(Framed):
+        y = framed.region.bottom - 1
+        for x in range(framed.region.x, framed.region.right):
+            if key := screen.get_style_at(x, y).meta.get("key"):
+                found[key] = x, y
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("enter opens   escape cancels", [("enter opens", "enter"), ("escape cancels", "escape")]),
+        ("← → other tests", [("←", "left"), ("→ other tests", "right")]),
+        ("tab or click chooses more", [("tab or click chooses more", "tab")]),
+        ("enter or ctrl+s writes", [("enter or", "enter"), ("ctrl+s writes", "ctrl+s")]),
+        ("l let it run on   s stop", [("l let it run on", "l"), ("s stop", "s")]),
+        ("7 of 9 judged", [("7 of 9 judged", "7")]),
+        ("no key at all", []),
+    ],
+)
+def test_each_key_has_the_words_behind_it(text, keys):
+    found = clickable(text)
+    assert found.plain == text
+    assert [(found.plain[at.start : at.end], at.style.meta["key"]) for at in found.spans] == keys
+
+
+@pytest.mark.parametrize("name", slow(pytest.mark.screens, OPENED, but=["help", "facts", "settings"]))
+async def test_a_dialog_obeys_each_key_that_it_shows_and_closes_by_a_click(run, name):
+    fake_moments.guided(run).hold()
+    app = Workbench(run.path)
+    async with app.run_test(size=USUAL) as pilot:
+        await pilot.pause()
+        for key in OPENED[name]:
+            await pilot.press(key)
+            await pilot.pause()
+        screen, shown = app.screen, hints(app.screen)
+        assert set(shown) - OF_WIDGETS <= set(screen.active_bindings), name
+        if screen.is_modal and screen.query(Framed):
+            assert await pilot.click(offset=next(shown[key] for key in ("escape", "n", "c") if key in shown))
+            await eventually(lambda: app.screen is not screen)
+
+
+async def test_a_click_in_a_pane_without_the_focus_is_for_this_pane(scenarios, runs):
+    fake_moments.finished(fake_run.FakeRun(runs / "crates-1.ddenv")).close()
+    app = Workbench()
+    async with app.run_test(size=USUAL) as pilot:
+        await eventually(lambda: len(app.screen.query(RunList)) and app.screen.query_one(RunList).option_count)
+        await pilot.pause()
+        assert not app.screen.query_one(RunList).has_focus
+        await pilot.click(offset=hints(app.screen)["enter"])
+        await eventually(lambda: type(app.screen).__name__ == "RunScreen")
+
+
+async def test_a_hint_has_the_users_own_key_and_a_tooltip(run):
+    fake_moments.guided(run).hold()
+    app = Workbench(run.path, config=Config(keys={"run.method": "ctrl+e"}))
+    app.TOOLTIP_DELAY = 0.01
+    async with app.run_test(size=SMALL, tooltips=True) as pilot:
+        await pilot.pause()
+        await pilot.press("4")
+        await pilot.pause()
+        pane = app.screen.query_one("#now", Framed)
+        assert "ctrl+e explains" in str(pane.border_subtitle)
+        at = hints(app.screen)["ctrl+e"]
+        await pilot.hover(offset=at)
+        tooltip = app.screen.query_one(Tooltip)
+        await eventually(lambda: tooltip.display and "explain" in str(tooltip.render()))
+        await pilot.hover(offset=(1, 1))
+        await eventually(lambda: not tooltip.display and not pane.tooltip)
+        await pilot.click(offset=at)
+        await eventually(lambda: type(app.screen).__name__ == "Method")

@@ -1,0 +1,135 @@
+"""A student's own search on the screen: by keys and by mouse, right, wrong, skipped, and gone back to."""
+
+import pytest
+from textual.widgets import Static
+
+from ddenv.learn.score import Score
+from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.workbench.app import Workbench
+from ddenv.workbench.learn.kept_scores import all_scores, keep_score
+from ddenv.workbench.learn.lesson_screen import LessonScreen
+from ddenv.workbench.learn.try_screen import TryScreen
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.messages import ShowLessons
+from tests.tiers import slow
+from tests.waiting import eventually
+
+SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
+NAME = "what-delta-debugging-is"
+STEP = next(number for number, step in enumerate(open_lesson(bundled()[0]).lesson.steps) if step.budget)
+
+
+@pytest.fixture
+def at_the_step():
+    keep_score(NAME, Score(step=STEP))
+    return Workbench(first=ShowLessons(bundled()[0]))
+
+
+async def begin(pilot):
+    await pilot.pause()
+    assert isinstance(pilot.app.screen, LessonScreen)
+    await pilot.press("enter")
+    screen = pilot.app.screen
+    assert isinstance(screen, TryScreen)
+    await eventually(lambda: screen.query_one(WorldMap).picture is not None)
+    return screen
+
+
+def said(pilot, name="try-said"):
+    return str(pilot.app.screen.query_one(f"#{name}", Static).content)
+
+
+async def without(pilot, *names):
+    pilot.app.screen.query_one(WorldMap).select(names)
+    await pilot.pause()
+    await pilot.press("w")
+    await pilot.pause()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+async def test_a_search_by_keys_that_finds_a_minimal_set(at_the_step, size):
+    async with at_the_step.run_test(size=size) as pilot:
+        screen = await begin(pilot)
+        # The first model and the third.
+        await pilot.press(*["right_square_bracket", "enter", "right_square_bracket", "right_square_bracket", "space"])
+        await pilot.pause()
+        assert "*bench" in said(pilot) and "*plant" in said(pilot) and "2 marked" in said(pilot)
+        await pilot.press("w")
+        await pilot.pause()
+        assert len(screen.attempt.held) == 6 and "f again without bench, plant" in said(pilot)
+        assert "without bench, plant" in said(pilot, "try-table") and "6 of 8 models held" in said(pilot, "try-header")
+        await without(pilot, "sign")
+        assert "another failure" in said(pilot) and len(screen.attempt.held) == 6
+        screen.query_one(WorldMap).select(["sign", "crate"])
+        await pilot.pause()
+        await pilot.press("o")
+        await pilot.pause()
+        assert screen.attempt.held == ("sign", "crate") and "17 of 20 tests left" in said(pilot, "try-header")
+        await pilot.press("m")
+        assert not screen.attempt.ended and "Sure that no single one of 2 models" in said(pilot)
+        await pilot.press("m")
+        await pilot.pause()
+        assert "✓ 1-minimal" in said(pilot) and "No smaller set shows f" in said(pilot)
+        # The race of this lesson is still to come.
+        assert "splitting" not in said(pilot, "try-table") and "log2 C(8, 2)" in said(pilot, "try-table")
+        await pilot.press("escape")
+        await pilot.pause()
+        course = pilot.app.screen.course
+        assert not course.due and "No smaller set shows f" in said(pilot, "lesson-text")
+        assert "The race to come" in said(pilot, "lesson-text")
+        await pilot.press("enter")
+        assert course.step == STEP + 1
+    assert all_scores()[NAME].answered[str(STEP)] is True
+
+
+async def test_a_wrong_claim_is_said_to_be_wrong_and_can_be_tried_again(at_the_step):
+    async with at_the_step.run_test(size=(80, 24)) as pilot:
+        screen = await begin(pilot)
+        await pilot.press("w")
+        assert not screen.attempt.tried, "nothing is marked"
+        await without(pilot, "bin")
+        await pilot.press("m", "m")
+        await pilot.pause()
+        assert "✗ Not 1-minimal: f also shows without any one of bench, plant" in said(pilot)
+        await pilot.press("n")
+        await pilot.pause()
+        assert not screen.attempt.moves and "8 of 8" in said(pilot, "try-header")
+        await without(pilot, "pallet")
+        await pilot.press("u", "escape")
+        await pilot.pause()
+        assert "`" not in said(pilot, "lesson-text") and "t goes on with it" in said(pilot, "lesson-text")
+        await pilot.press("t")
+        await pilot.pause()
+        assert [each.out for each in pilot.app.screen.attempt.tried] == [("pallet",)]
+        assert len(pilot.app.screen.attempt.held) == 8
+    kept = all_scores()[NAME]
+    assert kept.answered[str(STEP)] is False and kept.moves[str(STEP)][-1] == "back"
+
+
+async def test_a_search_is_skipped_and_gone_back_to(at_the_step):
+    async with at_the_step.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        course = pilot.app.screen.course
+        await pilot.press("s", "enter")
+        assert course.step == STEP + 1 and not course.score.answered
+        await pilot.press("backspace")
+        assert course.due
+        await pilot.press("enter")
+        await pilot.pause()
+        assert isinstance(pilot.app.screen, TryScreen)
+
+
+async def test_models_are_marked_by_mouse_on_the_map_and_in_the_list(at_the_step):
+    async with at_the_step.run_test(size=(120, 36)) as pilot:
+        screen = await begin(pilot)
+        world = screen.query_one(WorldMap)
+        world.go_to("pallet")
+        row, column = world.viewport.cursor
+        world.go_to("bench")
+        await pilot.click(WorldMap, offset=(column, row))
+        assert world.selection == {"pallet"}
+        column = said(pilot).splitlines()[1].index("sign")
+        await pilot.click("#try-said", offset=(column + 1, 1))
+        assert world.selection == {"pallet", "sign"}
+        await pilot.click("#try-said", offset=(column + 1, 1))
+        assert world.selection == {"pallet"}
