@@ -152,7 +152,7 @@ async def test_small_terminals_show_one_pane_at_a_time_and_keys_go_through_them(
         await session.press("v")
         assert "2 shows the table" in session.said()
         footer = [key.words for key in session.screen.query_one(KeyFooter).entries]
-        assert footer == ["pause", "step", "pin", "try without", "undo", "history", "export", "help", "quit"]
+        assert footer == ["pause", "step", "pins", "try without", "undo", "history", "export", "help", "quit"]
         await session.pilot.resize_terminal(200, 60)
         await session.pilot.pause()
         more = ("#models", "#decisions", *panes)
