@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from textual.screen import Screen
 
+from ddenv.workbench.setup.fields import OptionsForm
+from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.widgets.panes import Panes
-
-if TYPE_CHECKING:
-    from ddenv.workbench.setup.setup_screen import SetupScreen
 
 SMALLEST = (64, 18)
 # From this size on all panes are shown at once.
@@ -19,19 +18,20 @@ PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
 HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
 
 
-def arrange(screen: SetupScreen, pane: str) -> None:
-    """Shows all panes, or only `pane`."""
+def arrange(screen: Screen[None], pane: str) -> None:
+    """Shows all panes of the setup screen, or only `pane`."""
+    form, preview = screen.query_one(OptionsForm), screen.query_one(Preview)
     # Not by classes of the screen: these would compute all styles again.
     width, height = screen.size
     all = width >= ROOMY[0] and height >= ROOMY[1]
     fits = width >= SMALLEST[0] and height >= SMALLEST[1]
-    screen.form.display = fits
+    form.display = fits
     screen.query_one("#body").display = fits and (all or pane != "settings")
     screen.query_one("#choice").display = all or pane == "choose"
-    screen.form.show_fields(all or pane == "settings")
-    screen.form.set_class(not all and pane == "settings", "-alone")
-    screen.preview.set_class(not all and pane == "map", "-alone")
-    screen.form.set_class(not all, "-frameless")
+    form.show_fields(all or pane == "settings")
+    form.set_class(not all and pane == "settings", "-alone")
+    preview.set_class(not all and pane == "map", "-alone")
+    form.set_class(not all, "-frameless")
     panes = screen.query_one(Panes)
     panes.display = not all
     panes.mark(pane)
