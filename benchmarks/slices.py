@@ -1,12 +1,14 @@
 """Whether a run really repeats where what took no part in it is removed: simulates tests that a finished run implies.
 
-    python benchmarks/slices.py [--tests N] [--worlds N] [WORLD --spawn X,Y,Z,YAW --goal X,Y]
-    python benchmarks/slices.py --forget KIND
+    python benchmarks/slices.py [--worlds N] [--tests N] [--from NUMBER]
+    python benchmarks/slices.py ditch|friction|rubble [--seconds S] [--tests N]
+    python benchmarks/slices.py WORLD --spawn X,Y,Z,YAW --goal X,Y [--stand-in URI=SHAPE] [--seconds S] [--tests N]
+    python benchmarks/slices.py ... --forget KIND
 
-Without a world file: the three scenarios, and random worlds of tiles, walls, doors, piles, shelves and balls. Of each world, random
-parts run, and then random parts of these that keep what took part and break no tie. Every bit must be the same. With `--forget`
-one kind of participant is left out on purpose, which the comparison must find. Prints a row for each world, and what recording who
-took part adds to the time of its runs; exits with 1 if tests differ.
+Without a name: small random worlds (`small_worlds.py`), N of each kind. Of each world, random parts run, and then random parts of
+these that keep what took part and break no tie. Every bit must be the same. With `--forget` one kind of participant is left out on
+purpose, which the comparison must find. Prints a row for each kind of world; exits with 1 if tests differ. *Recording* is what
+recording who took part adds to the time of a run.
 """
 
 from __future__ import annotations
@@ -15,19 +17,23 @@ import argparse
 import random
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
+from small_worlds import KINDS, small_scenario, small_world
+
 from ddenv.robot.drake.template import Template, Variants
+from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.runs.scenarios import load_parts, scenario_for_world
+from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.slices import Ties
-from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
+from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World
-from ddenv.world.read import parse_world, read_model
+from ddenv.world.read import read_model
 from ddenv.world.scenario import Scenario
 
 FORGOTTEN = {
@@ -35,63 +41,101 @@ FORGOTTEN = {
     "models": lambda: setattr(Reached, "_look_around_models", lambda *_: None),
     "awake": lambda: setattr(Sleep, "took_part", frozenset()),
     "lidar": lambda: setattr(Lidar, "took_part", frozenset()),
+    "unusual": lambda: setattr(Repertoire, "unusual", lambda *_: frozenset()),
+    "carriers": lambda: setattr(Template, "_carriers", lambda *_: frozenset()),
     "ties": lambda: setattr(Template, "ties", lambda *_: []),
 }
 # Implied tests of each run.
 PARTS = 4
+# How often a part is drawn that is smaller than what ran, and was not drawn before.
+DRAWS = 10
+
+
+@dataclass
+class Count:
+    """Of one kind of world: how many worlds, runs, implied tests and differences, and what all that took, CPU s."""
+
+    worlds: int = 0
+    runs: int = 0
+    tests: int = 0
+    differ: int = 0
+    seconds: float = 0.0
+    recording: float = 0.0
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("world", nargs="?", type=Path)
+    parser.add_argument("world", nargs="?", help="a scenario's name or a world file")
     parser.add_argument("--spawn", default="0,0,0.2,0", help="x, y, z m and yaw rad; with a world file")
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
+    parser.add_argument("--stand-in", action="append", default=[], help="as in `ddenv run`; with a world file")
+    parser.add_argument("--seconds", type=float, help="simulated time of a run; the scenario's by default")
     parser.add_argument("--tests", type=int, default=40, help="implied tests of each world")
-    parser.add_argument("--worlds", type=int, default=10, help="random worlds")
+    parser.add_argument("--worlds", type=int, default=10, help="small worlds of each kind")
+    parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first small world, and seed")
     parser.add_argument("--forget", choices=FORGOTTEN, help="a kind of participant to leave out")
     options = parser.parse_args()
     if options.forget:
         FORGOTTEN[options.forget]()
-    print("| world | models | took part in the whole | implied tests | that differ | recording |")
-    print("|---|---|---|---|---|---|", flush=True)
-    return int(sum([row(*each, options.tests) for each in worlds(options)]) > 0)
-
-
-def worlds(options: argparse.Namespace) -> Iterator[tuple[World, Model, Scenario]]:
+    print("| worlds | how many | runs | implied tests | that differ | CPU s | recording |")
+    print("|---|---|---|---|---|---|---|", flush=True)
     if options.world is not None:
+        return int(row(options.world, [named(options)], options.tests, options.first) > 0)
+    husky = read_model(SDF / "robots" / "husky.sdf")
+    numbers = range(options.first, options.first + options.worlds)
+    differ = [
+        row(kind, ((small_world(kind, one), husky, small_scenario(one)) for one in numbers), options.tests, 0)
+        for kind in KINDS
+    ]
+    return int(sum(differ) > 0)
+
+
+def named(options: argparse.Namespace) -> tuple[World, Model, Scenario]:
+    bundled = SCENARIOS / f"{options.world}.yaml"
+    if bundled.is_file():
+        scenario = load_scenario(bundled)
+    else:
         x, y, z, yaw = map(float, options.spawn.split(","))
         goal_x, goal_y = map(float, options.goal.split(","))
-        scenario = scenario_for_world(options.world, (x, y, z, yaw), (goal_x, goal_y))
-        yield *load_parts(scenario), scenario
-        return
-    for name in ("ditch", "friction", "rubble"):
-        scenario = load_scenario(SCENARIOS / f"{name}.yaml")
-        yield *load_parts(scenario), scenario
-    husky = read_model(SDF / "robots" / "husky.sdf")
-    for number in range(options.worlds):
-        yield random_world(number), husky, random_scenario(number)
+        scenario = scenario_for_world(Path(options.world), (x, y, z, yaw), (goal_x, goal_y))
+        scenario = with_options(scenario, reading=reading_of(stand_in=options.stand_in))
+    scenario = with_options(scenario, timeout=options.seconds)
+    return *load_parts(scenario), scenario
 
 
-def row(world: World, robot: Model, scenario: Scenario, tests: int) -> int:
-    """Prints the row of one world. Returns how many of its implied tests differ."""
-    simulator, chance = Variants(world, robot, scenario), random.Random(0)
-    everything = frozenset(world.elements())
+def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, first: int) -> int:
+    """Prints the row of one kind of world. Returns how many of its implied tests differ."""
+    found, began = Count(), time.process_time()
+    for world, robot, scenario in worlds:
+        audit(Variants(world, robot, scenario), frozenset(world.elements()), tests, first, found)
+    found.seconds = time.process_time() - began
+    print(
+        f"| {kind} | {found.worlds} | {found.runs} | {found.tests} | {found.differ} | {found.seconds:.0f} "
+        f"| {found.recording / max(found.worlds, 1):+.1%} |",
+        flush=True,
+    )
+    return found.differ
+
+
+def audit(simulator: Variants, everything: frozenset[str], tests: int, first: int, found: Count) -> None:
+    """Simulates implied tests in one world, and counts them in `found`."""
+    chance = random.Random(first)
     ties = Ties.among(simulator.ties(everything) or ())
-    whole = simulator.run(everything, 0)
-    assert whole.took_part is not None, "who took part is unknown"
-    differ, recording = 0, cost(simulator, everything)
-    for seed in range(tests // PARTS):
+    found.worlds += 1
+    found.recording += cost(simulator, everything)
+    for seed in range(first, first + tests // PARTS):
         there = everything if seed % 2 == 0 else part(everything, chance)
         made = simulator.run(there, seed)
+        found.runs += 1
         if made.took_part is None:
             continue
-        for _ in range(PARTS):
-            keep = ties.closed((made.took_part & there) | part(there, chance), there)
-            differ += bits(simulator.run(keep, seed), keep) != bits(made, keep)
-    met = len(whole.took_part & everything)
-    count = tests // PARTS * PARTS
-    print(f"| {scenario.name} | {len(everything)} | {met} | {count} | {differ} | {recording:+.1%} |", flush=True)
-    return differ
+        took_part, tried = made.took_part & there, {there}
+        for _ in range(DRAWS):
+            keep = ties.closed(took_part | part(there, chance), there)
+            if keep not in tried and len(tried) <= PARTS:
+                tried.add(keep)
+                found.tests += 1
+                found.differ += bits(simulator.run(keep, seed), keep) != bits(made, keep)
 
 
 def part(models: frozenset[str], chance: random.Random) -> frozenset[str]:
@@ -109,91 +153,16 @@ def cost(simulator: Variants, keep: frozenset[str]) -> float:
 
     def timed(*arguments: object) -> None:
         nonlocal spent
-        began = time.perf_counter()
+        began = time.process_time()
         look(*arguments)  # type: ignore[arg-type]
-        spent += time.perf_counter() - began
+        spent += time.process_time() - began
 
     Reached.look = timed  # type: ignore[method-assign, assignment]
-    began = time.perf_counter()
+    began = time.process_time()
     simulator.run(keep, 0)
-    whole = time.perf_counter() - began
+    whole = time.process_time() - began
     Reached.look = look  # type: ignore[method-assign]
     return spent / (whole - spent)
-
-
-def random_scenario(number: int) -> Scenario:
-    """It sees by lidar in every second world."""
-    sees = {"sensors": {"lidar": {"range": 6.0}}, "controller": {"use": "costmap"}} if number % 2 else {}
-    data = {
-        "name": f"random {number}",
-        "world": "random.sdf",
-        "robot": {"model": "husky.sdf", "spawn": {"x": 0, "y": 0, "z": 0.14}},
-        "goal": {"x": 6, "y": 0},
-        "failure": {"timeout": 8.0},
-    }
-    return validate(data | sees, "slices")
-
-
-def random_world(number: int) -> World:
-    """A flat world with things beside and in the robot's way."""
-    chance = random.Random(number)
-    kinds = (tile, wall, door, pile, shelf, ball)
-    places = ((chance.uniform(0.9, 5.0), chance.uniform(-4.0, 4.0)) for _ in range(24))
-    things = "".join(chance.choice(kinds)(number, x, y) for number, (x, y) in enumerate(places))
-    ground = model("ground", 0, 0, 0, "<plane><normal>0 0 1</normal></plane>")
-    return parse_world(
-        f'<sdf version="1.9"><world name="w">{ground}{things}</world></sdf>'.encode(), Path("random.sdf")
-    )
-
-
-def tile(number: int, x: float, y: float) -> str:
-    return model(f"tile_{number}", x, y, 0.01, box(0.5, 0.4, 0.02))
-
-
-def wall(number: int, x: float, y: float) -> str:
-    return model(f"wall_{number}", x, y, 0.5, box(0.2, 0.6, 1.0))
-
-
-def door(number: int, x: float, y: float) -> str:
-    hinge = (
-        '<joint name="hinge" type="revolute"><parent>world</parent><child>link</child><pose>0 0.5 0 0 0 0</pose>'
-        "<axis><xyz>0 0 1</xyz><dynamics><damping>0.5</damping></dynamics></axis></joint>"
-    )
-    return model(f"door_{number}", x, y, 0.6, box(0.05, 1.0, 0.8), mass=3.0, more=hinge)
-
-
-def pile(number: int, x: float, y: float) -> str:
-    cubes = [
-        model(f"pile_{number}_{storey}", x + 0.1 * storey, y, 0.15 + 0.31 * storey, CUBE, 1.0) for storey in (0, 1)
-    ]
-    return "".join(cubes)
-
-
-def shelf(number: int, x: float, y: float) -> str:
-    return model(f"shelf_{number}", x, y, 0.2, box(0.4, 0.4, 0.4)) + model(f"on_shelf_{number}", x, y, 0.55, CUBE, 1.0)
-
-
-def ball(number: int, x: float, y: float) -> str:
-    return model(f"ball_{number}", x, y, 0.8, "<sphere><radius>0.2</radius></sphere>", 1.0)
-
-
-def box(x: float, y: float, z: float) -> str:
-    return f"<box><size>{x} {y} {z}</size></box>"
-
-
-CUBE = box(0.3, 0.3, 0.3)
-
-
-def model(name: str, x: float, y: float, z: float, shape: str, mass: float = 0.0, more: str = "") -> str:
-    """A model of one shape, static without a mass (kg)."""
-    moments = "".join(f"<{axis}>{0.03 * mass}</{axis}>" for axis in ("ixx", "iyy", "izz"))
-    inertial = f"<inertial><mass>{mass}</mass><inertia>{moments}</inertia></inertial>" if mass else ""
-    static = "" if mass else "<static>true</static>"
-    collision = f'<collision name="c"><geometry>{shape}</geometry></collision>'
-    return (
-        f'<model name="{name}">{static}<pose>{x} {y} {z} 0 0 0</pose><link name="link">{inertial}{collision}</link>{more}'
-        "</model>"
-    )
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.listening import Heard, Listener
+from ddenv.robot.navigation.costmap import horizon
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled
@@ -72,8 +73,8 @@ class Template:
         self._sleeping = True
         self._reach = reach(robot) + YIELD
         self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
-        # What decides in a run is known: no controller of the user's, and nothing that removed models could stir.
-        self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
+        # What decides in a run is known: no controller of the user's.
+        self._slices = scenario.controller.use in BUILT_IN
         self._surround(_region(world, scenario))
         self._build(names)
 
@@ -233,7 +234,9 @@ class Template:
         settings = self._scenario.sensors.lidar
         if settings is None or self._obstacles is None:
             return None
-        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
+        moving, controller = [self._models[body.name] for body in kept], self._scenario.controller
+        beyond = horizon(controller.planner, settings.x, settings.y) if controller.use == "costmap" else math.inf
+        return Lidar(settings, self._obstacles, present, moving, suite.lidar, beyond)
 
 
 def _setup(robot: Model, drive: Drive, clock: Clock, scenario: Scenario) -> Setup:

@@ -11,11 +11,23 @@ from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.protocol import Setup
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.world.scenario import Planner
 
 # A beam clears a cell if it goes farther than the cell by this many cells.
 PASSED = 1.5
 # When the robot tilts more than this (rad), its beams pass above or below what they would clear.
 LEVEL = 0.12
+
+
+def horizon(planner: Planner, x: float, y: float) -> float:
+    """Hits beyond this range (m) are none to the map: a lidar at `x`, `y` (m) in the robot's frame sees past all of it."""
+    corner = math.sqrt(2.0) * (_width(planner) / 2 + 1) * planner.resolution
+    return corner + math.hypot(x, y) + PASSED * planner.resolution
+
+
+def _width(planner: Planner) -> int:
+    """The map's width, cells."""
+    return max(round(planner.size / planner.resolution), 4)
 
 
 class Costmap:
@@ -28,9 +40,9 @@ class Costmap:
     """
 
     def __init__(self, setup: Setup) -> None:
-        planner = setup.settings.planner
-        self.resolution = planner.resolution
-        self.count = max(round(planner.size / planner.resolution), 4)
+        self._planner: Planner = setup.settings.planner
+        self.resolution = self._planner.resolution
+        self.count = _width(self._planner)
         self.spots = np.empty((3, 0))
         self.version = 0
         body = Footprint.of(setup)
@@ -39,7 +51,7 @@ class Costmap:
         self._half = (body.ahead + body.behind) / 2 - self.resolution
         self._side = body.side - self.resolution
         # The wheels stand this far below the frame of the points.
-        self._lowest = planner.lowest - setup.radius
+        self._lowest = self._planner.lowest - setup.radius
         self._slots: Integers = np.empty(0, dtype=int)
         # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
         self._known = self._slots
@@ -65,6 +77,9 @@ class Costmap:
             self._angles, self._beams = scan.angles, np.stack([np.cos(scan.angles), np.sin(scan.angles)])
             # The outermost beams, which have one neighbour only, clear nothing.
             self._far = np.zeros(len(scan.angles))
+        # So it is certain that what lies beyond takes no part in a run.
+        beyond = horizon(self._planner, *scan.origin[:2])
+        scan = Scan(scan.time, scan.angles, np.where(scan.ranges > beyond, np.inf, scan.ranges), scan.origin)
         roll, pitch = (imu.roll, imu.pitch) if imu else (0.0, 0.0)
         self._mark(scan, estimate, roll, pitch)
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)

@@ -33,7 +33,8 @@ DRAWS = 2**40
 class Lidar:
     """Measures the distances to the kept models of a world, never to the robot itself.
 
-    `present` are the names of the kept models, `moving` the ones among them that move.
+    `present` are the names of the kept models, `moving` the ones among them that move. Whoever reads its scans takes what is
+    measured beyond `horizon` (m) for nothing.
     """
 
     def __init__(
@@ -43,8 +44,10 @@ class Lidar:
         present: frozenset[str],
         moving: Sequence[Model],
         random: np.random.Generator,
+        horizon: float = math.inf,
     ) -> None:
         self._settings = settings
+        self._horizon = min(horizon, settings.range)
         self._mount = Pose((settings.x, settings.y, settings.z))
         self._random = random
         self._state = random.bit_generator.state
@@ -123,14 +126,18 @@ class Lidar:
         origins = np.array([turn.place.position for turn in turns])
         axes = np.array([turn.place.rotation() for turn in turns]).transpose(0, 2, 1)
         ends = cast(self._fan, turns[0].near.shapes, origins, axes)
-        for turn, distances in zip(turns, ends.distances, strict=True):
+        matters: Booleans = np.empty(ends.distances.shape, dtype=bool)
+        for number, (turn, distances) in enumerate(zip(turns, ends.distances, strict=True)):
             ranges = self._noise(turn.number) + distances
+            # What is behind a hit is farther, and has the same noise: it does not matter either.
+            matters[number] = ranges <= self._horizon
             ranges[(ranges < nearest) | (ranges > farthest)] = np.inf
             turn.ranges = ranges
         beams, shapes = ends.first()
         scans, owners = beams // len(self._fan.angles), turns[0].near.owners[shapes]
+        mattered = matters.ravel()[beams]
         for number, turn in enumerate(turns):
-            turn.met = np.unique(owners[scans == number])
+            turn.met = np.unique(owners[mattered & (scans == number)])
         return ends
 
     def _noise(self, number: int) -> Floats:
@@ -196,7 +203,7 @@ def _firsts(models: Sequence[Model]) -> list[int]:
 class Turn:
     """Scan `number` of a lidar, at `time` (s): its pose and the shapes that its beams may hit.
 
-    Once computed: its ranges, and the models on which its beams ended, also those too near to be measured.
+    Once computed: its ranges, and the models on which its beams ended short of the horizon, also those too near to be measured.
     """
 
     time: float
