@@ -46,7 +46,7 @@ FORGOTTEN = {
     "ties": lambda: setattr(Template, "ties", lambda *_: []),
 }
 # Implied tests of each run.
-PARTS = 4
+PARTS = 6
 # How often a part is drawn that is smaller than what ran, and was not drawn before.
 DRAWS = 10
 
@@ -70,7 +70,7 @@ def main() -> int:
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
     parser.add_argument("--stand-in", action="append", default=[], help="as in `ddenv run`; with a world file")
     parser.add_argument("--seconds", type=float, help="simulated time of a run; the scenario's by default")
-    parser.add_argument("--tests", type=int, default=40, help="implied tests of each world")
+    parser.add_argument("--tests", type=int, default=36, help="implied tests of each world, at most")
     parser.add_argument("--worlds", type=int, default=10, help="small worlds of each kind")
     parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first small world, and seed")
     parser.add_argument("--forget", choices=FORGOTTEN, help="a kind of participant to leave out")

@@ -12,8 +12,8 @@ from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario
 
 # How many things a world has, and how long its robot drives, s.
-THINGS = 9
-SECONDS = 3.0
+THINGS = 7
+SECONDS = 2.0
 Thing = Callable[[int, float, float], str]
 
 
@@ -33,7 +33,7 @@ def small_scenario(number: int) -> Scenario:
 def small_world(kind: str, number: int) -> World:
     """A flat world of some of `KINDS`."""
     chance = random.Random(f"{kind} {number}")
-    places = ((chance.uniform(0.9, 3.2), chance.uniform(-3.0, 3.0)) for _ in range(THINGS))
+    places = ((chance.uniform(0.9, 2.6), chance.uniform(-2.5, 2.5)) for _ in range(THINGS))
     things = "".join(chance.choice(KINDS[kind])(one, x, y) for one, (x, y) in enumerate(places))
     ground = model("ground", 0, 0, 0, "<plane><normal>0 0 1</normal></plane>")
     text = f'<sdf version="1.9"><world name="w">{ground}{things}</world></sdf>'

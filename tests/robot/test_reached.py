@@ -95,7 +95,7 @@ def test_a_model_takes_part_if_a_beam_ends_on_it_that_somebody_reads(flat):
 
 
 def test_what_the_map_cannot_hold_takes_no_part_although_beams_end_on_it(flat):
-    near, far = still("near", 5.0, 2.0, (0.5, 0.5, 2.0)), still("far", 11.0, 6.0, (0.5, 0.5, 2.0))
+    near, far = still("near", 5.0, 2.0, (0.5, 0.5, 2.0)), still("far", 9.0, 6.0, (0.5, 0.5, 2.0))
     beyond = still("beyond", 12.0, 8.0, (3.0, 3.0, 4.0))
     world = flat(near, far, beyond, sensors={"lidar": {"range": 20.0}}, controller={"use": "costmap"})
     result = world.run(names(near, far, beyond), 1)

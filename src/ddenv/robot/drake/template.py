@@ -19,7 +19,6 @@ from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.listening import Heard, Listener
-from ddenv.robot.navigation.costmap import horizon
 from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled
@@ -234,9 +233,7 @@ class Template:
         settings = self._scenario.sensors.lidar
         if settings is None or self._obstacles is None:
             return None
-        moving, controller = [self._models[body.name] for body in kept], self._scenario.controller
-        beyond = horizon(controller.planner, settings.x, settings.y) if controller.use == "costmap" else math.inf
-        return Lidar(settings, self._obstacles, present, moving, suite.lidar, beyond)
+        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
 
 
 def _setup(robot: Model, drive: Drive, clock: Clock, scenario: Scenario) -> Setup:

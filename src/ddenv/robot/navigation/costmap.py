@@ -11,23 +11,13 @@ from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.protocol import Setup
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
-from ddenv.world.scenario import Planner
 
 # A beam clears a cell if it goes farther than the cell by this many cells.
 PASSED = 1.5
 # When the robot tilts more than this (rad), its beams pass above or below what they would clear.
 LEVEL = 0.12
-
-
-def horizon(planner: Planner, x: float, y: float) -> float:
-    """Hits beyond this range (m) are none to the map: a lidar at `x`, `y` (m) in the robot's frame sees past all of it."""
-    corner = math.sqrt(2.0) * (_width(planner) / 2 + 1) * planner.resolution
-    return corner + math.hypot(x, y) + PASSED * planner.resolution
-
-
-def _width(planner: Planner) -> int:
-    """The map's width, cells."""
-    return max(round(planner.size / planner.resolution), 4)
+# What rounding changes is less, m.
+SPARE = 1e-6
 
 
 class Costmap:
@@ -40,9 +30,9 @@ class Costmap:
     """
 
     def __init__(self, setup: Setup) -> None:
-        self._planner: Planner = setup.settings.planner
-        self.resolution = self._planner.resolution
-        self.count = _width(self._planner)
+        planner = setup.settings.planner
+        self.resolution = planner.resolution
+        self.count = max(round(planner.size / planner.resolution), 4)
         self.spots = np.empty((3, 0))
         self.version = 0
         body = Footprint.of(setup)
@@ -51,7 +41,7 @@ class Costmap:
         self._half = (body.ahead + body.behind) / 2 - self.resolution
         self._side = body.side - self.resolution
         # The wheels stand this far below the frame of the points.
-        self._lowest = self._planner.lowest - setup.radius
+        self._lowest = planner.lowest - setup.radius
         self._slots: Integers = np.empty(0, dtype=int)
         # The occupied slots at the last change of the version, and those that are occupied or next to one, (count^2,).
         self._known = self._slots
@@ -77,9 +67,8 @@ class Costmap:
             self._angles, self._beams = scan.angles, np.stack([np.cos(scan.angles), np.sin(scan.angles)])
             # The outermost beams, which have one neighbour only, clear nothing.
             self._far = np.zeros(len(scan.angles))
-        # So it is certain that what lies beyond takes no part in a run.
-        beyond = horizon(self._planner, *scan.origin[:2])
-        scan = Scan(scan.time, scan.angles, np.where(scan.ranges > beyond, np.inf, scan.ranges), scan.origin)
+        # Nothing else of the scan is read: what ended the other beams takes no part in the run.
+        scan = Scan(scan.time, scan.angles, scan.within(self._limits(scan, estimate)), scan.origin)
         roll, pitch = (imu.roll, imu.pitch) if imu else (0.0, 0.0)
         self._mark(scan, estimate, roll, pitch)
         self._clear(scan, estimate, level=max(abs(roll), abs(pitch)) <= LEVEL)
@@ -94,6 +83,22 @@ class Costmap:
         near = np.hypot(dx, dy) <= np.where(seen, beyond, beyond_unseen)
         self._hit[self._slots[~near]] = False
         self._keep(self._slots[near], self.spots[:, near])
+
+    def _limits(self, scan: Scan, estimate: Estimate) -> Floats:
+        """The range (N,) m of each beam beyond which it marks nothing, and has passed all that is known in its direction."""
+        count = len(scan.angles)
+        limits = np.full(count, (self.count / 2 + PASSED) * self.resolution + math.hypot(*scan.origin[:2]))
+        if count > 2 and self.spots.size:
+            cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
+            dx, dy = self.spots[0] - estimate.x, self.spots[1] - estimate.y
+            x, y = cosine * dx + sine * dy - scan.origin[0], cosine * dy - sine * dx - scan.origin[1]
+            passed = np.sqrt(x * x + y * y) + PASSED * self.resolution + SPARE
+            # A place is cleared by its nearest beam and both neighbours; which one is nearest may be a matter of rounding.
+            beams = self._beams_at(scan, x, y) + np.arange(-2, 3)[:, None]
+            # Each row by itself: numpy takes wrong values where it has to broadcast them.
+            for row in beams.clip(0, count - 1):
+                np.maximum.at(limits, row, passed)
+        return limits
 
     def _mark(self, scan: Scan, estimate: Estimate, roll: float, pitch: float) -> None:
         turn = _rotation(roll, pitch, estimate.heading)
@@ -139,16 +144,21 @@ class Costmap:
 
     def _seen_through(self, scan: Scan, x: Floats, y: Floats) -> Booleans:
         """Which places (N,), given in the lidar's frame, the nearest beam and both its neighbours have passed."""
-        ranges, first, far = scan.ranges, scan.angles[0], self._far
+        ranges, far = scan.ranges, self._far
         np.minimum(ranges[1:-1], ranges[2:], out=far[1:-1])
         np.minimum(far[1:-1], ranges[:-2], out=far[1:-1])
-        step = (scan.angles[-1] - first) / (len(ranges) - 1)
-        beams = np.arctan2(y, x)
-        beams -= first
-        beams /= step
-        nearest = np.rint(beams, out=beams).astype(int)
+        nearest = self._beams_at(scan, x, y)
         passed: Booleans = np.sqrt(x * x + y * y) + PASSED * self.resolution < far.take(nearest, mode="clip")
         return passed
+
+    def _beams_at(self, scan: Scan, x: Floats, y: Floats) -> Integers:
+        """The numbers (N,) of the beams nearest to places in the lidar's frame; out of its view there are no such beams."""
+        first = scan.angles[0]
+        beams = np.arctan2(y, x)
+        beams -= first
+        beams /= (scan.angles[-1] - first) / (len(scan.angles) - 1)
+        nearest: Integers = np.rint(beams, out=beams).astype(int)
+        return nearest
 
     def _keep(self, slots: Integers, spots: Floats) -> None:
         same = len(slots) == len(self._slots) and bool((slots == self._slots).all())

@@ -33,8 +33,7 @@ DRAWS = 2**40
 class Lidar:
     """Measures the distances to the kept models of a world, never to the robot itself.
 
-    `present` are the names of the kept models, `moving` the ones among them that move. Whoever reads its scans takes what is
-    measured beyond `horizon` (m) for nothing.
+    `present` are the names of the kept models, `moving` the ones among them that move.
     """
 
     def __init__(
@@ -44,10 +43,8 @@ class Lidar:
         present: frozenset[str],
         moving: Sequence[Model],
         random: np.random.Generator,
-        horizon: float = math.inf,
     ) -> None:
         self._settings = settings
-        self._horizon = min(horizon, settings.range)
         self._mount = Pose((settings.x, settings.y, settings.z))
         self._random = random
         self._state = random.bit_generator.state
@@ -105,14 +102,21 @@ class Lidar:
             self._work_out_waiting()
         return LazyScan(now, self._fan.angles, partial(self._ranges, turn), self._mount.position)
 
-    def _ranges(self, turn: Turn) -> Floats:
+    def _ranges(self, turn: Turn, limits: Floats | None = None) -> Floats:
+        """The ranges of a scan, infinite where they exceed `limits` (B,) m."""
         if turn.ranges is None:
             self._work_out_waiting()
         if turn.ranges is None:
             self._measure([turn])
         assert turn.ranges is not None
-        self._read[turn.met] = True
-        return turn.ranges
+        if limits is None:
+            self._read[turn.owners] = True
+            return turn.ranges
+        # Behind a hit that is too far the next one is farther, with the same noise: that would not be seen either.
+        near: Booleans = turn.measured <= limits
+        self._read[turn.owners[near[turn.beams]]] = True
+        ranges: Floats = np.where(near, turn.ranges, np.inf)
+        return ranges
 
     def _work_out_waiting(self) -> None:
         if self._waiting:
@@ -126,18 +130,15 @@ class Lidar:
         origins = np.array([turn.place.position for turn in turns])
         axes = np.array([turn.place.rotation() for turn in turns]).transpose(0, 2, 1)
         ends = cast(self._fan, turns[0].near.shapes, origins, axes)
-        matters: Booleans = np.empty(ends.distances.shape, dtype=bool)
-        for number, (turn, distances) in enumerate(zip(turns, ends.distances, strict=True)):
-            ranges = self._noise(turn.number) + distances
-            # What is behind a hit is farther, and has the same noise: it does not matter either.
-            matters[number] = ranges <= self._horizon
-            ranges[(ranges < nearest) | (ranges > farthest)] = np.inf
-            turn.ranges = ranges
+        for turn, distances in zip(turns, ends.distances, strict=True):
+            turn.measured = self._noise(turn.number) + distances
+            beyond = (turn.measured < nearest) | (turn.measured > farthest)
+            turn.ranges = np.where(beyond, np.inf, turn.measured)
         beams, shapes = ends.first()
-        scans, owners = beams // len(self._fan.angles), turns[0].near.owners[shapes]
-        mattered = matters.ravel()[beams]
+        count, owners = len(self._fan.angles), turns[0].near.owners[shapes]
         for number, turn in enumerate(turns):
-            turn.met = np.unique(owners[mattered & (scans == number)])
+            here = beams // count == number
+            turn.beams, turn.owners = beams[here] % count, owners[here]
         return ends
 
     def _noise(self, number: int) -> Floats:
@@ -203,7 +204,8 @@ def _firsts(models: Sequence[Model]) -> list[int]:
 class Turn:
     """Scan `number` of a lidar, at `time` (s): its pose and the shapes that its beams may hit.
 
-    Once computed: its ranges, and the models on which its beams ended short of the horizon, also those too near to be measured.
+    Once computed: its ranges, the distances (B,) m that its beams measured, also too small and too large ones, and the models
+    `owners` (H,) on which the beams `beams` (H,) ended.
     """
 
     time: float
@@ -211,16 +213,18 @@ class Turn:
     place: Pose
     near: Near
     ranges: Floats | None = None
-    met: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
+    measured: Floats = field(default_factory=lambda: np.empty(0))
+    beams: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
+    owners: Integers = field(default_factory=lambda: np.empty(0, dtype=int))
 
 
 class LazyScan(Scan):
     """A scan that computes its `ranges` only when they are read. `dataclasses.replace` makes copies whose ranges are an array."""
 
     __slots__ = ("_ranges",)
-    _ranges: Callable[[], Floats] | Floats
+    _ranges: Callable[..., Floats] | Floats
 
-    def __init__(self, time: float, angles: Floats, ranges: Callable[[], Floats] | Floats, origin: Vector) -> None:
+    def __init__(self, time: float, angles: Floats, ranges: Callable[..., Floats] | Floats, origin: Vector) -> None:
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "angles", angles)
         object.__setattr__(self, "_ranges", ranges)
@@ -229,6 +233,9 @@ class LazyScan(Scan):
     @property
     def ranges(self) -> Floats:
         return self._ranges() if callable(self._ranges) else self._ranges
+
+    def within(self, limits: Floats) -> Floats:
+        return self._ranges(limits) if callable(self._ranges) else super().within(limits)
 
     def __reduce__(self) -> tuple[type[Scan], tuple[Any, ...]]:
         return Scan, (self.time, self.angles, self.ranges, self.origin)

@@ -35,6 +35,11 @@ class Scan:
     ranges: Floats
     origin: Vector
 
+    def within(self, limits: Floats) -> Floats:
+        """The ranges, infinite where they exceed `limits` (N,) m: then what lies beyond takes no part in the run."""
+        ranges: Floats = np.where(self.ranges <= limits, self.ranges, np.inf)
+        return ranges
+
     def points(self) -> Floats:
         """Where beams hit something, shape (M, 3) m, in the frame of the robot's first link."""
         met = np.isfinite(self.ranges)
