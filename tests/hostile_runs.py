@@ -21,6 +21,7 @@ SCENES = (
     fake_moments.guided,
     fake_moments.certifying,
     fake_moments.finished,
+    fake_moments.isolated,
     fake_moments.piled,
 )
 NUMBERS = (

@@ -10,6 +10,7 @@ from ddenv.amounts import count, first_of, percent
 from ddenv.certificate_cost import certificate_tests
 from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
+from ddenv.runfile.isolation import Isolation, Returned
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
@@ -99,6 +100,53 @@ def meaning(claim: Claim, certificate: Certificate) -> str:
 def _whole_rate(certificate: Certificate) -> str:
     """The rate that what is left has to keep a part of."""
     return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
+
+
+def of_passing(state: RunState, one: Isolation) -> str:
+    """What an isolation that has ended shows, in one sentence without a full stop."""
+    if not one.checks:
+        return (
+            "no world was found that passes: the robot does not reach its goal often enough even without all "
+            f"{count(len(_may_go(state, one)), 'model')} that may go"
+        )
+    check = one.checks[-1]
+    gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
+    names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
+    if one.found is None:
+        return f"no world is shown to pass: without {names} {_reaching(first)}"
+    said = (
+        f"the nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
+    )
+    for word, start in (
+        ("unknown", "not shown that each of them has to go: tests broke with"),
+        ("not shown", "not shown that each of them has to go: undecided with"),
+        ("not needed", "not the nearest: the robot passes about as often with"),
+    ):
+        found = [claim.back for claim in backs if claim.verdict == word and claim.back is not None]
+        if found:
+            return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
+    most = max(backs, key=lambda claim: claim.high)
+    back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
+    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most)}"
+
+
+def is_nearest(one: Isolation) -> bool:
+    """Whether fresh runs show that a world passes, and that it does not with any one model put back."""
+    return one.found is not None and all(claim.verdict in ("passes", "needed") for claim in one.checks[-1].claims)
+
+
+def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
+    stacks = (stack_with(state, state.elements, name) for name in one.suspects)
+    return frozenset(name for stack in stacks for name in stack)
+
+
+def _reaching(claim: Returned) -> str:
+    return f"the robot reaches its goal in {_share(claim)}"
+
+
+def _share(claim: Returned) -> str:
+    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
+    return f"{claim.reached} of {count(claim.runs, 'fresh run')}{interval}"
 
 
 def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:

@@ -37,10 +37,17 @@ def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool
     Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): at either rate it is wrong with a probability of
     at most about `error`, although it may be asked after each run.
     """
-    rate = min(rate, 0.99)
-    ratio, enough = 0.0, math.log((1.0 - error) / error)
+    rate, runs, hits = min(rate, 0.99), 0, 0
     for shown in outcomes:
-        ratio += math.log(2.0) if shown else math.log((1.0 - rate) / (1.0 - rate / 2))
-        if abs(ratio) >= enough:
-            return ratio > 0
+        runs, hits = runs + 1, hits + shown
+        found = leans_to(hits, runs - hits, rate, rate / 2, error)
+        if found is not None:
+            return found
     return None
+
+
+def leans_to(hits: int, misses: int, rate: float, other: float, error: float) -> bool | None:
+    """The same after `hits` and `misses`, if no fewer runs decided: whether they speak for `rate` or for `other`, a lower one."""
+    rate = min(rate, 0.99)
+    ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
+    return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None

@@ -9,14 +9,25 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import in_the_making, made_of_usual, missed, never_left_out, smaller_known, usual_runs, verdict_on
+from ddenv.claims import (
+    in_the_making,
+    made_of_usual,
+    missed,
+    never_left_out,
+    of_passing,
+    smaller_known,
+    usual_runs,
+    verdict_on,
+)
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
+from ddenv.runfile.isolation import Removal
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Candidate, RunState, Trial
+from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
 from ddenv.took_part import implied_words, refuted_words, slice_words
 
 SETTLING = "finding what rests on what"
+ISOLATING = "finding the nearest world that passes"
 CONFIRMING = "certifying what is left with fresh runs"
 # A line names so many failures of the baseline.
 MOST_FAILURES = 3
@@ -51,7 +62,20 @@ def _where(state: RunState) -> str:
         return CONFIRMING if now is None else f"certificate: {made_of_usual(state, now)}"
     if state.settling and not state.ended:
         return SETTLING
+    if state.isolating is not None and not state.ended:
+        return isolating(state)
     return "baseline" if state.round is None else f"round {state.round.number}, n {state.round.n_partitions}"
+
+
+def isolating(state: RunState) -> str:
+    """How far an isolation is: what it tries, or which world fresh runs judge."""
+    running, now = state.running_tests, state.isolating
+    last = next((test.removal for test in running if test.removal is not None), None)
+    if last is None or now is None:
+        return ISOLATING
+    gone = count(len(state.removals[last - 1].models), "model")
+    made = sum(test.run >= now.first_run and test.is_finished for test in state.tests if test.phase == ISOLATE)
+    return f"{ISOLATING}: without {gone}{f', {made} fresh runs' if made else ''}"
 
 
 def news(kind: str, before: RunState, after: RunState, attached: bool = False) -> str:
@@ -86,7 +110,7 @@ def _news(kind: str, before: RunState, after: RunState) -> str:
         case "finished" | "engine_stopped" | "engine_failed":
             known = smaller_known(after)
             return f"{after.status}: {after.reason}{f'; {known}' if known else ''}"
-    return _night(kind, before, after) or _news_by_hand(kind, before, after)
+    return _night(kind, before, after) or _isolation(kind, before, after) or _news_by_hand(kind, before, after)
 
 
 def _slices(kind: str, after: RunState) -> str:
@@ -140,6 +164,29 @@ def _certificate(kind: str, after: RunState) -> str:
     return (
         f"  reduced to {models} after {after.tests_done} tests: {after.nodes[after.node].what} f shows about as often"
     )
+
+
+def _isolation(kind: str, before: RunState, after: RunState) -> str:
+    """What isolation does, and what it finds."""
+    match kind:
+        case "isolation_started":
+            return (
+                f"{ISOLATING}: as few models as can be removed from the whole world so that the robot reaches its goal"
+            )
+        case "removal_judged":
+            return "".join(_removal(after, each) for each in after.removals.changed_since(before.removals))
+        case "isolation_checked":
+            first = after.isolations[-1].checks[-1].claims[0]
+            return f"  fresh runs: the robot reaches its goal in {first.reached} of {first.runs}: {first.verdict}"
+        case "isolation_finished":
+            return of_passing(after, after.isolations[-1])
+    return ""
+
+
+def _removal(state: RunState, one: Removal) -> str:
+    tests, implied = count(len(one.tests), "test"), implied_words(state, one.tests)
+    what = f"the whole world without {count(len(one.models), 'model')} ({first_of(one.models, MOST_FAILURES)})"
+    return f"  {what}: {one.verdict} after {tests}{_endings(state, one)}{f', {implied}' if implied else ''}"
 
 
 def _news_by_hand(kind: str, before: RunState, after: RunState) -> str:
@@ -198,8 +245,8 @@ def other_failures(found: Baseline) -> str:
     return f"other failures: {first_of(listed, MOST_FAILURES)}" if listed else ""
 
 
-def _endings(state: RunState, one: Candidate | Trial) -> str:
-    """How a candidate's or a trial's tests ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
+def _endings(state: RunState, one: Candidate | Trial | Removal) -> str:
+    """How the tests of a candidate, a try or a removal ended, such as " (2 pass, 1 stuck, 1 tipped over)"."""
     tests = (state.tests[id - 1] for id in one.tests if 0 < id <= len(state.tests))
     endings = Counter(test.failure if test.failure in DEEDS else test.outcome for test in tests if test.is_finished)
     return f" ({', '.join(f'{number} {ending}' for ending, number in endings.items())})" if endings else ""

@@ -120,6 +120,32 @@ def finished(run: FakeRun) -> FakeRun:
     return _claimed(run, claims)
 
 
+def isolating(run: FakeRun) -> FakeRun:
+    """After its end, isolation: the robot passes without the two models that were left; without one of them it is being tried."""
+    finished(run).start_isolation(2)
+    both = run.remove("crate_00", "crate_01")
+    run.write("removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp"))
+    run.live((run.isolate(run.remove("crate_00"), 0), 0.5))
+    return run
+
+
+def isolated(run: FakeRun) -> FakeRun:
+    """Isolation has ended: the robot passes without one model."""
+    finished(run).start_isolation(2)
+    both, one = run.remove("crate_00", "crate_01"), run.remove("crate_00")
+    run.write("removal_judged", removal=both, verdict="passes", tests=run.isolate_all(both, "ppppp"))
+    run.write("removal_judged", removal=one, verdict="passes", tests=run.isolate_all(one, "ppppp"))
+    whole = run.remove()
+    tests = [*run.isolate_all(one, 20 * "p", 100_000), *run.isolate_all(whole, 9 * "s", 100_000)]
+    claims = (
+        {"back": None, "verdict": "passes", "reached": 20, "runs": 20, "low": 0.84, "high": 1.0},
+        {"back": 0, "verdict": "needed", "reached": 0, "runs": 9, "low": 0.0, "high": 0.3},
+    )
+    run.write("isolation_checked", removal=one, claims=claims, tests=tests)
+    run.write("isolation_finished", removal=one)
+    return run
+
+
 def uncertified(run: FakeRun) -> FakeRun:
     """A run of a file of format 4, which ended with two models and without a certificate."""
     _rounds(run).write("finished", minimal=True, reason="no single model can be removed")

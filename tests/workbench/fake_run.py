@@ -132,6 +132,7 @@ class FakeRun:
         wall: float = 2.0,
         failure: str = "",
         end: tuple[float, float, float] = END,
+        aside: float = 0.0,
     ) -> None:
         event = {
             "test": test,
@@ -147,7 +148,11 @@ class FakeRun:
         }
         if self.met is not None:
             event["took_part"] = self.numbers(self.met)
-        self.file.append("test_finished", event, {ROBOT: path_samples().tobytes()})
+        way = path_samples()
+        # It turns aside in the middle of its way.
+        for row in range(len(way) // 16, len(way) // 8):
+            way[8 * row + 2] += aside
+        self.file.append("test_finished", event, {ROBOT: way.tobytes()})
 
     def test(
         self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0, failure: str = ""
@@ -205,6 +210,36 @@ class FakeRun:
             "high": high,
             "outcomes": {name: outcomes.count(letter) for letter, name in names.items() if letter in outcomes},
         }
+
+    def start_isolation(self, size: int) -> None:
+        """Isolation starts; the `size` first models are what the reduction left."""
+        self.write("engine_started", pid=2, jobs=2, version=__version__, simulator="none")
+        rule = {"wanted": 0.9, "rather_than": 0.45, "keep_rate": 0.8, "error": 0.05, "at_least": 20, "block": 1000}
+        suspects, before = list(range(len(self.elements))), self.state.reason or "it ended"
+        self.write("isolation_started", isolation=1, run=100_000, **rule, suspects=suspects, size=size, before=before)
+
+    def remove(self, *names: str) -> int:
+        """The number of a removal that is tried now."""
+        number = len(self.state.removals) + 1
+        self.write("removal_tried", removal=number, models=self.numbers(list(names)))
+        return number
+
+    def isolate(self, removal: int, run: int) -> int:
+        """A run of the whole world after a removal starts."""
+        self.tests += 1
+        place = {"phase": "isolate", "round": None, "candidate": None, "node": 0, "removal": removal}
+        self.write("test_started", test=self.tests, **place, run=run, seed=run)
+        return self.tests
+
+    def isolate_all(self, removal: int, outcomes: str, first: int = 0) -> list[int]:
+        """A run for each letter as in `certify_all`; one that reaches the goal goes 1 m further to the side."""
+        words = {"s": ("similar", 0.12, "stuck"), "p": ("pass", None, ""), "e": ("error", None, "it broke")}
+        tests = []
+        for run, letter in enumerate(outcomes, first):
+            outcome, distance, failure = words[letter]
+            tests.append(self.isolate(removal, run))
+            self.finish(tests[-1], outcome, distance, failure=failure, aside=float(letter == "p"))
+        return tests
 
     def live(self, *tests: tuple[int, float]) -> None:
         """Tests run now: each (test, part of the way from 0 to 1)."""

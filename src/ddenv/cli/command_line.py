@@ -17,6 +17,7 @@ from ddenv.cli.certify_command import certify_command
 from ddenv.cli.config_command import config_command
 from ddenv.cli.doctor_command import doctor_command
 from ddenv.cli.export_command import export_command
+from ddenv.cli.isolate_command import isolate_command
 from ddenv.cli.learn_command import learn_command
 from ddenv.cli.open_command import open_command
 from ddenv.cli.options import given_reading, reading_options
@@ -105,6 +106,7 @@ for command in (
     reproduce_command,
     report_command,
     why_command,
+    isolate_command,
     learn_command,
     study_command,
     schemas_command,

@@ -1,4 +1,4 @@
-"""`ddenv why`: what happens without each model that is left."""
+"""`ddenv why`: what happens without each model that is left, and what the nearest world that passes lacks."""
 
 from __future__ import annotations
 
@@ -18,24 +18,32 @@ from ddenv.cli.options import json_option
 def why_command(run: str, as_json: bool) -> int:
     """Says why the robot fails in what RUN (a name or a file) has left: what it does without each model, and where the ways part.
 
-    The fresh runs of the certificate show it; no new test is made.
+    The fresh runs of the certificate show it; no new test is made. After 'ddenv isolate RUN' it also says what the nearest world
+    that passes lacks.
     """
+    from ddenv.claims import current
     from ddenv.cli.wrapping import wrapped
     from ddenv.errors import printable
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
+    from ddenv.runs.nearest import nearest
     from ddenv.runs.reasons import parting_sentence, reasons, sentence
 
     with RunFile(find_run(run)) as file:
-        found = reasons(file, fold(file.events()))
+        state = fold(file.events())
+        passing = nearest(file, state)
+        found = () if passing is not None and current(state) is None else reasons(file, state)
     if as_json:
-        print(json.dumps({"reasons": [asdict(each) | {"words": sentence(each)} for each in found]}))
+        said = [asdict(each) | {"words": sentence(each)} for each in found]
+        print(json.dumps({"reasons": said, "nearest": None if passing is None else asdict(passing)}))
         return 0
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for each in found:
         words = printable(f"{sentence(each)} {parting_sentence(each)}".rstrip())
         print("\n".join(wrapped(words, columns, "- ")))
-    if not found:
+    if passing is not None:
+        print("\n".join(wrapped(printable(passing.sentences), columns)))
+    if not found and passing is None:
         print("nothing is left that could be left out")
     return 0

@@ -17,6 +17,7 @@ from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.crash_loop import check_crash_loop
 from ddenv.engine.driver import Driver
+from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.engine.repeating import check_repeats
@@ -52,6 +53,11 @@ def main() -> int:
     parser.add_argument(
         "--certify", type=int, help="make one more certificate, with at least so many runs of what is left"
     )
+    parser.add_argument(
+        "--isolate",
+        type=int,
+        help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
+    )
     parser.add_argument("--after", type=int, help="the last command before it was asked to start")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -80,11 +86,17 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     room = Room(file, terminated)
     file.own(room.wait)
     journal = Journal(file)
-    new = options.certify or journal.has_broken or file.commands(journal.state.last_command)
+    new = (
+        options.certify
+        or options.isolate is not None
+        or journal.has_broken
+        or file.commands(journal.state.last_command)
+    )
     if journal.state.status == "finished" and not new:
         return 0
     if options.anyway == "no":
         check_crash_loop(journal)
+    before = journal.state.reason
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
         control = Control(journal, terminated, after, room)
@@ -96,11 +108,13 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
             if scenario.oracle is None:
                 check_repeats(journal, workers, control, options.bits == "mixed")
             note_start(scenario, world, robot, journal)
-            driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
+            bench = Bench(journal, pool, control)
             if options.certify:
-                driver.certify(options.certify)
+                Driver(scenario, world, journal, bench, control).certify(options.certify)
+            elif options.isolate is not None or journal.state.isolating is not None:
+                isolate(world, journal, bench, options.isolate or None, before)
             else:
-                driver.reduce()
+                Driver(scenario, world, journal, bench, control).reduce()
         finally:
             pool.close()
     except Stopped as stop:

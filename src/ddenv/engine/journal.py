@@ -13,7 +13,7 @@ from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, Round, RunState, Test
+from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, ISOLATE, Round, RunState, Test
 from ddenv.runfile.store import ROBOT, Event, Motions, RunFile
 from ddenv.runfile.supports import stack_with
 
@@ -136,7 +136,7 @@ class Journal:
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         # Fresh runs that only ran ahead of time would make it depend on the number of workers.
-        named = (test for test in self.state.tests if test.phase not in FRESH or test.id in self._rested_on)
+        named = (test for test in self.state.tests if test.phase not in (*FRESH, ISOLATE) or test.id in self._rested_on)
         tests = [test for test in named if self.keep_of_test(test.id) == self.whole]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
@@ -156,7 +156,7 @@ class Journal:
 
     def _leaves_unknown(self, test: Test) -> bool:
         """A baseline that is done, and a certificate, may do without a few runs that broke."""
-        if test.outcome not in BROKEN:
+        if test.outcome not in BROKEN or test.phase == ISOLATE:
             return False
         if test.phase == "baseline":
             return self.state.baseline is None
@@ -269,8 +269,8 @@ class Journal:
         self._fineness[self.state.node] = data["n_partitions"]
 
     def _arrived(self, _: dict[str, Any]) -> None:
-        if self.state.round is not None:
-            self._fineness[self.state.node] = self.state.round.n_partitions
+        if (round := self.state.round) is not None:
+            self._fineness[self.state.node] = round.n_partitions
 
     def _leg_started(self, data: dict[str, Any]) -> None:
         self.leg, self.steered = self._leg(data["round"], data["n_partitions"]), False
@@ -278,10 +278,11 @@ class Journal:
 
     def _engine_started(self, _: dict[str, Any]) -> None:
         """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
-        tests = self.state.tests
-        again = [key for key, test in self.ledger.items() if self._leaves_unknown(tests[test - 1])]
-        for key in again:
-            del self.ledger[key]
+        broke = {key: test for key, id in self.ledger.items() if (test := self.state.tests[id - 1]).outcome in BROKEN}
+        again = [test for test in broke.values() if self._leaves_unknown(test)]
+        for key, test in broke.items():
+            if test in again or test.phase == ISOLATE:
+                del self.ledger[key]
         self._broke.clear()
         if again and self.state.baseline is not None:
             self.steered = True

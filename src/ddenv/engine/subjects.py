@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.state import FRESH, Round, RunState, Test
+from ddenv.runfile.state import FRESH, ISOLATE, Round, RunState, Test
 from ddenv.runfile.supports import stack_with
 
 Keep = frozenset[str]
@@ -16,7 +16,10 @@ HELD = 64
 
 @dataclass(frozen=True)
 class Asked:
-    """A test that is wanted: run number `run` of the models `keep`, for a candidate of a round, for a try, or as `phase` says."""
+    """A test that is wanted: run number `run` of the models `keep`, for a candidate of a round, for a try, or as `phase` says.
+
+    In isolation, `candidate` is the number of a removal.
+    """
 
     phase: str
     keep: Keep
@@ -29,7 +32,10 @@ class Asked:
         """The data of an event with which the test begins. Raises UserError for one of a round that is over."""
         if self.round is not None and self.round != current_round(state).number:
             raise UserError(other_way(self.round))
-        place: dict[str, Any] = {"phase": self.phase, "round": self.round, "candidate": self.candidate}
+        candidate = None if self.phase == ISOLATE else self.candidate
+        place: dict[str, Any] = {"phase": self.phase, "round": self.round, "candidate": candidate}
+        if self.phase == ISOLATE:
+            place |= {"removal": self.candidate, "node": 0}
         if self.phase in ("certify", "audit"):
             place |= _node(state, self.keep)
         if self.phase == "hand":
@@ -72,6 +78,8 @@ class Keeps:
         if test.phase in (*FRESH, "audit"):
             environment = state.nodes[test.node].environment
             return self._set(environment).difference(stack_with(state, environment, test.without))
+        if test.removal is not None:
+            return self._set(state.elements).difference(state.removals[test.removal - 1].models)
         if test.phase == "hand":
             return frozenset(state.trials[(test.trial or 0) - 1].models)
         return self.of_candidate(state, test.candidate or 0)

@@ -9,7 +9,7 @@ from typing import Literal
 from ddenv.claims import fresh_runs_made, in_the_making
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
-from ddenv.runfile.tested import made_for
+from ddenv.runfile.tested import made_for, purpose
 from ddenv.words import count, first_of
 
 EngineIs = Literal["alive", "starting", "absent"]
@@ -68,6 +68,8 @@ def row_of(state: RunState, test: Test) -> Row | None:
 def label_of(state: RunState, test: Test) -> str:
     """What a test was made for, in words."""
     row = row_of(state, test)
+    if row is None and test.round is None:
+        return purpose(state, test).words
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, Protocol
 
 Verdict = Literal["", "similar", "dissimilar", "unknown"]
 
@@ -16,6 +16,14 @@ HIGHEST_RATE = 0.985
 SPURIOUS = 0.03
 # After this many runs the likelier side counts.
 MOST_RUNS = 40
+
+
+class Rule(Protocol):
+    """Decides from the runs of a candidate, one after the other."""
+
+    def verdict(self, shown: int, missed: int) -> Verdict:
+        """The verdict after `shown` runs that showed what is looked for and `missed` that did not; "" while it is open."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -126,6 +126,11 @@ def ddmin(elements: Partition, guide: Guide) -> Search:
 
     Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002. The last model is tested, too.
     """
+    return by_chunks(elements)
+
+
+def by_chunks(elements: Partition) -> Search:
+    """`ddmin`, which asks nothing of a guide."""
     environment, partitions = elements, _cut(elements, 2)
     while environment:
         winner = yield _round(environment, partitions)

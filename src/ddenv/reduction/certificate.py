@@ -18,7 +18,7 @@ from ddenv.reduction.acceptance import HIGHEST_RATE
 from ddenv.reduction.verdict import Shown
 
 Subject = frozenset[str]
-Verdict = Literal["", "kept", "lost", "needed", "not needed", "not shown", "unknown"]
+Verdict = Literal["", "kept", "lost", "needed", "not needed", "passes", "fails", "not shown", "unknown"]
 # Asks for a run of each of these subjects with the next seed, is sent whether each showed f, and returns a verdict.
 Procedure = Generator[tuple[Subject, ...], tuple[bool, ...], Verdict]
 

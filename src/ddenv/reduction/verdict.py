@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
-from ddenv.reduction.acceptance import Acceptance, Verdict
+from ddenv.reduction.acceptance import Rule, Verdict
 
 Key = TypeVar("Key")
 # Whether a run showed f. A broken one says nothing; None is a run that is not finished.
@@ -32,7 +32,7 @@ class Standing:
 def standing(
     candidates: Iterable[Key],
     shown: Runs[Key],
-    rule: Acceptance,
+    rule: Rule,
     refused: Container[Key] = frozenset(),
     *,
     first: int = 0,
@@ -58,7 +58,7 @@ def standing(
     return Standing(tuple(verdicts), None, tuple(wanted))
 
 
-def _row(shown: Runs[Key], candidate: Key, rule: Acceptance) -> tuple[Verdict, list[int]]:
+def _row(shown: Runs[Key], candidate: Key, rule: Rule) -> tuple[Verdict, list[int]]:
     """The verdict if no missing run shows f, and the missing runs up to there.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.
@@ -79,7 +79,7 @@ def _row(shown: Runs[Key], candidate: Key, rule: Acceptance) -> tuple[Verdict, l
     return verdict, missing
 
 
-def decided_by(shown: Callable[[int], Shown], rule: Acceptance) -> int:
+def decided_by(shown: Callable[[int], Shown], rule: Rule) -> int:
     """How many runs of a candidate decided its verdict; all of them are finished."""
     hits = misses = 0
     while not rule.verdict(hits, misses):

@@ -65,6 +65,7 @@ PHASES = (
     ("hand", "by hand"),
     ("audit", "audits of slices"),
     ("certify", "fresh runs"),
+    ("isolate", "isolation"),
     ("confirm", "full runs at the end"),
 )
 

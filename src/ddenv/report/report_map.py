@@ -6,7 +6,7 @@ Its colours are classes of `style.css`, so that it follows the reader's light or
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -126,10 +126,15 @@ def _ways(record: Record) -> Ways:
     return {"way": record.original, "last": last}
 
 
-def two_ways(record: Record, models: Sequence[Drawn], ways: Ways, name: str) -> str:
-    """The map with two paths of the robot, "with" and "without" a model, in place of those in f."""
+def two_ways(
+    record: Record, models: Sequence[Drawn], ways: Ways, name: str, named: Collection[str] | None = None
+) -> str:
+    """The map with two paths of the robot, "with" and "without" a model, in place of those in f.
+
+    With `named`, the map has the names of these models, in place of those that are left.
+    """
     points = [point for point in _places(record) if point is not None]
-    return _picture(record, models, _frame(models, points, LEAST), name, ways)
+    return _picture(record, models, _frame(models, points, LEAST), name, ways, named)
 
 
 def close_up(record: Record, models: Sequence[Drawn]) -> str:
@@ -145,7 +150,14 @@ def close_up(record: Record, models: Sequence[Drawn]) -> str:
     return _picture(record, models, frame, "near", _ways(record))
 
 
-def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str, ways: Ways) -> str:
+def _picture(
+    record: Record,
+    models: Sequence[Drawn],
+    frame: Frame,
+    name: str,
+    ways: Ways,
+    named: Collection[str] | None = None,
+) -> str:
     """`name` is different for each picture of a page."""
     start, goal, end = (point if frame.holds(point) else None for point in _places(record))
     points = [point for point in (start, goal, end) if point is not None]
@@ -165,7 +177,7 @@ def _picture(record: Record, models: Sequence[Drawn], frame: Frame, name: str, w
         *(f'<path class="{way}" d="{path}"/>' for way, path in drawn),
         *_near(record, frame, goal, end),
         "</g>",
-        *_labels(models, sorts, frame, points),
+        *_labels([each for each in models if _has_name(each.model.name, sorts, named)], sorts, frame, points),
         *_marks(frame, start, goal, end),
         f'<rect {_rectangle(frame.box)} class="frame"/>',
         *legend(shown, bottom, WIDTH),
@@ -274,9 +286,8 @@ def _near(record: Record, frame: Frame, goal: Any, end: Any) -> Iterator[str]:
 def _labels(
     models: Sequence[Drawn], sorts: dict[str, str], frame: Frame, points: Sequence[tuple[float, float]]
 ) -> Iterator[str]:
-    """Names of the models that are left, the largest first; of a whole world, all names."""
-    # Removed models are so faint that a name may cover them.
-    seen = [each for each in models if sorts[each.model.name] != "gone"][-MOST_AVOIDED:]
+    """Names of `models`, the largest first, but not of those that are always there."""
+    seen = models[-MOST_AVOIDED:]
     spots = [_spot(each, frame) for each in seen]
     names = [shortened(each.model.name, LONGEST_LABEL) for each in seen]
     named = [index for index, each in enumerate(seen) if sorts[each.model.name] != "still"]
@@ -292,6 +303,11 @@ def _labels(
             f'<rect class="plate" x="{-long / 2:.1f}" y="{-high / 2:.1f}" width="{long:.1f}" height="{high:.1f}" rx="2"/>'
             f'<text class="label" y="{0.35 * size:.1f}" font-size="{size:g}">{_text(label.text)}</text></g>'
         )
+
+
+def _has_name(model: str, sorts: dict[str, str], named: Collection[str] | None) -> bool:
+    """Whether a model has a name, or keeps names away: by default what is left. A name may cover the rest, which is faint."""
+    return sorts[model] != "gone" if named is None else model in named
 
 
 def _spot(each: Drawn, frame: Frame) -> Spot:

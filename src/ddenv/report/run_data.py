@@ -16,7 +16,8 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Event, RunFile
-from ddenv.runs.reasons import Reason, reasons
+from ddenv.runs.nearest import Nearest, nearest
+from ddenv.runs.reasons import Parting, Reason, reasons
 
 if TYPE_CHECKING:
     from ddenv.world.model import World
@@ -28,8 +29,8 @@ class Record:
 
     `started` is the Unix time of the first event, s. `original` is the robot's path in f, `evidence` that on the last similar run:
     flat rows of `COLUMNS` floats. `troubles` are one line each on what could not be read. `elements` are the models that can be
-    removed, `kept` those of them that are left. `reasons` say what happens without each of these, `ways` are the robot's paths in
-    the tests that they compare.
+    removed, `kept` those of them that are left. `reasons` say what happens without each of these, `nearest`
+    what the nearest world that passes lacks; `ways` are the robot's paths in the tests that they compare.
     """
 
     path: Path
@@ -45,6 +46,7 @@ class Record:
     elements: frozenset[str] = frozenset()
     kept: frozenset[str] = frozenset()
     reasons: tuple[Reason, ...] = ()
+    nearest: Nearest | None = None
     ways: Mapping[int, array[float]] = field(default_factory=dict)
 
 
@@ -63,7 +65,9 @@ def read_run(path: Path) -> Record:
         same = state.evidence_test == first
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = _reasons(file, state, troubles)
-        compared = [test for each in why if (one := each.parting) for test in (one.with_test, one.without_test)]
+        passing = _nearest(file, state, troubles)
+        partings: list[Parting | None] = [*(each.parting for each in why), passing.parting if passing else None]
+        compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
     return Record(
         path=path,
@@ -79,6 +83,7 @@ def read_run(path: Path) -> Record:
         elements=frozenset(state.elements),
         kept=frozenset(state.environment),
         reasons=why,
+        nearest=passing,
         ways=ways,
     )
 
@@ -121,6 +126,14 @@ def _reasons(file: RunFile, state: RunState, troubles: list[str]) -> tuple[Reaso
     except UserError as error:
         troubles.append(str(error))
         return ()
+
+
+def _nearest(file: RunFile, state: RunState, troubles: list[str]) -> Nearest | None:
+    try:
+        return nearest(file, state)
+    except UserError as error:
+        troubles.append(str(error))
+        return None
 
 
 def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:

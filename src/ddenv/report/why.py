@@ -1,4 +1,6 @@
-"""Why what is left makes the robot fail: what happens without each model, in words and on a map, from the certificate's runs."""
+"""Why the robot fails, in words and on maps: what happens without each model that is left, and what the nearest world that passes
+lacks.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ddenv.claims import current, rate
-from ddenv.page.blocks import Block, Picture, Section, plain, say
+from ddenv.page.blocks import Block, Picture, Section, Table, plain, say
 from ddenv.report.report_map import CORNERS, two_ways
 from ddenv.report.run_data import Record
+from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Reason, parting_sentence, sentence
-from ddenv.words import count
+from ddenv.words import count, first_of
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn
@@ -20,22 +23,52 @@ MOST_MODELS, MOST_MAPS = 200, 6
 
 
 def why(record: Record) -> Section | None:
-    """The section on why the robot fails; None before a certificate shows it."""
-    found = current(record.state)
-    if found is None or not record.reasons:
+    """The section on why the robot fails; None before a certificate or an isolation shows it."""
+    if not record.reasons and record.nearest is None:
         return None
     drawn: tuple[Drawn, ...] = ()
     if record.world is not None:
         from ddenv.map.footprints import plan
 
         drawn = plan(record.world, CORNERS)
-    left = count(len(record.state.environment), "model")
-    blocks: list[Block] = [say(f"With what is left ({left}): {rate(found.claims[0])}.")]
+    blocks: list[Block] = []
+    found = current(record.state)
+    if found is not None and record.reasons:
+        left = count(len(record.state.environment), "model")
+        blocks.append(say(f"With what is left ({left}): {rate(found.claims[0])}."))
     for number, reason in enumerate(record.reasons[:MOST_MODELS]):
         blocks.append(say(plain(f"{sentence(reason)} {parting_sentence(reason)}".rstrip())))
         if drawn and number < MOST_MAPS and reason.parting is not None:
             blocks.append(_map(record, drawn, reason, f"why{number}"))
+    if record.nearest is not None:
+        blocks += _passing(record, record.nearest, drawn)
     return Section("Why it fails", tuple(blocks))
+
+
+def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[Block]:
+    """The nearest world that passes, and the two runs side by side."""
+    blocks: list[Block] = [say(plain(found.sentences))]
+    one = found.parting
+    if one is None:
+        return blocks
+    if drawn:
+        ways = {"with": record.ways[one.with_test], "without": record.ways[one.without_test]}
+        there = replace(record, kept=record.elements - frozenset(found.gone))
+        words = (
+            f"The nearest world that passes, from above: the robot's path with {first_of(found.gone, 3)} and without, "
+            f"seed {one.seed}."
+        )
+        blocks.append(Picture("nearest", two_ways(there, drawn, ways, "nearest", found.gone), plain(words)))
+    rows = tuple(
+        (f"{each.seconds:.1f}", _place(each.failing), _place(each.passing), f"{each.apart:.2f}")
+        for each in found.instants
+    )
+    head = ("time, s", "whole world: x, y, m", "nearest world that passes: x, y, m", "apart, m")
+    return [*blocks, Table(head, rows, frozenset({0, 1, 2, 3}))]
+
+
+def _place(point: tuple[float, float]) -> str:
+    return f"{point[0]:.2f}, {point[1]:.2f}"
 
 
 def _map(record: Record, drawn: tuple[Drawn, ...], reason: Reason, name: str) -> Picture:

@@ -40,7 +40,15 @@ def models_of(state: RunState, test: Test) -> tuple[str, ...]:
     row = _row(state, test)
     if row is not None:
         return row.models
+    if test.removal is not None:
+        return without_removal(state, test.removal)
     return tuple(name for name in state.nodes[test.node].environment if name != test.without)
+
+
+def without_removal(state: RunState, number: int) -> tuple[str, ...]:
+    """The models of the whole world after removal number `number`, from 1."""
+    gone = frozenset(state.removals[number - 1].models)
+    return tuple(name for name in state.elements if name not in gone)
 
 
 def atlas(state: RunState) -> tuple[OtherFailure, ...]:

@@ -14,7 +14,8 @@ The kinds of events with their data. Models are indices into the run's `elements
     still                nothing in the world moves by itself: there are no ties
     noted                about, words: what is wrong with the whole world; a sentence about each thing, once
     test_started         test, phase, round, candidate, run, seed; if phase is "certify" or "audit" (of a slice): node, without?
-                         (a model); if it is "hand": trial; audits? (the test that implies it: it is simulated to be compared)
+                         (a model); if it is "hand": trial; if it is "isolate": removal; audits? (the test that implies it: it is
+                         simulated to be compared)
     test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
                          first_sensed [[model, s]], first_touched [[model, s]], cut, took_part? [models that can have
                          changed a bit of it], taken? (the run whose result was copied); trajectories beside it
@@ -41,6 +42,13 @@ The kinds of events with their data. Models are indices into the run's `elements
     rate_lost            node (the run goes back to it), lost (the node after it), again [[models]] (to leave out at once, or in
                          halves), tests [ids] that this rests on
     left_out             without, environment [..], evidence_test: the certificate showed that this model is not needed
+    isolation_started    isolation, run (the number of its first fresh run), block (fresh runs of a check), wanted, rather_than,
+                         keep_rate, error, at_least, suspects [..], size, before: the fewest models are sought that have to go from
+                         the whole world so that the robot reaches its goal
+    removal_tried        removal, models [..]: tests of the whole world without these follow, with phase "isolate" and this removal
+    removal_judged       removal, verdict (passes, fails or unknown), tests [ids]
+    isolation_checked    removal, claims [{back (a model or null), verdict, reached, runs, low, high}], tests [ids]: fresh runs
+    isolation_finished   removal (null if there is no such world)
     confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
     room                 enough, needed, free (bytes): without enough room on the disk no tests are started

@@ -8,7 +8,16 @@ from typing import Any
 
 from ddenv.amounts import count
 from ddenv.errors import UserError
-from ddenv.runfile import fold_baseline, fold_certificates, fold_decisions, fold_rates, fold_slices, supports, working
+from ddenv.runfile import (
+    fold_baseline,
+    fold_certificates,
+    fold_decisions,
+    fold_isolation,
+    fold_rates,
+    fold_slices,
+    supports,
+    working,
+)
 from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector, whole
 from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
 from ddenv.runfile.persistent import PersistentTuple
@@ -87,6 +96,7 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
         seed=whole(data["seed"]),
         without=None if without is None else names(state.elements, [without])[0],
         trial=data.get("trial"),
+        removal=fold_isolation.removal_of(state, data),
         audits=data.get("audits"),
         node=data.get("node", state.node),
     )
@@ -259,10 +269,6 @@ def _unvetoed(state: RunState, data: Data, at: float) -> Changes:
     return changes
 
 
-def _command_handled(state: RunState, data: Data, _: float) -> Changes:
-    return {"last_command": max(state.last_command, whole(data["command"]))}
-
-
 def _finished(state: RunState, data: Data, at: float) -> Changes:
     minimal, size = bool(data["minimal"]), len(state.environment)
     nodes = list(state.nodes)
@@ -274,14 +280,6 @@ def _finished(state: RunState, data: Data, at: float) -> Changes:
         "nodes": tuple(nodes),
         "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
     }
-
-
-def _engine_stopped(state: RunState, data: Data, at: float) -> Changes:
-    return _ended(state, "stopped", data, at)
-
-
-def _engine_failed(state: RunState, data: Data, at: float) -> Changes:
-    return _ended(state, "failed", data, at)
 
 
 # Each returns only the changed fields, so that the state is copied once per event.
@@ -316,6 +314,7 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "paused": _paused,
     "resumed": _resumed,
     **working.HANDLERS,
+    **fold_isolation.HANDLERS,
     "accept_mode": _accept_mode,
     "vetoed": _vetoed,
     "unvetoed": _unvetoed,
@@ -329,10 +328,10 @@ _HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
     "changed": fold_decisions.changed,
     "leg_started": fold_decisions.leg_started,
     "command_refused": fold_decisions.command_refused,
-    "command_handled": _command_handled,
+    "command_handled": lambda state, data, _: {"last_command": max(state.last_command, whole(data["command"]))},
     "finished": _finished,
-    "engine_stopped": _engine_stopped,
-    "engine_failed": _engine_failed,
+    "engine_stopped": lambda state, data, at: _ended(state, "stopped", data, at),
+    "engine_failed": lambda state, data, at: _ended(state, "failed", data, at),
 }
 
 

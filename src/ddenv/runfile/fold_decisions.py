@@ -234,6 +234,8 @@ def left_round(state: RunState) -> Changes:
     last = state.certificates[-1:]
     past = (*state.certificates[:-1], *(replace(one, past=True) for one in last))
     changes: Changes = {"confirming": False, "certificates": past, **waits_no_more(state)}
+    if state.isolating is not None:
+        changes["isolations"] = (*state.isolations[:-1], replace(state.isolating, broken_off=True))
     if state.round is not None and not state.round.done:
         changes["round"] = replace(state.round, done=True)
     return changes

@@ -36,7 +36,7 @@ def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
 
 
 def _made_for(test: Test) -> tuple[object, ...]:
-    return test.phase, test.round, test.candidate, test.trial, test.node, test.without
+    return test.phase, test.round, test.candidate, test.trial, test.removal, test.node, test.without
 
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:

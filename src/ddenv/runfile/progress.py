@@ -1,4 +1,6 @@
-"""What a run has found so far, as plain frozen data: its environments, certificates, how many tests are left, and its sizes."""
+"""What a run has found so far, as plain frozen data: its environments, certificates, how many tests are left, its sizes,
+and what the user decided.
+"""
 
 from __future__ import annotations
 
@@ -99,3 +101,14 @@ class Point:
     tests: int
     models: int
     needed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A decision of the user: `kind` is the event's, `words` describe it; at Unix `time`, s, after `tests` tests, in `node`."""
+
+    time: float
+    tests: int
+    node: int
+    kind: str
+    words: str

@@ -8,9 +8,11 @@ from typing import Any
 
 from ddenv.resting import Supports
 from ddenv.runfile.failures import Baseline, Place
+from ddenv.runfile.isolation import Isolation, Removal
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
+from ddenv.runfile.progress import Decision as Decision
 from ddenv.runfile.progress import Node as Node
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
@@ -23,6 +25,8 @@ UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 # The phases of full runs of what is left. Files of format 4 have "confirm", with the seeds that the search had used.
 FRESH = ("certify", "confirm")
+# The phase of runs of the whole world without the models of a removal: all are full.
+ISOLATE = "isolate"
 # The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
 FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
@@ -51,6 +55,7 @@ class RunState:
     where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
     `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
+    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -89,6 +94,8 @@ class RunState:
     decisions: tuple[Decision, ...] = ()
     failures: tuple[int, ...] = ()
     certificates: tuple[Certificate, ...] = ()
+    isolations: tuple[Isolation, ...] = ()
+    removals: PersistentTuple[Removal] = field(default_factory=PersistentTuple)
     lower_bound: int = 0
     supports: Supports = ()
     ties: tuple[tuple[str, str], ...] | None = None
@@ -179,6 +186,17 @@ class RunState:
         return last if last is not None and last.node == self.node and not last.past else None
 
     @property
+    def isolating(self) -> Isolation | None:
+        """The isolation that has no result yet, if there is one: an engine goes on with it."""
+        last = self.isolations[-1] if self.isolations else None
+        return None if last is None or last.ended or last.broken_off else last
+
+    @property
+    def isolated(self) -> Isolation | None:
+        """The last isolation that has come to its end: all that is known of the nearest world that passes."""
+        return next((one for one in reversed(self.isolations) if one.ended), None)
+
+    @property
     def certified(self) -> bool:
         """Whether the run ended as minimal, and fresh runs show it; files of format 4 have no certificate."""
         return self.minimal and self.certificate is not None and bool(self.certificate.claims)
@@ -187,7 +205,7 @@ class RunState:
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
         # Tries of the user may run between them.
-        last = takewhile(lambda test: test.phase in (*FRESH, "hand"), reversed(self.tests))
+        last = takewhile(lambda test: test.phase in (*FRESH, "hand", ISOLATE), reversed(self.tests))
         return tuple(test for test in last if test.phase in FRESH)[::-1]
 
     @property
@@ -325,11 +343,11 @@ class Test:
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
     "hand" (for the user's trial number `trial`), "audit" (of the slice in `node`) or "certify": a run with a fresh seed of the
-    environment of `node`, or of that without the model `without`. In other phases `node` was the current one. `run` is i in
-    seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is
-    x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and
-    `first_touched` are the models that the robot sensed or touched, with the simulated time of the first time, s. `cut`: ended
-    early, because the robot was stuck for good.
+    environment of `node`, or of that without the model `without`; or "isolate": a run of the whole world after removal number
+    `removal`. In other phases `node` was the current one. `run` is i in seed = base + i; above 0 in a round it is a re-run
+    (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it
+    ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
+    sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
     `took_part` are the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that
     test implies it; `audits`: it was, although that test implies it.
     `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.
@@ -355,6 +373,7 @@ class Test:
     audits: int | None = None
     without: str | None = None
     trial: int | None = None
+    removal: int | None = None
     taken: bool = False
     node: int = 0
     tried: Candidate | None = field(default=None, repr=False, compare=False)
@@ -367,17 +386,6 @@ class Test:
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
         return self.phase == "round" and self.run > 0 and self.is_finished
-
-
-@dataclass(frozen=True, slots=True)
-class Decision:
-    """A decision of the user: `kind` is the event's, `words` describe it; at Unix `time`, s, after `tests` tests, in `node`."""
-
-    time: float
-    tests: int
-    node: int
-    kind: str
-    words: str
 
 
 def partition_letter(index: int) -> str:

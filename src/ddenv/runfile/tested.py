@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ddenv.amounts import first_of
+from ddenv.runfile.atlas import without_removal
 from ddenv.runfile.position import Moment
 from ddenv.runfile.state import FRESH, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
@@ -30,6 +31,10 @@ def purpose(state: RunState, test: Test) -> Purpose:
         return Purpose(f"round {test.round}", None)
     if test.phase == "audit":
         return Purpose("an audit of the slice", state.nodes[test.node].environment)
+    if test.removal is not None:
+        gone = state.removals[test.removal - 1].models
+        words = f"the whole world without {first_of(gone, 1)}" if gone else "the whole world, in full"
+        return Purpose(words, without_removal(state, test.removal))
     if test.phase in FRESH:
         environment = state.nodes[test.node].environment
         gone = stack_with(state, environment, test.without)

@@ -183,16 +183,21 @@ def parting_sentence(reason: Reason) -> str:
     one = reason.parting
     if one is None:
         return ""
-    start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
-    apart = (
-        ""
-        if one.apart is None or one.place is None
-        else (f", and are {APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}")
-    )
     it = "it" if len(reason.gone) == 1 else "one of them"
     met = (
         ""
         if one.met is None
         else (f" With {it} there, the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s.")
     )
-    return f"With seed {one.seed} the two runs differ {start}{apart}.{met}"
+    return f"{where_they_part(one)}{met}"
+
+
+def where_they_part(one: Parting) -> str:
+    """When two runs begin to differ, and when and where they are visibly apart, in one sentence."""
+    start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
+    apart = (
+        ""
+        if one.apart is None or one.place is None
+        else (f", and are {APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}")
+    )
+    return f"With seed {one.seed} the two runs differ {start}{apart}."

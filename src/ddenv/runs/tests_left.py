@@ -60,6 +60,8 @@ def remaining(state: RunState, at_work: bool) -> Remaining | None:
 
 def _expected(state: RunState) -> tuple[int, int, int] | None:
     """How many tests are left, as (low, likely, high); None if unknown, or after more than were expected."""
+    if state.isolating is not None:
+        return None
     if state.confirming:
         now = state.certificate
         return None if now is None else _of_certificate(state, now)

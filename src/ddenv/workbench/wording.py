@@ -24,6 +24,7 @@ STATUS = {
     "baseline": ("▶", "baseline"),
     "running": ("▶", "running"),
     "certifying": ("▶", "certificate"),
+    "isolating": ("▶", "isolation"),
     "paused": ("‖", "paused"),
     "waiting": ("?", "waiting"),
     "finished": ("■", "finished"),

@@ -1,4 +1,4 @@
-"""What is happening while a certificate is made, in sentences."""
+"""What is happening after the rounds, in sentences: while a certificate is made, and in isolation."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from ddenv.claims import fresh_runs_made, of_runs, terms, usual_runs
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
+from ddenv.words import isolating
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 
@@ -13,6 +14,12 @@ from ddenv.workbench.wording import plain
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:
     """Fresh runs show what the result of the rounds is worth."""
     state = snapshot.state
+    if state.isolating is not None:
+        now = plain(isolating(state))
+        return (
+            "Isolation: as few models as can be are removed from the whole world so that the robot reaches its goal.",
+            f"Now {now}. The result of the reduction stays as it is.",
+        )
     certificate = state.certificate
     if certificate is None:
         return ("The rounds are over.",)

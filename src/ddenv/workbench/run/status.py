@@ -159,6 +159,7 @@ def facts(
     """What the status line says, in its order."""
     state = snapshot.state
     status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
+    status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
     status = "settling" if status == "baseline" and state.settling else status
     sign, word = STATUS.get(status, ("·", status))
     if snapshot.gone:

@@ -1,0 +1,82 @@
+"""`ddenv isolate`: the nearest world that passes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from ddenv.cli.options import cluster_option, jobs_option, json_option, trust_option, whole
+from ddenv.errors import UserError, printable
+
+
+@click.command("isolate")
+@click.argument("run")
+@click.option(
+    "--runs",
+    type=whole(1),
+    metavar="N",
+    help="Run the world that passes at least so often with fresh seeds; at least 20 times if not given.",
+)
+@click.option("--again", is_flag=True, help="Search again, although the nearest world that passes is known.")
+@jobs_option()
+@cluster_option()
+@trust_option
+@json_option
+def isolate_command(
+    run: str, runs: int | None, again: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
+) -> int:
+    """Finds the nearest world that passes: as few models removed from the whole world of RUN (a name or a file) as it takes for the
+    robot to reach its goal. It changes nothing else.
+    """
+    from ddenv.cli.follow import Interrupted, follow
+    from ddenv.cli.trusting import allow_run
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.lock import engine_lock
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.programs import start_engine
+
+    path = find_run(run)
+    allow_run(path, trust, cluster)
+    with RunFile(path) as file, engine_lock(path):
+        state = fold(file.events())
+    if state.baseline is None:
+        raise UserError(
+            f"{path}: no failure is known yet, so there is nothing to isolate; run it first: ddenv resume {path}"
+        )
+    if state.status != "finished" and state.isolating is None:
+        raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
+    if state.isolated is None or state.isolating is not None or again or runs is not None:
+        where = {"cluster": cluster} if cluster else {}
+        try:
+            follow(path, start_engine(path, jobs, isolate=runs or 0, **where), sys.stderr if as_json else sys.stdout)
+        except Interrupted as interrupted:
+            if interrupted.state.isolating is not None or interrupted.state.isolated is None:
+                print(printable(f"interrupted; continue with: ddenv isolate {path}"), file=sys.stderr)
+                return 130
+    return _print(path, as_json)
+
+
+def _print(path: Path, as_json: bool) -> int:
+    """Prints what was found; returns the exit code."""
+    from ddenv.cli.wrapping import wrapped
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.nearest import nearest
+
+    with RunFile(path) as file:
+        state = fold(file.events())
+        found = nearest(file, state)
+    if found is None:
+        # The engine was stopped from elsewhere.
+        raise UserError(f"{path}: {state.reason}")
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    print(
+        json.dumps({"nearest": asdict(found)}) if as_json else "\n".join(wrapped(printable(found.sentences), columns))
+    )
+    return 0 if found.gone else 1

@@ -1,0 +1,129 @@
+"""The nearest world that passes, beside the whole world that fails: in words, and as two runs with one seed from where they part.
+
+`nearest(file, state)` is all that a view shows of it; `state.isolated` has the numbers alone, without a trajectory.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ddenv.amounts import first_of
+from ddenv.claims import is_nearest, of_passing
+from ddenv.errors import UserError
+from ddenv.runfile.isolation import Isolation
+from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.runs.reasons import GOAL, F, Parting, parted, where_they_part
+
+# Instants at which the two runs are compared, from where they part to the end of the shorter one.
+INSTANTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """Where the robots of two runs are after `seconds`, x and y, m, and how far from each other, m."""
+
+    seconds: float
+    failing: tuple[float, float]
+    passing: tuple[float, float]
+    apart: float
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """The nearest world that passes: the whole world without the models `gone`.
+
+    `words` say what fresh runs show of it, in one sentence. `shown`: they show that it passes, and that it does not with any one of
+    `gone` put back. `parting` compares a run of the whole world, `with_test`, with one without `gone`; None where no pair of runs
+    with one seed shows it. `first` of `gone` took part first there. `instants` are side by side from where the runs part.
+    """
+
+    gone: tuple[str, ...]
+    words: str
+    shown: bool
+    parting: Parting | None = None
+    first: str = ""
+    instants: tuple[Instant, ...] = ()
+
+    @property
+    def sentences(self) -> str:
+        """All of it in a few sentences."""
+        said = f"{self.words[:1].upper()}{self.words[1:]}."
+        return (
+            said if self.parting is None else f"{said} {where_they_part(self.parting)}{_met(self.parting, self.first)}"
+        )
+
+
+def nearest(file: RunFile, state: RunState) -> Nearest | None:
+    """What the last isolation found; None if there was none, or if it did not end. Raises UserError for damaged trajectories."""
+    one = state.isolated
+    if one is None:
+        return None
+    words, shown = of_passing(state, one), is_nearest(one)
+    if one.found is None:
+        return Nearest((), words, shown)
+    gone = state.removals[one.found - 1].models
+    pair = _pair(state, one, one.found)
+    if pair is None:
+        return Nearest(gone, words, shown)
+    failing, passing = pair
+    first, second = file.trajectory(failing.id), file.trajectory(passing.id)
+    equal, apart, place = parted(first, second)
+    touched = {model: at for model, at in failing.first_touched if model in gone}
+    met = touched or {model: at for model, at in failing.first_sensed if model in gone}
+    earliest = min(met, key=met.__getitem__, default="")
+    parting = Parting(failing.id, passing.id, failing.seed, equal, apart, place, met.get(earliest), bool(touched))
+    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, equal)))
+
+
+def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | None:
+    """A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not."""
+    passing = {test.run: test for test in state.tests if test.removal == found and test.outcome == GOAL}
+    whole = [test for test in state.tests if test.run in passing and _is_whole(state, test)]
+    failing = [test for test in whole if test.outcome in (F, "other")]
+    chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
+    return None if chosen is None else (chosen, passing[chosen.run])
+
+
+def _is_whole(state: RunState, test: Test) -> bool:
+    if test.phase in FRESH:
+        return test.without is None and len(state.nodes[test.node].environment) == len(state.elements)
+    if test.removal is not None:
+        return not state.removals[test.removal - 1].models
+    return test.phase == "baseline"
+
+
+def _met(parting: Parting, first: str) -> str:
+    if parting.met is None:
+        return ""
+    did = "touches" if parting.touched else "senses"
+    return (
+        f" Of what has to go, {first_of((first,), 1)} takes part first: the robot {did} it after {parting.met:.1f} s."
+    )
+
+
+def _side_by_side(first: array[float], second: array[float], since: float) -> Iterable[Instant]:
+    """`INSTANTS` of two trajectories, evenly from `since`, s, to the end of the shorter one."""
+    rows = min(len(first), len(second)) // COLUMNS
+    start = next((row for row in range(rows) if first[row * COLUMNS] >= since), None)
+    if start is None:
+        return
+    for row in sorted({start + (rows - 1 - start) * number // (INSTANTS - 1) for number in range(INSTANTS)}):
+        seconds, x, y = first[row * COLUMNS : row * COLUMNS + 3]
+        other_x, other_y = second[row * COLUMNS + 1 : row * COLUMNS + 3]
+        yield Instant(seconds, (x, y), (other_x, other_y), math.dist((x, y), (other_x, other_y)))
+
+
+def removed_in_passing(state: RunState, where: object) -> tuple[str, ...]:
+    """The models that the nearest world that passes lacks. Raises UserError where there is no such world yet."""
+    one = state.isolated
+    if one is None:
+        raise UserError(
+            f"{where}: no world that passes is known yet; find the nearest one first: ddenv isolate {where}"
+        )
+    if one.found is None:
+        raise UserError(f"{where}: {of_passing(state, one)}")
+    return state.removals[one.found - 1].models

@@ -1,0 +1,63 @@
+"""`ddenv isolate`, and what `ddenv why` says of its result."""
+
+import json
+
+import pytest
+
+from tests.command import in_process
+from tests.workbench import fake_moments, fake_run
+
+
+@pytest.fixture
+def run(tmp_path):
+    made = fake_run.FakeRun(tmp_path / "crates-1.ddenv")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """The engines that were asked for; none starts."""
+    asked = []
+    monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *words, **more: asked.append((*words, more)))
+    monkeypatch.setattr("ddenv.cli.follow.follow", lambda *_: None)
+    return asked
+
+
+def test_what_is_known_is_said_without_a_test(run, started, monkeypatch, capsys):
+    fake_moments.isolated(run)
+    done = in_process(monkeypatch, capsys, "isolate", run.path)
+    assert (done.returncode, started) == (0, [])
+    assert done.stdout.startswith("The nearest world that passes lacks 1 model of 11 (crate_00)")
+    found = json.loads(in_process(monkeypatch, capsys, "isolate", run.path, "--json").stdout)["nearest"]
+    assert (found["gone"], found["shown"], len(found["instants"])) == (["crate_00"], True, 8)
+    in_process(monkeypatch, capsys, "isolate", run.path, "--again", "--jobs", 1)
+    in_process(monkeypatch, capsys, "isolate", run.path, "--runs", 50, "--jobs", 1)
+    assert started == [(run.path, 1, {"isolate": 0}), (run.path, 1, {"isolate": 50})]
+
+
+def test_one_that_was_stopped_goes_on(run, started, monkeypatch, capsys):
+    fake_moments.isolating(run).write("engine_stopped", reason="stopped by the user")
+    done = in_process(monkeypatch, capsys, "isolate", run.path, "--jobs", 1)
+    assert started == [(run.path, 1, {"isolate": 0})]
+    # No engine works here.
+    assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: stopped by the user\n")
+
+
+def test_a_run_that_has_not_ended_is_refused_in_one_line(run, started, monkeypatch, capsys):
+    run.created()
+    said = in_process(monkeypatch, capsys, "isolate", run.path)
+    assert (said.returncode, said.stderr.count("\n")) == (2, 1)
+    assert "no failure is known yet" in said.stderr
+    fake_run.FakeRun.baseline(run)
+    assert "its search is not over" in in_process(monkeypatch, capsys, "isolate", run.path).stderr
+    assert started == []
+
+
+def test_why_says_it_after_the_reasons(run, monkeypatch, capsys):
+    fake_moments.isolated(run)
+    lines = in_process(monkeypatch, capsys, "why", run.path).stdout.splitlines()
+    assert [line[:12] for line in lines] == ["- Without cr", "- Without cr", "The nearest "]
+    found = json.loads(in_process(monkeypatch, capsys, "why", run.path, "--json").stdout)
+    assert len(found["reasons"]) == 2
+    assert found["nearest"]["gone"] == ["crate_00"]

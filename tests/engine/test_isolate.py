@@ -1,0 +1,229 @@
+"""The nearest world that passes: as few models removed as can be, whoever works on it, and with fresh runs of the end."""
+
+import tempfile
+import threading
+import time
+from contextlib import suppress
+from itertools import permutations
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ddenv.engine.__main__ import _begin
+from ddenv.engine.bench import Bench
+from ddenv.engine.control import Control, Stopped
+from ddenv.engine.driver import Driver
+from ddenv.engine.isolate import FEWEST_RUNS, FIRST_RUN, isolate
+from ddenv.engine.journal import Journal
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import ISOLATE
+from ddenv.runfile.store import RunFile
+from ddenv.runs.creation import read_parts
+from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
+from tests.engine.killing import Killed, kill_after
+from tests.engine.oracles import needs
+from tests.tiers import examples
+
+
+def reduced(folder, oracle, **more):
+    path = new_run(Path(folder), **more)
+    drive(path, FakePool(oracle, 2))
+    return path
+
+
+def work(path, pool, prepare=lambda _: None):
+    """Isolates as the engine program does, in this process."""
+    with RunFile(path) as file:
+        prepare(file)
+        _, world, _ = read_parts(file)
+        file.own()
+        journal = Journal(file)
+        before = journal.state.reason
+        _begin(journal, pool.jobs, None)
+        control = Control(journal, threading.Event(), time.time())
+        isolate(world, journal, Bench(journal, pool, control), None, before)
+        return journal.state
+
+
+def any_of(*groups):
+    """f shows wherever all models of any of `groups` are there: that is how a world fails for several reasons."""
+    return lambda keep, seed: "similar" if any(group <= keep for group in groups) else "pass"
+
+
+def under_way(path):
+    with RunFile(path) as file:
+        state = fold(file.events())
+        return state.isolating is not None or state.status == "finished"
+
+
+def removed(state):
+    return set(state.removals[state.isolated.found - 1].models)
+
+
+def tried(state):
+    return {frozenset(one.models): one.verdict for one in state.removals}
+
+
+def test_one_model_of_each_reason_goes_and_fresh_runs_show_what_that_is_worth(tmp_path):
+    oracle = needs("wall", "beam")
+    path = reduced(tmp_path, oracle)
+    with RunFile(path) as file:
+        before = fold(file.events())
+    state = work(path, FakePool(oracle, 2))
+    assert len(removed(state)) == 1
+    assert removed(state) < {"wall", "beam"}
+    first, back = state.isolated.checks[-1].claims
+    assert (first.verdict, first.reached, first.runs) == ("passes", FEWEST_RUNS, FEWEST_RUNS)
+    assert (back.verdict, back.reached) == ("needed", 0)
+    assert back.high < first.low
+    # The reduction is as it was.
+    same = ("status", "reason", "minimal", "environment", "certificates", "nodes", "evidence_test", "rounds_done")
+    assert [getattr(state, name) for name in same] == [getattr(before, name) for name in same]
+
+
+@given(
+    groups=st.lists(st.sets(st.sampled_from(ELEMENTS), min_size=1, max_size=3), min_size=1, max_size=3),
+    jobs=st.integers(1, 3),
+    salt=st.integers(0, 99),
+)
+@examples(0.3)
+def test_putting_back_any_one_model_makes_the_robot_fail_again(groups, jobs, salt):
+    oracle = any_of(*map(frozenset, groups))
+    with tempfile.TemporaryDirectory() as folder:
+        state = work(reduced(folder, oracle), FakePool(oracle, jobs, salt))
+    whole, gone = frozenset(ELEMENTS), removed(state)
+    assert oracle(whole - gone, 0) == "pass"
+    claims = state.isolated.checks[-1].claims
+    assert [claim.verdict for claim in claims] == ["passes", *["needed"] * len(gone)]
+    assert {claim.back for claim in claims[1:]} == gone
+    # Tests showed each, and the search looked at no world twice.
+    assert all(oracle((whole - gone) | {name}, 0) != "pass" for name in gone)
+    assert state.isolated.error <= 0.05
+
+
+@given(after=st.integers(1, 90), jobs=st.integers(1, 3))
+@examples(0.3)
+def test_killed_and_resumed_it_comes_to_the_same_end(after, jobs):
+    oracle = any_of(frozenset({"wall", "beam"}), frozenset({"ball"}))
+    with tempfile.TemporaryDirectory() as folder:
+        once = work(reduced(folder, oracle), FakePool(oracle, 1))
+        path = reduced(folder, oracle)
+        with suppress(Killed):
+            work(path, FakePool(oracle, jobs, after), lambda file: kill_after(file, after))
+        if not under_way(path):
+            # Nothing of it is in the file yet: the reduction is resumed.
+            drive(path, FakePool(oracle, jobs))
+        state = work(path, FakePool(oracle, jobs))
+    assert removed(state) == removed(once)
+    assert state.isolated.checks[-1].claims == once.isolated.checks[-1].claims
+    assert (state.reason, state.minimal) == (once.reason, once.minimal)
+
+
+def test_a_world_that_passes_a_few_times_does_not_pass(tmp_path):
+    """Without the lucky model it passes with the first three seeds, and not again."""
+    verdicts = []
+    for lucky, *others in permutations(ELEMENTS[:3]):
+
+        def oracle(keep, seed, lucky=lucky, others=frozenset(others)):
+            return "similar" if others <= keep and not (lucky not in keep and seed < 3) else "pass"
+
+        state = work(reduced(tmp_path, needs(lucky, *others)), FakePool(oracle, 2))
+        assert lucky not in removed(state)
+        verdicts.append(tried(state).get(frozenset({lucky})))
+    assert "fails" in verdicts
+
+
+def test_what_only_the_seeds_of_the_search_let_pass_is_refuted_by_fresh_runs(tmp_path):
+    def oracle(keep, seed):
+        if "wall" not in keep:
+            return "similar" if seed >= FIRST_RUN and "beam" in keep else "pass"
+        return "similar" if "beam" in keep else "pass"
+
+    path = reduced(tmp_path, needs("wall", "beam"))
+    state = work(path, FakePool(oracle, 2))
+    assert removed(state) == {"beam"}
+    assert {claim.verdict for check in state.isolated.checks for claim in check.claims[:1]} <= {"passes", "fails"}
+
+
+def test_where_nothing_lets_the_robot_pass_it_says_so(tmp_path):
+    oracle = needs()
+    state = work(reduced(tmp_path, oracle), FakePool(oracle, 2))
+    assert state.isolated.found is None
+    assert state.isolated.checks == ()
+    assert all(verdict == "fails" for verdict in tried(state).values())
+    # All that may go was among them.
+    assert frozenset(ELEMENTS) in tried(state)
+
+
+def test_a_world_whose_tests_break_is_unknown_and_not_taken(tmp_path):
+    def oracle(keep, seed):
+        if keep == frozenset(ELEMENTS) - {"wall"}:
+            return "error"
+        return "similar" if {"wall", "beam"} <= keep else "pass"
+
+    path = reduced(tmp_path, needs("wall", "beam"))
+    state = work(path, FakePool(oracle, 2))
+    assert removed(state) == {"beam"}
+    assert tried(state)[frozenset({"wall"})] == "unknown"
+
+
+def test_pinned_models_stay_and_a_new_pin_ends_it(tmp_path):
+    oracle = needs("wall", "beam")
+    path = reduced(tmp_path, oracle)
+    with RunFile(path) as file:
+        file.send("pin", models=[ELEMENTS.index("wall")])
+    drive(path, FakePool(oracle, 2))
+    state = work(path, FakePool(oracle, 2))
+    assert removed(state) == {"beam"}
+
+    def pins(keep, seed):
+        with RunFile(path) as file:
+            file.send("pin", models=[ELEMENTS.index("beam")])
+        return oracle(keep, seed)
+
+    with pytest.raises(Stopped):
+        work(path, FakePool(pins, 2))
+    with RunFile(path) as file:
+        state = fold(file.events())
+    assert state.isolating is None
+    assert state.isolated.found is not None
+
+
+def test_a_finished_run_implies_tests_here_too(tmp_path):
+    """What took no part in a run of the whole world makes no difference when it goes."""
+    oracle = needs("wall")
+    path = new_run(tmp_path, accept_rate="kept", slice=True)
+
+    def pool():
+        made = FakePool(oracle, 1)
+        made.ties, made.took_part = [], lambda keep, seed: frozenset({"wall", "beam"}) & keep
+        return made
+
+    drive(path, pool())
+    state = work(path, pool())
+    assert removed(state) == {"wall"}
+    one = next(test for test in state.tests if test.phase == ISOLATE)
+    assert one.run < FIRST_RUN
+
+
+def test_the_search_can_go_on_after_it(tmp_path):
+    """The tests of isolation are no round's."""
+    oracle = needs("wall", "beam")
+    path = reduced(tmp_path, oracle)
+    work(path, FakePool(oracle, 2))
+    with RunFile(path) as file:
+        before = fold(file.events())
+        file.send("go_back", node=0)
+    with RunFile(path) as file:
+        scenario, world, _ = read_parts(file)
+        file.own()
+        journal = Journal(file)
+        _begin(journal, 2, None)
+        control = Control(journal, threading.Event(), time.time())
+        file.send("resume")
+        Driver(scenario, world, journal, Bench(journal, FakePool(oracle, 2), control), control).reduce()
+        after = journal.state
+    assert after.environment == before.environment
+    assert after.isolated == before.isolated

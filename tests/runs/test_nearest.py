@@ -1,0 +1,98 @@
+"""The nearest world that passes, in words and beside the world that fails: each number is that of the runs."""
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.store import RunFile
+from ddenv.runs.nearest import INSTANTS, nearest, removed_in_passing
+from tests.workbench import fake_moments, fake_run
+
+
+def read(path):
+    with RunFile(path) as file:
+        state = fold(file.events())
+        return state, nearest(file, state)
+
+
+@pytest.fixture
+def run(tmp_path):
+    made = fake_run.FakeRun(tmp_path / "one.ddenv")
+    yield made
+    made.close()
+
+
+def test_it_says_what_goes_and_what_fresh_runs_show_with_and_without_it(run):
+    state, found = read(fake_moments.isolated(run).path)
+    assert found.gone == removed_in_passing(state, run.path) == ("crate_00",)
+    assert found.shown
+    assert found.words == (
+        "the nearest world that passes lacks 1 model of 11 (crate_00): without it the robot reaches its goal in 20 of 20 fresh "
+        "runs (84 % to 100 %); with it put back in 0 of 9 fresh runs (0 % to 30 %)"
+    )
+    # The reduction is as it was.
+    assert (state.status, state.minimal, state.certified) == ("finished", True, True)
+
+
+def test_two_runs_with_one_seed_stand_side_by_side_from_where_they_part(run):
+    state, found = read(fake_moments.isolated(run).path)
+    one = found.parting
+    failing, passing = (state.tests[test - 1] for test in (one.with_test, one.without_test))
+    assert failing.seed == passing.seed == one.seed
+    assert (failing.outcome, failing.phase, passing.outcome) == ("similar", "baseline", "pass")
+    assert len(found.instants) == INSTANTS
+    first, *later = found.instants
+    assert (first.seconds, first.apart) == (one.equal, 0.0)
+    assert all(each.apart == pytest.approx(1.0) for each in later)
+    assert found.sentences.startswith("The nearest world")
+    assert f"With seed {one.seed} the two runs differ after {one.equal:.1f} s" in found.sentences
+
+
+def test_before_it_has_ended_nothing_is_claimed(run):
+    state, found = read(fake_moments.isolating(run).path)
+    assert found is None
+    assert state.isolating is not None
+    with pytest.raises(UserError, match="find the nearest one first: ddenv isolate"):
+        removed_in_passing(state, run.path)
+
+
+def ended(run, claims, removal):
+    """What is said of an isolation that ends with these claims about the world without the first three models."""
+    fake_moments.finished(run).start_isolation(2)
+    gone = run.remove("crate_00", "crate_01", "crate_02")
+    low_high = {"low": 0.1, "high": 0.9}
+    said = [
+        {"back": back, "verdict": verdict, "reached": reached, "runs": runs, **low_high}
+        for back, verdict, reached, runs in claims
+    ]
+    if claims:
+        run.write("isolation_checked", removal=gone, claims=said, tests=[])
+    run.write("isolation_finished", removal=removal)
+    return read(run.path)[1]
+
+
+def test_what_is_not_shown_is_not_claimed(run):
+    claims = ((None, "passes", 20, 20), (0, "needed", 0, 9), (1, "not shown", 3, 9), (2, "needed", 0, 9))
+    found = ended(run, claims, 1)
+    assert not found.shown
+    assert found.words.endswith("; not shown that each of them has to go: undecided with crate_01 put back")
+
+
+def test_the_worst_of_several_that_are_put_back_is_named_by_its_numbers(run):
+    found = ended(run, ((None, "passes", 20, 20), *((each, "needed", 0, 9) for each in range(3))), 1)
+    assert found.shown
+    assert "with any one of these 3 put back in at most 0 of 9 fresh runs" in found.words
+
+
+def test_where_no_world_passes_it_says_so(run):
+    found = ended(run, (), None)
+    assert (found.gone, found.shown) == ((), False)
+    assert found.words.startswith("no world was found that passes: the robot does not reach its goal")
+    assert "all 11 models that may go" in found.words
+
+
+def test_where_fresh_runs_do_not_show_that_it_passes_it_says_so(run):
+    found = ended(run, ((None, "not shown", 12, 20),), None)
+    assert found.words.startswith("no world is shown to pass: without 3 models of 11")
+    with pytest.raises(UserError, match="no world is shown to pass"):
+        removed_in_passing(read(run.path)[0], run.path)
