@@ -67,6 +67,7 @@ def evil(tmp_path, home):
             ("world", "check", "WORLD"),
             ("world", "show", "WORLD"),
             ("world", "show", "RUN", "--took-part"),
+            ("isolate", "RUN"),
             ("test", "RUN", "--keep", ESCAPES),
         ),
         *(

@@ -10,8 +10,8 @@ from ddenv.amounts import count, first_of, percent
 from ddenv.certificate_cost import certificate_tests
 from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
-from ddenv.runfile.isolation import Isolation, Returned
 from ddenv.runfile.progress import Certificate, Claim
+from ddenv.runfile.removals import Isolation, Returned
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
 from ddenv.runfile.supports import stack_with

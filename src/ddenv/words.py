@@ -21,7 +21,7 @@ from ddenv.claims import (
 )
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.isolation import Removal
+from ddenv.runfile.removals import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
 from ddenv.took_part import implied_words, refuted_words, slice_words

@@ -61,3 +61,23 @@ def test_why_says_it_after_the_reasons(run, monkeypatch, capsys):
     found = json.loads(in_process(monkeypatch, capsys, "why", run.path, "--json").stdout)
     assert len(found["reasons"]) == 2
     assert found["nearest"]["gone"] == ["crate_00"]
+
+
+def test_the_world_that_passes_is_drawn_and_written(run, tmp_path, monkeypatch, capsys):
+    fake_moments.isolated(run)
+    shown = in_process(monkeypatch, capsys, "world", "show", run.path, "--passes").stdout
+    assert shown.endswith("the nearest world that passes lacks 1 model of 11:\n  crate_00\n")
+    file = tmp_path / "passes.sdf"
+    in_process(monkeypatch, capsys, "export", run.path, "--sdf", file, "--passes")
+    text = file.read_text()
+    assert [name for name in run.elements if f'"{name}"' not in text] == ["crate_00"]
+
+
+@pytest.mark.parametrize("words", [("world", "show", "RUN", "--passes"), ("export", "RUN", "--sdf", "OUT", "--passes")])
+def test_where_no_such_world_is_known_one_line_says_how_to_find_it(run, tmp_path, monkeypatch, capsys, words):
+    fake_moments.finished(run)
+    there = {"RUN": run.path, "OUT": tmp_path / "passes.sdf"}
+    done = in_process(monkeypatch, capsys, *(there.get(word, word) for word in words))
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"ddenv isolate {run.path}" in done.stderr
+    assert not there["OUT"].exists()

@@ -16,6 +16,11 @@ LONGEST_URI = 80
 @click.command("export")
 @click.argument("run")
 @click.option("--sdf", type=Path, help="Write the environment as an SDF world.")
+@click.option(
+    "--passes",
+    is_flag=True,
+    help="With --sdf: write the nearest world that passes, in place of what is left ('ddenv isolate RUN' finds it).",
+)
 @click.option("--scenario", type=Path, help="Write a scenario (YAML) that runs the robot in that world; needs --sdf.")
 @click.option(
     "--bundle",
@@ -40,6 +45,7 @@ LONGEST_URI = 80
 def export_command(
     run: str,
     sdf: Path | None,
+    passes: bool,
     scenario: Path | None,
     bundle: Path | None,
     mcap: Path | None,
@@ -59,6 +65,8 @@ def export_command(
             raise UserError("nothing to export: give --sdf FILE, --bundle FOLDER, --mcap FILE or --pytest FOLDER")
     if sdf is None and scenario is not None:
         raise UserError("--scenario: needs --sdf FILE")
+    if sdf is None and passes:
+        raise UserError("--passes: needs --sdf FILE")
     written = [] if bundle is None else write_bundle(path, bundle)
     written += [] if test is None else write_test(path, test)
     for file in written:
@@ -67,7 +75,7 @@ def export_command(
         _write_mcap(path, mcap, trust)
     if sdf is None:
         return 0
-    exported = export_world(path, sdf, scenario)
+    exported = export_world(path, sdf, scenario, passes)
     for file in exported.files:
         print(printable(f"wrote {file}"))
     announce_needs(sdf, exported.needs)

@@ -45,12 +45,14 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
 @click.option("--svg", type=Path, help="Write the map to this file instead.")
 @click.option("--took-part", is_flag=True, help="FILE is a run: show what took part in its runs of the whole world.")
+@click.option("--passes", is_flag=True, help="FILE is a run: show the nearest world that passes, and what it lacks.")
 def show(
     file: Path,
     spawn: tuple[float, ...] | None,
     goal: tuple[float, float] | None,
     svg: Path | None,
     took_part: bool,
+    passes: bool,
     **reading: Any,
 ) -> int:
     """Draws the map of FILE, from above."""
@@ -60,13 +62,14 @@ def show(
 
     columns, rows = shutil.get_terminal_size((100, 36))
     color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
-    if took_part:
-        from ddenv.cli.world_took_part import took_part_map
+    if took_part or passes:
+        from ddenv.cli.world_took_part import passing_map, took_part_map
         from ddenv.runs.folder import find_run
 
-        if spawn is not None or goal is not None or svg is not None:
-            raise UserError("--took-part: --spawn, --goal and --svg do not go with it")
-        print(took_part_map(find_run(str(file)), columns, rows - 1, color=color))
+        option, drawn = ("--took-part", took_part_map) if took_part else ("--passes", passing_map)
+        if spawn is not None or goal is not None or svg is not None or (took_part and passes):
+            raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run do not go with it")
+        print(drawn(find_run(str(file)), columns, rows - 1, color=color))
         return 0
     world = _read(file, reading)
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)

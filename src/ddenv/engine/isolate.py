@@ -23,7 +23,7 @@ from ddenv.reduction.isolation import Passing, isolating, passes
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import Shown, decided_by, standing
-from ddenv.runfile.isolation import Check, Isolation
+from ddenv.runfile.removals import Check, Isolation
 from ddenv.runfile.state import BROKEN, FRESH_RUNS, ISOLATE
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World

@@ -280,9 +280,8 @@ class Journal:
         """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
         broke = {key: test for key, id in self.ledger.items() if (test := self.state.tests[id - 1]).outcome in BROKEN}
         again = [test for test in broke.values() if self._leaves_unknown(test)]
-        for key, test in broke.items():
-            if test in again or test.phase == ISOLATE:
-                del self.ledger[key]
+        for key in [key for key, test in broke.items() if test in again or test.phase == ISOLATE]:
+            del self.ledger[key]
         self._broke.clear()
         if again and self.state.baseline is not None:
             self.steered = True

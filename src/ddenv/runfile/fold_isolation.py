@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ddenv.runfile import working
 from ddenv.runfile.events import Changes, Data, chance, names, one_of, whole
-from ddenv.runfile.isolation import Check, Isolation, Removal, Returned
+from ddenv.runfile.removals import Check, Isolation, Removal, Returned
 from ddenv.runfile.state import ISOLATE, RunState
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from ddenv.resting import Supports
 from ddenv.runfile.failures import Baseline, Place
-from ddenv.runfile.isolation import Isolation, Removal
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
 from ddenv.runfile.progress import Certificate, Forecast, Point
 from ddenv.runfile.progress import Decision as Decision
 from ddenv.runfile.progress import Node as Node
+from ddenv.runfile.removals import Isolation, Removal
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Tests that ended so say nothing about f.

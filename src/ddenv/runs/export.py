@@ -12,6 +12,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import RESOURCE, read_parts
+from ddenv.runs.nearest import removed_in_passing
 from ddenv.world.files.access import Missing, Unusable, write_file
 from ddenv.world.files.resolve import find
 from ddenv.world.files.resources import Stored
@@ -46,15 +47,19 @@ class _Asked:
         return self._stored.mesh(uri, base, **how)
 
 
-def export_world(run: Path, sdf: Path, scenario_file: Path | None) -> Exported:
-    """Writes the current environment of a run as an SDF world, and a scenario for it if asked. Raises UserError."""
+def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool = False) -> Exported:
+    """Writes the current environment of a run, or the nearest world that `passes`, as an SDF world, and a scenario for it if asked.
+
+    Raises UserError.
+    """
     with RunFile(run) as file:
         scenario, world, _ = read_parts(file)
         robot, stored = file.document("robot"), Stored(file.documents(RESOURCE))
         state = fold(file.events())
     if not state.elements:
         raise UserError(f"{run}: nothing has been run yet; start it with 'ddenv resume {run}'")
-    removed = frozenset(state.elements) - frozenset(state.environment)
+    gone = removed_in_passing(state, run) if passes else set(state.elements).difference(state.environment)
+    removed = frozenset(gone)
     try:
         text = without(world, removed)
     except ValueError as error:
