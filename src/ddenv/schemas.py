@@ -12,11 +12,13 @@ import importlib.util
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ddenv.errors import UserError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 Kind = Literal["partitioning", "prioritization", "algorithm"]
 
@@ -136,9 +138,24 @@ def nearest(word: str, known: Sequence[str]) -> str:
 
 
 @cache
+def _installed() -> dict[str, list[EntryPoint]]:
+    """Ours of all packages, by their groups. They stand in many files, which are read once."""
+    from importlib.metadata import entry_points
+
+    found = entry_points()
+    return {group: list(found.select(group=group)) for group in map(_group, _OURS)}
+
+
+def _group(kind: str) -> str:
+    return f"ddenv.{kind}s"
+
+
+@cache
 def _known(kind: Kind) -> dict[str, EntryPoint]:
-    group = f"ddenv.{kind}s"
+    from importlib.metadata import EntryPoint
+
+    group = _group(kind)
     ours = {name: EntryPoint(name, value, group) for name, value in _OURS[kind].items()}
     # A name with a slash would look like a pair.
-    others = {each.name: each for each in entry_points(group=group) if each.name not in ours and "/" not in each.name}
+    others = {each.name: each for each in _installed()[group] if each.name not in ours and "/" not in each.name}
     return ours | others

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
+from weakref import WeakSet
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -16,6 +17,7 @@ from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
+from textual.dom import DOMNode
 from textual.notifications import SeverityLevel
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
@@ -30,6 +32,8 @@ from ddenv.workbench.wording import plain
 
 # New objects until garbage is collected, then how often until older ones are looked through, too.
 THRESHOLDS = (20_000, 20, 20)
+# The keys that move the focus, with Textual's actions for them.
+TABS = {"tab": ("app.focus_next",), "shift+tab": ("app.focus_previous",)}
 # So many notices wait for a dialog to close, the latest ones.
 HELD = 3
 
@@ -133,6 +137,8 @@ class Workbench(App[int]):
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
         self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
+        # Screens that have come to the top before.
+        self._shown: WeakSet[DOMNode] = WeakSet()
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.run.observed import Observed
@@ -150,6 +156,32 @@ class Workbench(App[int]):
         # Widgets draw with Rich, whose names for the terminal's own colours differ.
         self.theme_variables = for_rich(self.theme_variables)
         return variables
+
+    async def on_event(self, event: events.Event) -> None:
+        """As every app, but tab moves the focus before the next key is looked at: that would still go to the field before."""
+        if (
+            isinstance(event, events.Key)
+            and event.key in TABS
+            and self.app_focus
+            and not self._bind_otherwise(event.key)
+        ):
+            (self.screen.focus_next if event.key == "tab" else self.screen.focus_previous)()
+        else:
+            await super().on_event(event)
+
+    def _bind_otherwise(self, key: str) -> bool:
+        """Whether what has the focus, or what that is in, gives another meaning to `tab` or `shift+tab`."""
+        nodes = self.screen.ancestors_with_self if self.focused is None else self.focused.ancestors_with_self
+        bound = (each for node in nodes for each in node._bindings.key_to_bindings.get(key, ()))
+        return any(each.action not in TABS[key] for each in bound)
+
+    def update_styles(self, node: DOMNode, animate: bool = True) -> None:
+        """As every app; but a screen that opens has just got all its styles, and Textual would make them once more."""
+        opens = isinstance(node, Screen) and not animate and node not in self._shown
+        if opens:
+            self._shown.add(node)
+        else:
+            super().update_styles(node, animate)
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.

@@ -3,6 +3,7 @@
 import fake_run
 import pytest
 import yaml
+from textual import events
 from textual.widgets import Input
 
 from ddenv.runfile.store import RunFile
@@ -99,3 +100,15 @@ async def test_a_terminal_that_is_too_small_is_told_what_is_needed(scenarios, si
         await session.pilot.pause()
         assert not session.screen.query_one("#small").display
         assert session.screen.query_one("#map").size.height > 10
+
+
+async def test_what_is_typed_right_after_tab_goes_to_the_next_field(scenarios):
+    async with Opened() as session:
+        session.screen.query_one("#epsilon", Input).focus()
+        await session.pilot.pause()
+        before = session.value("epsilon")
+        # At once, as they come from a busy terminal.
+        for key, character in (("tab", None), ("3", "3"), ("tab", None), ("minus", "-"), ("1", "1")):
+            session.app.post_message(events.Key(key, character))
+        await session.settle()
+        assert [session.value(id) for id in ("epsilon", "jobs", "spawn_x")] == [before, "3", "-1"]

@@ -157,3 +157,27 @@ def test_only_the_newest_remedies_are_kept():
     found = json.loads(state_file(REMEDIES).read_text())
     assert len(found) == KEPT - 1
     assert list(found)[-1] == "model://9"
+
+
+async def test_the_question_for_the_start_says_how_to_come_to_the_map_and_comes_back_to_it(depot):
+    async with Opened(size=(80, 24)) as session:
+        await session.open(depot)
+        assert "the start: move the crosshair" in session.told("picking")
+        await session.press("m")
+        assert "the start comes next: s goes to the map" in session.told("picking")
+        await session.press("a")
+        assert session.screen.focused is session.screen.query_one(WorldMap)
+        assert "the start: move the crosshair" in session.told("picking")
+        assert "press s for the start, on the map" in session.told("cost")
+
+
+async def test_an_empty_remedy_and_a_file_are_answered(depot, tmp_path):
+    async with Opened(size=(80, 24)) as session:
+        await session.open(depot)
+        await session.press("m", "enter")
+        dialog = session.app.screen
+        for text, said in (("", "type one of these"), (str(depot), "is a file; name a folder")):
+            dialog.query_one(Input).value = text
+            await session.press("enter")
+            assert said in dialog.query_one("#wrong", Static).render().plain
+        assert session.app.screen is dialog

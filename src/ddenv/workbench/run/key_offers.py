@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import partial
+from typing import Any
+
+from textual.screen import Screen
 
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.workbench.help.footer import KeyFooter
@@ -13,7 +16,7 @@ from ddenv.workbench.run.browsing import NOT_NOW, Browsing
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.run_keys import GUIDING
+from ddenv.workbench.run.run_keys import GUIDES, GUIDING
 
 # These ask for models if none are selected. A pin always asks: it ends the search.
 TITLES = {
@@ -59,9 +62,13 @@ class KeyOffers:
             offered = offer(name, now, pointed)
             footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
 
-    def refuse(self, name: str) -> None:
-        """Shows why a key does nothing."""
-        self._asking.refuse(self.offer(name).why_not)
+    def pressed(self, screen: Screen[Any], key: str) -> None:
+        """Shows why a key does nothing, if it guides the run on `screen` and is not possible now."""
+        # To list what all keys do now takes longer than most keys take.
+        if any(each.action in GUIDES for each in screen._bindings.key_to_bindings.get(key, ())):
+            active = screen.active_bindings.get(key)
+            if active is not None and not active.enabled and active.node is screen:
+                self._asking.refuse(self.offer(GUIDES[active.binding.action]).why_not)
 
     def use(self, name: str) -> None:
         """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""

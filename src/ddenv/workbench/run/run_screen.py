@@ -42,7 +42,7 @@ from ddenv.workbench.run.noteworthy import title, worth_a_look
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.processes import Engine, Scene
-from ddenv.workbench.run.run_keys import BROWSING, FIRST, GUIDES, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
+from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
 from ddenv.workbench.run.status import Header, Status
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
@@ -253,9 +253,7 @@ class RunScreen(Screen[None]):
 
     def on_key(self, event: events.Key) -> None:
         """A key that is not possible now says why."""
-        active = self.active_bindings.get(event.key)
-        if active is not None and not active.enabled and active.node is self:
-            self._keys.refuse(GUIDES[active.binding.action])
+        self._keys.pressed(self, event.key)
 
     @on(WorldMap.Pointed)
     def _show_keys(self) -> None:

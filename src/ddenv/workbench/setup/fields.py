@@ -118,6 +118,7 @@ class OptionsForm(Vertical):
         self._suggested = ""
         # What is wrong with the fields that are marked, by id, and what else is wrong.
         self._problems: dict[str, str] = {}
+        self._marked: frozenset[str] = frozenset()
         self._message = ""
         # The texts of fields that were not opened yet: most never are, and the screen opens faster without them.
         self._unopened = {field.id: next(iter(field.choices), "") for field in form.ADVANCED}
@@ -304,9 +305,10 @@ class OptionsForm(Vertical):
         line, words = self.query_one("#wrong", Static), f"{MARK}{first}" if first else self._message
         line.display = bool(words)
         line.update(Text(plain(words)))
-        for id in FIELDS:
+        for id in self._marked ^ self._problems.keys():
             for field in self.query(f"#{id}"):
                 field.set_class(id in self._problems, "-wrong")
+        self._marked = frozenset(self._problems)
 
     def on_descendant_blur(self, event: events.DescendantBlur) -> None:
         """A field is checked when it is left; an empty one only at the start of a run."""

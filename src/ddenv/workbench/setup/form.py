@@ -101,7 +101,7 @@ def value(field: Field, text: str) -> Value:
     if not text and field.empty:
         return None
     if not text:
-        raise FieldError(field.id, f"{field.label}: is missing")
+        raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
     try:
         found = str(text) if field.kind is str else int(text) if field.kind is int else float(text)
     except ValueError:
@@ -110,6 +110,15 @@ def value(field: Field, text: str) -> Value:
     if allowed := _out_of_range(field, found):
         raise FieldError(field.id, f"{field.label}: expected {allowed}, found {text[:40]}")
     return found
+
+
+def _wanted(field: Field) -> str:
+    """What an empty field asks for."""
+    if field in PLACES:
+        return (
+            "press s for the start, on the map" if field.id.startswith("spawn") else "press g for the goal, on the map"
+        )
+    return f"type {field.setting.range}" if field.setting is not None and field.setting.range else "type one"
 
 
 def _out_of_range(field: Field, found: Value) -> str:

@@ -108,6 +108,8 @@ class AskRemedy(ModalScreen[str | None]):
     @on(Input.Submitted)
     def _typed(self, event: Input.Submitted) -> None:
         try:
+            if not event.value.strip() and not self._row.remedy:
+                raise UserError("type one of these, or press escape to change nothing")
             text = remedy(event.value)
         except UserError as error:
             self.query_one("#wrong", Static).update(Text(str(error).removeprefix("remedy: ")))

@@ -37,6 +37,8 @@ ASKS = {
     "heading": "the heading: pick a place for the robot to look at",
     "goal": "the goal: move the crosshair and press enter, or click",
 }
+# The same while the focus is elsewhere, where the arrows and enter mean something else.
+ASKS_FROM_AFAR = "the {what} comes next: {key} goes to the map, or click there"
 MORE = " …"
 
 
@@ -89,6 +91,12 @@ class Preview(Vertical):
         texts = self.picker.form.texts
         now = {field.id: texts[field.id] if keep else "" for field in form.PLACES}
         return now if self.choice is None else places_of(self.choice.path) or now
+
+    def ask_again(self) -> None:
+        """Back to the map, where a place is picked next, once each missing file has its remedy."""
+        missing = () if self.choice is None else self.choice.missing
+        if self.picker.picked_next and self.missing.has_focus and all(row.remedy for row in missing):
+            self.map.focus()
 
     def remember_places(self) -> None:
         """For the next time that this world is chosen."""
@@ -240,6 +248,13 @@ class PlacePicker(Static):
             self._map.set_marks(self.spawn, self.goal)
             self._show_words()
 
+    def on_mount(self) -> None:
+        self.watch(self.screen, "focused", self._focus_moved, init=False)
+
+    def _focus_moved(self) -> None:
+        if self.picked_next:
+            self._show_words()
+
     def on_resize(self) -> None:
         self._show_words()
 
@@ -247,7 +262,10 @@ class PlacePicker(Static):
         """Where start and goal are, in the longest words that fit."""
         self.set_class(bool(self.picked_next), "-on")
         if self.picked_next:
-            words = Text("▶ ", "bold", no_wrap=True, overflow="ellipsis").append(ASKS[self.picked_next])
+            what = self.picked_next
+            here = self.screen.focused is self._map
+            asked = ASKS[what] if here else ASKS_FROM_AFAR.format(what=what, key=KEYS[what])
+            words = Text("▶ ", "bold", no_wrap=True, overflow="ellipsis").append(asked)
             self.update(words.append("   escape stops", "dim"))
             return
         if self.choice is None:

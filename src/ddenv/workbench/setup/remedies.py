@@ -55,7 +55,7 @@ def remedy(text: str) -> str:
     if text.startswith(("/", "~", ".")):
         folder = without_tilde(text).absolute()
         if not is_folder(folder):
-            raise UserError(f"there is no folder {folder}")
+            raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
         return str(folder)
     stand_in = parse_stand_in(text, "remedy") if text else None
     if stand_in is not None and stand_in.shape is None and stand_in.word not in (AUTO, NONE):

@@ -185,6 +185,7 @@ class SetupScreen(Screen[None]):
         self.form.suggest_name(event.free_name)
         if event.again:
             self.preview.show_places()
+            self.preview.ask_again()
             self._show_outcome()
             return
         placed = choice.scenario is not None
