@@ -178,6 +178,8 @@ class Preview(Vertical):
     @on(WorldMap.PlacePicked)
     def _place_picked(self, event: WorldMap.PlacePicked) -> None:
         self.picker.take(event.x, event.y)
+        # The user may quit before a run begins.
+        self.remember_places()
 
 
 class PlacePicker(Static):
