@@ -83,6 +83,23 @@ def rate(fresh: Counted) -> str:
     return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
 
 
+def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
+    """What runs `there`, in another simulator, show of what is left, or of that without a model; without a full stop.
+
+    The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs at the low end of its interval.
+    """
+    share = f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+    if there.without is not None:
+        verdicts = {True: f"not needed in {name}", False: f"needed in {name}, too", None: f"not shown for {name}"}
+        return f"{there.without}: {verdicts[fails]}: without it {share}"
+    verdicts = {
+        True: f"fails in {name}, too",
+        False: f"does not fail in {name} as it did",
+        None: f"the runs do not say whether it fails in {name} as it did",
+    }
+    return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
+
+
 def meaning(claim: Claim, certificate: Certificate) -> str:
     """What the verdict of a claim means, in plain words."""
     rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"

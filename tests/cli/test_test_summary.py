@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from ddenv.cli.test_summary import lines, summary
+from ddenv.cli.test_summary import elsewhere, lines, summary
+from ddenv.runfile.progress import Claim
 from tests.command import in_process
 from tests.conftest import DATA
 
@@ -30,6 +31,23 @@ def test_each_environment_has_its_runs_its_rate_and_its_interval():
 
 def test_where_no_f_is_known_all_failures_count():
     assert lines(summary(runs(None, "failed", "pass", "pass"))) == ["all 3 models: 1 of 3 runs failed (6 % to 79 %)"]
+
+
+def test_runs_in_another_simulator_are_compared_with_the_certificate():
+    here = Claim(None, "kept", 29, 29, 0.88, 1.0)
+    many = [
+        *runs(None, *["similar"] * 18, "other", "pass"),
+        *runs("ball", *["pass"] * 8, "error"),
+        *runs("wall", "pass"),
+    ]
+    found = elsewhere(many, here, "MuJoCo")
+    assert [each["fails"] for each in found] == [True, False, None]
+    assert lines(summary(many), {each["without"]: each["said"] for each in found}) == [
+        "fails in MuJoCo, too: f in 18 of 20 runs (70 % to 97 %); by its certificate f in 29 of 29 fresh runs (88 % to 100 %)",
+        "ball: needed in MuJoCo, too: without it f in 0 of 8 runs (0 % to 32 %); 1 more run broke",
+        "wall: not shown for MuJoCo: without it f in 0 of 1 run (0 % to 79 %)",
+    ]
+    assert elsewhere(runs(None, "error"), here, "MuJoCo") == []
 
 
 def test_the_command_ends_with_it(monkeypatch, capsys):

@@ -48,6 +48,23 @@ def test_what_is_left_fails_as_it_did_and_without_either_shelf_the_robot_passes(
 
 
 @pytest.mark.examples
+def test_another_simulator_is_told_from_the_one_of_the_run(reduced, tmp_path):
+    """A robot that drives where nothing stands in its way reaches its goal, so that nothing fails there."""
+    drive = SCENARIO.with_name("drive.py").read_text()
+    (tmp_path / "drive.py").write_text(drive)
+    (tmp_path / "open.py").write_text(drive.replace("obstacles(world)\n    print", "[]\n    print"))
+    said = {}
+    for name in ("drive.py", "open.py"):
+        (tmp_path / name).chmod(0o755)
+        (tmp_path / "simulator.yaml").write_text(f"name: {name}\ncommand: ./{name} {{world}} {{seed}}\n")
+        words = ["--minimal", "--leave-each-out", "--repeat", 8, "--json", "--simulator", "simulator.yaml"]
+        found = json.loads(ddenv("test", reduced[0], *words, cwd=tmp_path).stdout)["elsewhere"]
+        said[name] = [(each["without"], each["fails"]) for each in found]
+    assert said["drive.py"] == [(None, True), ("shelf_left", False), ("shelf_right", False)]
+    assert said["open.py"] == [(None, False), ("shelf_left", False), ("shelf_right", False)]
+
+
+@pytest.mark.examples
 def test_a_test_for_pytest_fails_as_long_as_the_robot_fails(reduced, tmp_path):
     done = ddenv("export", reduced[0], "--pytest", tmp_path, cwd=tmp_path)
     assert done.stdout.splitlines() == [f"wrote {tmp_path / 'test_run.py'}", f"wrote {tmp_path / 'run.ddenv'}"]
@@ -69,7 +86,7 @@ def test_the_same_seed_gives_the_same_run(tmp_path):
 
 def test_the_page_shows_the_scenario_the_placeholders_and_the_variables(monkeypatch):
     monkeypatch.delenv("DDENV_HOME", raising=False)
-    (shown,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    shown = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[0]
     assert yaml.safe_load(shown)["oracle"] == yaml.safe_load(SCENARIO.read_text())["oracle"]
     assert re.findall(r"^\| `\{(\w+)\}`", PAGE, re.MULTILINE) == list(PLACEHOLDERS)
     scenario = load_scenario(SCENARIO)

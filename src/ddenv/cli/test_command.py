@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
 @click.option("--leave-each-out", is_flag=True, help="Then leave out each of the models in turn.")
 @click.option("--seed", type=whole(0, 2**31), help="Seed of the first run; the next ones count up.")
 @click.option("--repeat", type=whole(1, 100_000), default=1, show_default=True, help="Runs of each.")
+@click.option(
+    "--simulator", type=Path, metavar="FILE", help="Run in this simulator: a YAML file with its name and its command."
+)
 @jobs_option("Runs")
 @trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print one object with all runs at the end.")
@@ -48,6 +53,7 @@ def test_command(
     leave_each_out: bool,
     seed: int | None,
     repeat: int,
+    simulator: Path | None,
     jobs: int,
     trust: bool,
     as_json: bool,
@@ -57,40 +63,58 @@ def test_command(
     from ddenv.cli.test_summary import line, lines, summary
     from ddenv.engine.single_test import plan, run_trials
 
-    what = _subject(subject, options, trust)
     names = None if keep is None else [name.strip() for name in keep.split(",") if name.strip()]
-    trials = plan(
-        what,
-        keep=names,
-        minimal=minimal,
-        leave_out=list(leave_out),
-        leave_each_out=leave_each_out,
-        seed=seed,
-        repeat=repeat,
-        test=test,
-    )
     results = []
-    for result in run_trials(what, trials, jobs):
-        results.append(result)
-        if not as_json:
-            print(line(result), flush=True)
+    with ExitStack() as robots:
+        what = _subject(subject, options, simulator, trust, robots)
+        trials = plan(
+            what,
+            keep=names,
+            minimal=minimal,
+            leave_out=list(leave_out),
+            leave_each_out=leave_each_out,
+            seed=seed,
+            repeat=repeat,
+            test=test,
+        )
+        for result in run_trials(what, trials, jobs):
+            results.append(result)
+            if not as_json:
+                print(line(result), flush=True)
     rows = summary(results)
+    others = _elsewhere(what, results) if minimal and simulator is not None else []
     if as_json:
-        print(json.dumps({"runs": results, "summary": rows}))
+        print(json.dumps({"runs": results, "summary": rows, "elsewhere": others}))
     elif len(results) > 1:
-        print("\n".join(["", *lines(rows)]))
+        print("\n".join(["", *lines(rows, {each["without"]: each["said"] for each in others})]))
     return 0
 
 
-def _subject(name: str, options: Mapping[str, Any], trust: bool) -> Subject:
-    """A run if there is one of that name, else a scenario."""
+def _elsewhere(what: Subject, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What the runs show of another simulator; [] without a certificate that it can be compared with."""
+    from ddenv.claims import current
+    from ddenv.cli.test_summary import elsewhere
+
+    certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
+    if certificate is None or oracle is None or not certificate.claims[0].low:
+        return []
+    return elsewhere(results, certificate.claims[0], oracle.name or "this simulator")
+
+
+def _subject(name: str, options: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack) -> Subject:
+    """A run if there is one of that name, else a scenario; in another simulator, if one is given.
+
+    `robots` keeps the file of a robot that only the run file has.
+    """
     from ddenv.cli.trusting import allow, allow_named
-    from ddenv.engine.single_test import Subject, subject_of_run
+    from ddenv.engine.single_test import Subject, in_simulator, subject_of_run
     from ddenv.runfile.store import RunFile
+    from ddenv.runs.creation import robot_file
     from ddenv.runs.folder import find_run
     from ddenv.runs.scenarios import load_parts
+    from ddenv.world.load import load_simulator
 
-    path = find_run(name)
+    path, another = find_run(name), None if simulator is None else load_simulator(simulator)
     if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
         if any(value is not None and value != () for value in options.values()):
             raise UserError(
@@ -98,9 +122,19 @@ def _subject(name: str, options: Mapping[str, Any], trust: bool) -> Subject:
                 "a run keeps its own"
             )
         with RunFile(path) as file:
-            run = subject_of_run(file)
-        allow(run.scenario, path, trust)
-        return run
-    scenario = chosen_scenario(name, options)
-    allow_named(scenario, name, trust)
-    return Subject(scenario, *load_parts(scenario, announce))
+            found = subject_of_run(file)
+            model = (
+                found.scenario.robot.model
+                if another is None
+                else robots.enter_context(robot_file(file, found.scenario))
+            )
+        # Another simulator may start the scenario's own controller.
+        allow(found.scenario if another is None else found.scenario.model_copy(update={"oracle": None}), path, trust)
+    else:
+        scenario = chosen_scenario(name, options)
+        allow_named(scenario, name, trust)
+        found, model = Subject(scenario, *load_parts(scenario, announce)), scenario.robot.model
+    if another is not None:
+        found = in_simulator(found, another, model)
+        allow_named(found.scenario, str(simulator), trust)
+    return found

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ddenv.amounts import count, percent
+from ddenv.claims import in_another_simulator
 from ddenv.errors import printable
-from ddenv.rates import wilson_interval
+from ddenv.rates import shows_at, wilson_interval
+from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 
 
@@ -52,19 +55,37 @@ def _summary(without: str | None, results: Sequence[Mapping[str, Any]]) -> dict[
     }
 
 
-def lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The same for people."""
+def lines(rows: Sequence[Mapping[str, Any]], said: Mapping[str | None, str] | None = None) -> list[str]:
+    """The same for people; `said` has other words for a row, by the model that was left out."""
     # Without a known f, all failures are alike.
     known = any("similar" in row["outcomes"] or "other" in row["outcomes"] for row in rows)
-    return [printable(_line(row, known)) for row in rows]
+    return [printable(_line(row, known, (said or {}).get(row["without"], ""))) for row in rows]
 
 
-def _line(row: Mapping[str, Any], known: bool) -> str:
+def _line(row: Mapping[str, Any], known: bool, said: str) -> str:
     what = f"without {row['without']}" if row["without"] else f"all {count(row['models'], 'model')}"
     broke = sum(number for outcome, number in row["outcomes"].items() if outcome in BROKEN)
     also = f"; {count(broke, 'more run')} broke" if broke else ""
-    if not row["runs"]:
-        return f"{what}: no run ended{also}"
+    if not row["runs"] or said:
+        return f"{said or f'{what}: no run ended'}{also}"
     share = f"{row['shown']} of {count(row['runs'], 'run')}"
-    said = f"f in {share}" if known else f"{share} failed"
-    return f"{what}: {said} ({percent(row['low'])} to {percent(row['high'])}){also}"
+    words = f"f in {share}" if known else f"{share} failed"
+    return f"{what}: {words} ({percent(row['low'])} to {percent(row['high'])}){also}"
+
+
+def elsewhere(results: Sequence[Mapping[str, Any]], here: Claim, simulator: str) -> list[dict[str, Any]]:
+    """What runs in another simulator show of what is left, of which the certificate says `here`, and of that without each model.
+
+    `fails` says whether they show f at the certificate's rate, or at less than half of it; None if they do not decide. `said` has
+    the same in words. An environment without a run that ended is left out.
+    """
+    return [_elsewhere(row, results, here, simulator) for row in summary(results) if row["runs"]]
+
+
+def _elsewhere(
+    row: Mapping[str, Any], results: Sequence[Mapping[str, Any]], here: Claim, simulator: str
+) -> dict[str, Any]:
+    ended = [each for each in results if each["without"] == row["without"] and each["outcome"] not in BROKEN]
+    fails = shows_at((each["outcome"] == "similar" for each in ended), here.low)
+    there = replace(here, **{key: row[key] for key in ("without", "shown", "runs", "low", "high")})
+    return {"without": row["without"], "fails": fails, "said": in_another_simulator(simulator, fails, there, here)}

@@ -17,7 +17,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose
 from ddenv.runs.creation import read_parts
 from ddenv.world.model import Model, World
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Oracle, Scenario
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,12 @@ def subject_of_run(file: RunFile) -> Subject:
 def in_folder(subject: Subject, folder: Path) -> Subject:
     """The same, with the user's own controller or simulator from `folder`."""
     return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
+
+
+def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
+    """The same, in this simulator in place of the scenario's own; it finds the robot in the file `robot`."""
+    there = subject.scenario.robot.model_copy(update={"model": robot})
+    return replace(subject, scenario=subject.scenario.model_copy(update={"oracle": simulator, "robot": there}))
 
 
 def plan(

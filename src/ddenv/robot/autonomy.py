@@ -3,11 +3,34 @@
 from __future__ import annotations
 
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.drake.drive import Drive
-from ddenv.robot.protocol import Drives, Reading, Twist, WheelSpeeds
+from ddenv.robot.drake.drive import Drive, footprint
+from ddenv.robot.protocol import Drives, Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
 from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
-from ddenv.world.scenario import Sensors
+from ddenv.world.model import Model
+from ddenv.world.scenario import Scenario, Sensors
+
+
+def setup_of(robot: Model, drive: Drive, clock: Clock, scenario: Scenario, seed: int = 0) -> Setup:
+    """What the controller of a run with this seed knows before it starts."""
+    settings, goal, spawn = scenario.controller, scenario.goal, scenario.robot.spawn
+    return Setup(
+        goal=(goal.x, goal.y),
+        tolerance=goal.tolerance,
+        start=(spawn.x, spawn.y, spawn.yaw),
+        joints=drive.joints,
+        left=drive.left,
+        radius=drive.radius,
+        track=drive.track,
+        footprint=footprint(robot),
+        period=clock.command_period,
+        speed=settings.speed,
+        acceleration=settings.acceleration,
+        turn_rate=settings.turn_rate,
+        settings=settings,
+        options=settings.options,
+        seed=seed,
+    )
 
 
 class Autonomy:

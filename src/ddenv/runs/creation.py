@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -12,7 +14,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
 from ddenv.runs.scenarios import check_parts, load_parts
-from ddenv.world.files.access import read_bytes
+from ddenv.world.files.access import read_bytes, write_file
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Model, World
 from ddenv.world.read import parse_model, parse_world
@@ -66,6 +68,18 @@ def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
     if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
         raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
     return scenario, world, robot
+
+
+@contextmanager
+def robot_file(run: RunFile, scenario: Scenario) -> Iterator[Path]:
+    """The robot's file; one with the run's own text, as long as this lasts, where the original is not on this machine."""
+    if scenario.robot.model.is_file():
+        yield scenario.robot.model
+        return
+    with tempfile.TemporaryDirectory(prefix="ddenv-robot-") as folder:
+        file = Path(folder) / scenario.robot.model.name
+        write_file(file, run.document("robot"))
+        yield file
 
 
 def read_scenario(run: RunFile) -> Scenario:

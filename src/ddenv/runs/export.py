@@ -79,6 +79,8 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
         del data["folder"]
     else:
         data["folder"] = _name(scenario.folder, folder)
+    if scenario.oracle is not None and scenario.oracle.folder is not None:
+        data["oracle"]["folder"] = _name(scenario.oracle.folder, folder)
     data["world"], data["robot"]["model"] = _name(sdf, folder), _name(model, folder)
     data["protected"] = _renamed(scenario.protected, world, removed, minimal)
     needed = (*_folders(scenario, asked, robot, stored), *_packages(scenario.robot.model, robot))

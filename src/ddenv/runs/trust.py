@@ -20,6 +20,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.runs.clusters import HERE
 from ddenv.runs.remembered import read_state, write_state
+from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario
 
 FILE = "trusted.json"
@@ -51,11 +52,10 @@ def _cluster_of(scenario: Scenario) -> Program | None:
 
 
 def _own_program(scenario: Scenario) -> Program | None:
-    folder = scenario.folder.absolute()
     if scenario.oracle is not None:
-        command = scenario.oracle.command
+        command, folder = scenario.oracle.command, start_folder(scenario).absolute()
         return _program(f"the command '{command}' in {folder}", _named(folder, command))
-    use = scenario.controller.use
+    folder, use = scenario.folder.absolute(), scenario.controller.use
     if ":" not in use:
         return None
     return _program(

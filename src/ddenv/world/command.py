@@ -14,11 +14,17 @@ from ddenv.schemas import nearest
 from ddenv.world.files.access import Unusable, size_of
 from ddenv.world.scenario import Scenario
 
-PLACEHOLDERS = ("world", "seed", "log")
+PLACEHOLDERS = ("world", "scenario", "seed", "log")
 KEY = "oracle.command"
 # Linux reads only this many bytes of a script's first line.
 LONGEST_FIRST_LINE = 256
 _PLACEHOLDER = re.compile(r"\{(\w+)\}")
+
+
+def start_folder(scenario: Scenario) -> Path:
+    """The folder in which the oracle's command starts."""
+    own = None if scenario.oracle is None else scenario.oracle.folder
+    return scenario.folder if own is None else own
 
 
 def command_words(scenario: Scenario) -> tuple[str, ...]:
@@ -40,11 +46,13 @@ def command_words(scenario: Scenario) -> tuple[str, ...]:
         if name not in PLACEHOLDERS:
             raise UserError(
                 f"{KEY}: unknown placeholder {{{name}}}{nearest(name, PLACEHOLDERS)}; "
-                "use {world}, {seed} and {log}; shell variables are not available"
+                "use {world}, {scenario}, {seed} and {log}; shell variables are not available"
             )
-    if not scenario.folder.is_dir():
-        raise UserError(f"folder: there is no folder {scenario.folder} to start the command in")
-    program = _program(words[0], scenario.folder)
+    folder = start_folder(scenario)
+    if not folder.is_dir():
+        key = "folder" if scenario.oracle.folder is None else "oracle.folder"
+        raise UserError(f"{key}: there is no folder {folder} to start the command in")
+    program = _program(words[0], folder)
     _check_first_line(program)
     return program, *words[1:]
 

@@ -17,7 +17,7 @@ from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
 from ddenv.world.files.access import is_folder, read_bytes
-from ddenv.world.scenario import Scenario
+from ddenv.world.scenario import Oracle, Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _ROOT = _PACKAGE / "data" if (_PACKAGE / "data").is_dir() else _PACKAGE.parents[1]
@@ -54,6 +54,32 @@ def find_scenario(name: str) -> Path:
 
 def load_scenario(path: Path) -> Scenario:
     """The scenario in the YAML file `path`, with its file names made absolute. Raises UserError."""
+    scenario = validate(_data(path, "name, world, robot and goal"), str(path))
+    folder = path.resolve().parent
+    robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
+    model_path = tuple(folder / each for each in scenario.reading.model_path)
+    reading = scenario.reading.model_copy(update={"model_path": model_path})
+    places: dict[str, Any] = {"world": folder / scenario.world, "folder": folder / scenario.folder}
+    if scenario.oracle is not None and scenario.oracle.folder is not None:
+        places["oracle"] = scenario.oracle.model_copy(update={"folder": folder / scenario.oracle.folder})
+    return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
+
+
+def load_simulator(path: Path) -> Oracle:
+    """The simulator in the YAML file `path`, which has the keys of a scenario's `oracle`; it starts in the file's folder.
+
+    Raises UserError.
+    """
+    try:
+        oracle = Oracle.model_validate(_data(path, "name and command"))
+    except ValidationError as error:
+        raise _wrong(str(path), *complaint(error.errors()[0], Oracle), {}) from None
+    folder = path.resolve().parent
+    return oracle.model_copy(update={"folder": folder / (oracle.folder or "")})
+
+
+def _data(path: Path, expected: str) -> dict[str, Any]:
+    """The keys of the YAML file `path`, such as those `expected`. Raises UserError."""
     content = read_bytes(path)
     try:
         data = yaml.safe_load(content)
@@ -65,14 +91,8 @@ def load_scenario(path: Path) -> Scenario:
     except RecursionError:
         raise UserError(f"{path}: not valid YAML: nested too deeply") from None
     if not isinstance(data, dict):
-        raise UserError(f"{path}: expected keys such as name, world, robot and goal; found {_shown(data)}")
-    scenario = validate(data, str(path))
-    folder = path.resolve().parent
-    robot = scenario.robot.model_copy(update={"model": folder / scenario.robot.model})
-    model_path = tuple(folder / each for each in scenario.reading.model_path)
-    reading = scenario.reading.model_copy(update={"model_path": model_path})
-    places = {"world": folder / scenario.world, "folder": folder / scenario.folder}
-    return scenario.model_copy(update={**places, "robot": robot, "reading": reading})
+        raise UserError(f"{path}: expected keys such as {expected}; found {_shown(data)}")
+    return data
 
 
 def validate(data: dict[str, Any], where: str, named: Mapping[str, str] = {}) -> Scenario:

@@ -234,11 +234,13 @@ else:
 class Oracle(Section):
     """A program that runs the robot in place of Drake: any simulator.
 
-    `command` is started in the scenario's folder, without a shell; `{world}` stands for an SDF file, `{seed}` for a number and
-    `{log}` for the file of its pose log (without it, what the command prints).
+    `command` is started in `folder`, by default the scenario's, without a shell; `{world}` stands for an SDF file, `{scenario}` for
+    a scenario in that world, `{seed}` for a number and `{log}` for the file of its pose log (without it, what the command prints).
     """
 
     command: str = Field(min_length=1)
+    name: str = Field(default="", max_length=40, description="what results call it")
+    folder: Path | None = Field(default=None, description="where the command starts, if not in the scenario's folder")
 
 
 class Scenario(Section):

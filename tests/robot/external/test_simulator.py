@@ -12,6 +12,8 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.robot.external import pose_log, process
+from ddenv.world.load import load_scenario
+from ddenv.world.read import read_world
 from tests.conftest import DATA
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 
@@ -50,6 +52,21 @@ def test_the_command_gets_the_world_the_seed_and_the_scenario(simulator_of, tmp_
     assert (reported["DDENV_SPAWN"], reported["DDENV_GOAL"]) == ("0 0 0.45 0", "4 0 0.5")
     assert reported["GZ_SIM_RESOURCE_PATH"] == f"{DATA}{os.pathsep}/models"
     assert reported["GAZEBO_MODEL_PATH"] == str(DATA)
+
+
+def test_the_scenario_goes_along_in_the_reduced_world(simulator_of, tmp_path):
+    show = "import shutil, sys; shutil.copytree(sys.argv[1].rpartition('/')[0], 'shown'); print('0,0,0,0,0,0,0,1')"
+    assert simulator_of(show, "{scenario}").run(frozenset({"deck", "wall"}), 5).outcome == "pass"
+    (file,) = (tmp_path / "shown").glob("*.yaml")
+    shown, own = load_scenario(file), load_scenario(DATA / "wall.yaml")
+    assert {model.name for model in read_world(tmp_path / "shown" / shown.world.name).models} == {
+        "ground_plane",
+        "deck",
+        "wall",
+    }
+    assert shown.oracle is None
+    assert (shown.robot, shown.goal, shown.sensors) == (own.robot, own.goal, own.sensors)
+    assert shown.reading.model_path[0] == own.world.parent
 
 
 def test_the_log_may_be_a_file_and_its_name_works_without_one(simulator_of):

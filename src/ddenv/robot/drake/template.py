@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ddenv.errors import UserError
-from ddenv.robot.autonomy import Autonomy
+from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, controllers
-from ddenv.robot.drake.drive import Drive, find_drive, footprint
+from ddenv.robot.drake.drive import Drive, find_drive
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
@@ -24,7 +24,6 @@ from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.piles.support import supports
-from ddenv.robot.protocol import Setup
 from ddenv.robot.reached import Reached, Solids
 from ddenv.robot.result import Progress, RunResult
 from ddenv.robot.robot_hull import Hull
@@ -63,7 +62,7 @@ class Template:
         self._always = names & frozenset(scenario.protected) | grounds
         self._floor = lowest(world) - FALL
         self._clock = Clock.of(scenario)
-        self._setup = _setup(robot, self._drive, self._clock, scenario)
+        self._setup = setup_of(robot, self._drive, self._clock, scenario)
         self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
         self._models = {model.name: model for model in world.models}
         self._repertoire = Repertoire(world)
@@ -234,26 +233,6 @@ class Template:
         if settings is None or self._obstacles is None:
             return None
         return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
-
-
-def _setup(robot: Model, drive: Drive, clock: Clock, scenario: Scenario) -> Setup:
-    settings, goal, spawn = scenario.controller, scenario.goal, scenario.robot.spawn
-    return Setup(
-        goal=(goal.x, goal.y),
-        tolerance=goal.tolerance,
-        start=(spawn.x, spawn.y, spawn.yaw),
-        joints=drive.joints,
-        left=drive.left,
-        radius=drive.radius,
-        track=drive.track,
-        footprint=footprint(robot),
-        period=clock.command_period,
-        speed=settings.speed,
-        acceleration=settings.acceleration,
-        turn_rate=settings.turn_rate,
-        settings=settings,
-        options=settings.options,
-    )
 
 
 def _with_ground(world: World, scenario: Scenario) -> World:

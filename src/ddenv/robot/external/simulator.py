@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
@@ -19,7 +20,7 @@ from ddenv.robot.external.pose_log import MOST_BYTES, TOO_LARGE, BadLog, PoseLog
 from ddenv.robot.external.process import Ended, running, watch
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.result import Progress, RunResult
-from ddenv.world.command import command_words, filled, has_placeholder
+from ddenv.world.command import command_words, filled, has_placeholder, start_folder
 from ddenv.world.files.resolve import ENVIRONMENT
 from ddenv.world.model import World
 from ddenv.world.placement import spawn_pose
@@ -76,10 +77,12 @@ class ExternalSimulator:
         )
 
     def _execute(self, world: Path, seed: int, progress: Progress | None) -> tuple[Ended, PoseLog]:
-        """Runs the command on the file `world` to its end, and reads its pose log."""
+        """Runs the command on the file `world` to its end, and reads its pose log. Raises UserError if no file can be written."""
         file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
         log = PoseLog(progress if file is None else None)
-        values = {"world": str(world), "seed": str(seed), "log": str(file or "/dev/stdout")}
+        whole = world.with_name(f"{world.name}.scenario.yaml")
+        _write(whole, self._scenario_in(world))
+        values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
         words, environment = filled(self._words, values), self._environment(values)
 
         def take(piece: bytes) -> None:
@@ -91,7 +94,7 @@ class ExternalSimulator:
             return TOO_LARGE if size > MOST_BYTES else ""
 
         try:
-            with running(words, self._scenario.folder, environment, world.parent) as command:
+            with running(words, start_folder(self._scenario), environment, world.parent) as command:
                 ended = watch(command, self.limit, take, too_much)
                 # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE:
@@ -100,6 +103,13 @@ class ExternalSimulator:
             ended = Ended(None, f"the command cannot be started: {error.strerror}: {error.filename}", "")
         return ended, log
 
+    def _scenario_in(self, world: Path) -> bytes:
+        """The scenario in the file `world`, as YAML: for simulators that run the same robot."""
+        data = self._scenario.model_copy(update={"world": world, "oracle": None}).model_dump(mode="json")
+        # Files beside the original world are not beside the reduced one.
+        data["reading"]["model_path"] = [str(self._scenario.world.parent), *data["reading"]["model_path"]]
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode()
+
     def _environment(self, values: dict[str, str]) -> dict[str, str]:
         """Our own environment, and what the command needs to know about the scenario."""
         spawn, goal = self._scenario.robot.spawn, self._scenario.goal
@@ -107,7 +117,6 @@ class ExternalSimulator:
         known["DDENV_TIMEOUT"] = f"{self._scenario.failure.timeout:.12g}"
         known["DDENV_SPAWN"] = _numbers(spawn.x, spawn.y, spawn.z, spawn.yaw)
         known["DDENV_GOAL"] = _numbers(goal.x, goal.y, goal.tolerance)
-        # Files beside the original world are not beside the reduced one.
         folders = [self._scenario.world.parent, *self._scenario.reading.model_path]
         for name in ENVIRONMENT:
             before = os.environ.get(name)

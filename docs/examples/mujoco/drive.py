@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it has in Drake.
+
+drive.py SCENARIO SEED prints the pose log. Exit codes: 0 goal reached, 1 time is up or it fell, 2 this cannot be simulated.
+drive.py SCENARIO prints world and robot as MJCF. Needs `pip install ddenv mujoco`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+from mjcf import Unsupported, mjcf, named
+
+from ddenv.errors import UserError
+from ddenv.robot.autonomy import Autonomy, setup_of
+from ddenv.robot.clock import Clock
+from ddenv.robot.controllers import ControllerFailed, controllers
+from ddenv.robot.drake.drive import find_drive
+from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.sensing.obstacles import Obstacles
+from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.world.extent import model_bounds
+from ddenv.world.load import load_scenario
+from ddenv.world.placement import spawn_pose
+from ddenv.world.read import read_model, read_world
+
+STEP = 0.002  # MuJoCo's time step at most, s: its contacts need shorter ones than Drake's
+FALL = 2.0  # so far below everything the robot has fallen out of the world, m
+
+
+class Broken(Exception):
+    """Why MuJoCo cannot go on, in one line."""
+
+
+class Parts:
+    """A scenario with what it names."""
+
+    def __init__(self, file: Path) -> None:
+        self.scenario = load_scenario(file)
+        self.world = read_world(self.scenario.world, self.scenario.reading)
+        self.robot = read_model(self.scenario.robot.model, self.scenario.reading)
+        self.drive = find_drive(self.robot, self.scenario.robot.wheels)
+        self.clock = Clock.of(self.scenario)
+        # How many steps MuJoCo makes in one of the clock's.
+        self.steps = math.ceil(self.clock.step / STEP - 1e-9)
+
+    def text(self) -> str:
+        start, gain = spawn_pose(self.scenario.robot.spawn), self.scenario.controller.motor_gain
+        return mjcf(self.world, self.robot, start, self.drive, gain, self.clock.step / self.steps)
+
+
+class Simulation:
+    """MuJoCo with world and robot."""
+
+    def __init__(self, parts: Parts) -> None:
+        import mujoco
+
+        # By default MuJoCo writes warnings to a file in the current folder, and starts again after a number that is not finite.
+        self._warnings: list[str] = []
+        mujoco.set_mju_user_warning(self._warnings.append)
+        self._advance, self._steps = mujoco.mj_step, parts.steps
+        self._model = model = mujoco.MjModel.from_xml_string(parts.text())
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        base = model.body(named(0, parts.robot.links[0].name)).id
+        self._place = model.jnt_qposadr[model.body_jntadr[base]]
+        self._spin = model.jnt_dofadr[model.body_jntadr[base]] + 3
+        self._wheels = [model.joint(named(0, name)).dofadr[0] for name in parts.drive.joints]
+        self._signs = np.array(parts.drive.signs)
+        moving = [(number, each) for number, each in enumerate(parts.world.models, start=1) if not each.static]
+        self._links = [model.body(named(number, link.name)).id for number, each in moving for link in each.links]
+
+    def advance(self, steps: int, speeds: np.ndarray) -> None:
+        """Simulates `steps` of the clock with the joint speeds that the wheels shall have, rad/s. Raises Broken."""
+        self._data.ctrl[:] = speeds
+        self._advance(self._model, self._data, nstep=steps * self._steps)
+        if self._warnings:
+            raise Broken(f"MuJoCo: {self._warnings[0]}")
+
+    def pose(self) -> tuple[float, ...]:
+        """Of the robot's first link: x, y, z (m), qw, qx, qy, qz."""
+        return tuple(self._data.qpos[self._place : self._place + 7].tolist())
+
+    def truth(self) -> Truth:
+        """What ideal sensors of the robot measure."""
+        *_, w, x, y, z = self.pose()
+        wheels = self._data.qvel[self._wheels] * self._signs
+        return Truth(
+            heading=math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+            roll=math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+            pitch=math.asin(min(1.0, max(-1.0, 2 * (w * y - x * z)))),
+            # MuJoCo gives the turn rate of a free body in the body's own axes.
+            yaw_rate=float(self._data.qvel[self._spin + 2]),
+            wheels=tuple(wheels.tolist()),
+        )
+
+    def links(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places (L, 3) m and rotations (L, 3, 3) of the links of all models that can move, in the order of the world."""
+        return self._data.xpos[self._links].copy(), self._data.xmat[self._links].reshape(-1, 3, 3).copy()
+
+
+def drive(parts: Parts, seed: int) -> bool:
+    """One run, which prints the pose log; whether the robot reached its goal. Raises Broken and ControllerFailed."""
+    scenario, world = parts.scenario, parts.world
+    simulation, suite = Simulation(parts), SensorSuite(scenario.sensors, seed)
+    setup = setup_of(parts.robot, parts.drive, parts.clock, scenario, seed)
+    controller, skid = controllers(scenario.controller, scenario.folder)(setup), scenario.controller.skid
+    autonomy = Autonomy(scenario.sensors, suite, parts.drive, skid, parts.clock, setup.start, controller)
+    lidar = None
+    if scenario.sensors.lidar is not None:
+        names = frozenset(model.name for model in world.models)
+        moving = [model for model in world.models if not model.static]
+        lidar = Lidar(scenario.sensors.lidar, Obstacles.of(world), names, moving, suite.lidar)
+    boxes = [box for box in map(model_bounds, world.models) if box is not None]
+    floor = min((float(low[2]) for low, _ in boxes), default=0.0) - FALL
+    speeds, before, goal = np.zeros(len(parts.drive.joints)), 0, scenario.goal
+    print("t,x,y,z,qx,qy,qz,qw")
+    for tick in parts.clock.ticks:
+        if tick.step > before:
+            simulation.advance(tick.step - before, speeds)
+            before = tick.step
+        pose = simulation.pose()
+        x, y, z, qw, qx, qy, qz = pose
+        arrived = math.hypot(goal.x - x, goal.y - y) <= goal.tolerance
+        ended = arrived or z < floor or tick.step == parts.clock.last
+        if tick.record or ended:
+            print(f"{tick.time:.6g},{x!r},{y!r},{z!r},{qx!r},{qy!r},{qz!r},{qw!r}", flush=True)
+        if ended:
+            return arrived
+        scan = lidar.scan(tick.time, pose, *simulation.links()) if tick.lidar and lidar else None
+        autonomy.sense(tick, simulation.truth(), scan)
+        if tick.command:
+            speeds = parts.drive.wheel_speeds(autonomy.command(tick), skid)
+    raise AssertionError("the clock's last tick ends every run")
+
+
+def main() -> int:
+    try:
+        file, *seeds = sys.argv[1:]
+        parts = Parts(Path(file))
+        if not seeds:
+            print(parts.text())
+            return 0
+        return 0 if drive(parts, int(seeds[0])) else 1
+    except (UserError, Unsupported, Broken, ControllerFailed, ValueError, ImportError) as error:
+        print(str(error).splitlines()[0] if str(error) else type(error).__name__, file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,152 @@
+"""The example of MuJoCo: what it makes of a world, and whether the robot fails there, too, where MuJoCo is installed."""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from ddenv.robot.drake.drive import find_drive
+from ddenv.world.load import SDF, load_scenario, load_simulator
+from ddenv.world.model import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Inertia,
+    Joint,
+    Link,
+    Mesh,
+    Model,
+    Plane,
+    Sphere,
+    World,
+)
+from ddenv.world.pose import Pose
+from ddenv.world.read import read_model, read_world
+from ddenv.world.scenario import Oracle
+from ddenv.world.write import without
+from tests.conftest import ROOT
+
+FOLDER = ROOT / "docs/examples/mujoco"
+needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="mujoco is not installed: pip install mujoco")
+ROBOT = read_model(SDF / "robots" / "husky.sdf")
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+SHAPES = [
+    Box((1, 2, 3)),
+    Cylinder(0.3, 1),
+    Sphere(0.2),
+    Capsule(0.1, 1),
+    Ellipsoid((1, 2, 3)),
+    Plane((1, 1)),
+    Mesh("m", CUBE, CUBE),
+]
+
+
+@pytest.fixture
+def mjcf(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    monkeypatch.delitem(sys.modules, "mjcf", raising=False)
+    import mjcf
+
+    return mjcf
+
+
+def link(name, *shapes, at=0.0, mass=None):
+    collisions = tuple(Collision(f"c{number}", shape, Pose(), mu) for number, (shape, mu) in enumerate(shapes))
+    inertia = None if mass is None else Inertia(mass, Pose(), (1.0, 1.0, 1.0))
+    return Link(name, Pose((at, 0.0, 0.0)), inertia, collisions, ())
+
+
+def model(name, *links, static=False, joints=()):
+    return Model(name, Pose(), static, links, joints, (), 1)
+
+
+def joint(kind, parent, child, **more):
+    return Joint(f"{parent}-{child}", kind, parent, child, Pose((1, 0, 0)), (0, 0, 1), -1, 1, 9, 9, 0.5, **more)
+
+
+def written(mjcf, *models):
+    world = World(ROOT, "w", b"", (0.0, 0.0, -9.8), models)
+    return ElementTree.fromstring(mjcf.mjcf(world, ROBOT, Pose((0, 0, 1)), find_drive(ROBOT), 30.0, 0.002))
+
+
+def test_every_shape_has_its_like_and_the_smoother_surface_decides(mjcf):
+    grips = [0.8, 0.4, 1.2, 0.001, 1.5, 0.5, 0.7]
+    tree = written(mjcf, model("all", link("l", *zip(SHAPES, grips, strict=True)), static=True))
+    geoms = tree.findall("worldbody/geom")
+    assert [geom.get("type") for geom in geoms] == [
+        "box",
+        "cylinder",
+        "sphere",
+        "capsule",
+        "ellipsoid",
+        "plane",
+        "mesh",
+    ]
+    assert geoms[0].get("size") == "0.5 1 1.5"
+    assert len(tree.find("asset/mesh").get("vertex").split()) == 24
+    priority = {float(geom.get("friction").split()[0]): int(geom.get("priority")) for geom in tree.iter("geom")}
+    assert sorted(priority, key=priority.get, reverse=True) == sorted(priority)
+
+
+def test_links_hang_on_their_joints_and_wheels_have_motors(mjcf):
+    parts = [link("base", mass=1), link("door", at=2.0, mass=1), link("loose", mass=1), link("post")]
+    joints = (joint("revolute", "base", "door"), joint("fixed", "world", "post"))
+    tree = written(mjcf, model("m", *parts, joints=joints))
+    door = tree.find("worldbody/body[@name='1 base']/body[@name='1 door']")
+    assert (door.get("pos"), door.find("joint").get("pos"), door.find("joint").get("range")) == (
+        "2 0 0",
+        "-1 0 0",
+        "-1 1",
+    )
+    assert [body.get("name") for body in tree.findall("worldbody/body") if body.find("freejoint") is not None] == [
+        "0 base_link",
+        "1 base",
+        "1 loose",
+    ]
+    assert len([pair for pair in tree.findall("contact/exclude") if pair.get("body1").startswith("1 ")]) == 6
+    motors = [motor.get("joint") for motor in tree.findall("actuator/velocity")]
+    assert motors == [f"0 {name}" for name in find_drive(ROBOT).joints]
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        (joint("screw", "a", "b"),),
+        (joint("revolute", "a", "b"), joint("ball", "b", "a")),
+        (joint("ball", "a", "b"),) * 2,
+    ],
+)
+def test_what_it_cannot_translate_is_one_line(mjcf, joints):
+    with pytest.raises(mjcf.Unsupported, match=r"^[^\n]+$"):
+        written(mjcf, model("m", link("a", mass=1), link("b", mass=1), joints=joints))
+
+
+def test_the_file_of_the_simulator_is_read():
+    assert load_simulator(FOLDER / "simulator.yaml") == Oracle(
+        name="MuJoCo", command="./drive.py {scenario} {seed}", folder=FOLDER
+    )
+
+
+@needs_mujoco
+@pytest.mark.examples
+@pytest.mark.parametrize(
+    ("names", "code"), [(["barrel_01", "barrel_02", "green_patch_01"], 1), (["barrel_01", "barrel_02"], 0)]
+)
+def test_the_robot_of_friction_fails_in_mujoco_too_and_not_without_the_patch(names, code, tmp_path):
+    scenario = load_scenario(ROOT / "scenarios/friction.yaml")
+    world = read_world(scenario.world)
+    (tmp_path / "less.sdf").write_bytes(without(world, frozenset(world.elements()) - frozenset(names)))
+    text = (ROOT / "scenarios/friction.yaml").read_text()
+    for old, new in (("../sdf/worlds/friction.sdf", "less.sdf"), ("../sdf/", f"{SDF}/")):
+        text = text.replace(old, new)
+    (tmp_path / "less.yaml").write_text(text)
+    done = subprocess.run(
+        [sys.executable, FOLDER / "drive.py", tmp_path / "less.yaml", "0"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    assert (float(done.stdout.splitlines()[-1].split(",")[1]) < 3.0) == bool(code)
