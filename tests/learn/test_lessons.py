@@ -28,8 +28,8 @@ by_stem = lambda number: FILES[number].stem  # noqa: E731
 def test_right_answers_lead_to_the_end_with_all_points(number):
     end = through(course(number), lambda question: question.right)
     assert end.score.done
-    assert end.score.right == len(end.score.answered) == opened(number).lesson.asked == end.score.best
-    assert summary(opened(number).lesson, end.score)[-1] == "No typical misconception was seen."
+    assert end.score.right == len(end.score.answered) == opened(number).asked == end.score.best
+    assert summary(opened(number).asked, end.score)[-1] == "No typical misconception was seen."
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=by_stem)
@@ -40,7 +40,7 @@ def test_wrong_answers_lead_there_too_and_name_what_was_mixed_up(number):
     end = through(course(number), wrong)
     assert end.score.done and end.score.right == 0 and end.score.best == 0
     assert len(end.score.misconceptions) >= 3
-    assert len([line for line in summary(opened(number).lesson, end.score) if "One of your answers" in line]) >= 3
+    assert len([line for line in summary(opened(number).asked, end.score) if "of your answers" in line]) >= 3
 
 
 @pytest.mark.parametrize("number", NUMBERS, ids=by_stem)

@@ -106,7 +106,7 @@ def lesson(folder, text):
 def test_a_good_lesson_is_read(tmp_path):
     assert len(open_lesson(lesson(tmp_path, GOOD)).lesson.steps) == 2
     whole = open_lesson(lesson(tmp_path, ALONE))
-    assert whole.lesson.steps[2].budget == 12 and whole.lesson.asked == 5
+    assert whole.lesson.steps[2].budget == 12 and whole.asked == 5
     assert [play.name for play in whole.racers(whole.lesson.steps[3])] == ["ddmin", "splitting"]
 
 
@@ -137,6 +137,6 @@ def test_a_text_is_never_more_than_a_text(text):
 def test_a_new_lesson_is_whole(tmp_path):
     file, run = write_template(tmp_path / "mine.yaml", LESSONS / "delivery.ddenv")
     assert run.is_file()
-    assert open_lesson(file).lesson.asked == 4
+    assert open_lesson(file).asked == 5
     with pytest.raises(UserError, match="exists already"):
         write_template(file, LESSONS / "delivery.ddenv")

@@ -66,15 +66,15 @@ def _list() -> int:
     scores = all_scores()
     for number, file in enumerate(bundled(), 1):
         lesson = glance(file)
-        print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name), lesson.asked)}")
+        print(f"{number}  {lesson.title} ({lesson.minutes} min): {in_words(scores.get(lesson.name))}")
     return 0
 
 
 def _check(file: Path) -> int:
     from ddenv.learn.shelf import open_lesson
 
-    lesson = open_lesson(file).lesson
-    print(f"{file}: {len(lesson.steps)} steps, {lesson.asked} questions, no mistake found")
+    opened = open_lesson(file)
+    print(f"{file}: {len(opened.lesson.steps)} steps, {opened.asked} questions, no mistake found")
     return 0
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ddenv.amounts import count
 from ddenv.learn.lesson import Answer, Foretold, Question
+from ddenv.learn.reason_questions import is_last, why_ended, why_won
 from ddenv.runfile.events import deed
 from ddenv.runfile.position import Chapter, Moment, Position
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runfile.tested import pointed
 
@@ -16,17 +18,31 @@ SAID = {
     "other": "another failure: elsewhere, or otherwise",
     "pass": "the goal is reached",
 }
-# Candidates of a round to choose from.
-MOST = 5
+# Candidates of a round to choose from, and models of a candidate that are named there.
+MOST, FEW = 5, 3
 
 
 @dataclass(frozen=True, slots=True)
 class Foretelling:
-    """`question` comes before, `reason` once the event `until` is shown; `reason` may be None."""
+    """`question` comes before, `reason` once the event `until` is shown; `reason` may be None.
+
+    Foretellings of one `kind` ask for the same reason.
+    """
 
     question: Question
     until: int
     reason: Question | None = None
+    kind: str = ""
+
+    @property
+    def told(self) -> Foretelling:
+        """The same, with the reason told at the right answer in place of asked."""
+        if self.reason is None:
+            return self
+        seen = self.question.answers[self.question.right].why
+        because = f"{seen} {self.reason.answers[self.reason.right].why}"
+        answers = tuple(replace(each, why=because) if each.why == seen else each for each in self.question.answers)
+        return replace(self, question=replace(self.question, answers=answers), reason=None)
 
 
 def foretelling(position: Position, at: int, what: Foretold) -> Foretelling | None:
@@ -58,7 +74,8 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
     what = f"Test {number} runs {_what(candidate)}. How does it end?"
-    return Foretelling(Question(what, answers, _hint(candidate)), until, _reason(test, candidate))
+    reason = why_ended(test, candidate, settings(moment.after))
+    return Foretelling(Question(what, answers, _hint(candidate)), until, reason, test.outcome)
 
 
 def _ends(position: Position, id: int, test: int) -> bool:
@@ -96,67 +113,6 @@ def _seen(test: Test) -> str:
     return f"The robot {deed(test.failure)}{away}: {'that is f' if test.outcome == 'similar' else 'that is not f'}."
 
 
-def _reason(test: Test, candidate: Candidate) -> Question:
-    """Why a test ended so, and what that means."""
-    gone = "the models of the part" if candidate.kind == "complement" else "all models outside the part"
-    if test.outcome == "similar":
-        answers = (
-            Answer("Everything that f needs is still there.", True, f"f shows without {gone}: they can go."),
-            Answer(
-                "The models that were left out caused f.",
-                False,
-                "They were not there, and f showed all the same. So f does not need them.",
-                "part",
-            ),
-            Answer(
-                "This is the smallest world that shows f.",
-                False,
-                "Nobody knows yet: there are smaller ones that were not tried.",
-                "smallest",
-            ),
-        )
-        return Question("f showed. Why?", _turned(answers, test.id))
-    if test.outcome == "other":
-        answers = (
-            Answer(
-                "It failed, but not as in f: it ended elsewhere or otherwise.",
-                True,
-                "It may have another cause, so it does not count: the candidate is one without f.",
-            ),
-            Answer(
-                "Any failure is good enough: this is f.", False, "Only the same failure counts, near f's end.", "any"
-            ),
-            Answer(
-                "It cannot fail with fewer models; the test is broken.",
-                False,
-                "With fewer models the robot can take another way, and find another trap.",
-                "fewer",
-            ),
-        )
-        return Question("It failed, but not as in f. What does that mean?", _turned(answers, test.id))
-    answers = (
-        Answer(
-            "Something that f needs is probably gone.",
-            True,
-            "Probably: one miss can be bad luck where a failure is flaky. That is why tests are repeated.",
-        ),
-        Answer("Now it is proved that f needs what was left out.", False, "One test proves little.", "proof"),
-        Answer(
-            "With fewer models the robot always gets through.",
-            False,
-            "Not always: fewer models can open a way into another trap.",
-            "fewer",
-        ),
-    )
-    return Question("The goal was reached. What does that mean?", _turned(answers, test.id))
-
-
-def _turned(answers: tuple[Answer, ...], by: int) -> tuple[Answer, ...]:
-    """In another order each time: the right answer has no place of its own."""
-    by %= len(answers)
-    return answers[by:] + answers[:by]
-
-
 # Who wins a round.
 
 
@@ -185,51 +141,62 @@ def _winner(position: Position, moment: Moment) -> Foretelling | None:
         return None
     answers = [_candidate_answer(one, round) for one in shown]
     none = round.winner is None
-    why = "No candidate showed f." if round.winner is None else f"{round.candidates[round.winner].label} showed f."
+    why = "No candidate showed f." if round.winner is None else f"{_name(round.candidates[round.winner])} showed f."
     answers.append(Answer("none of them", none, why, "" if none else "stuck"))
     question = Question(
         f"Round {round.number}: {count(len(listed), 'candidate')}, tested in this order. Which is the first to show f?",
         tuple(answers),
         "The first candidate that has everything f needs wins. 'part A' is A alone, 'without A' is all the rest.",
     )
-    return Foretelling(question, chapter.last)
+    kind = "won" if round.winner is not None else "last" if is_last(round) else "none"
+    return Foretelling(question, chapter.last, why_won(round), kind)
 
 
 def _candidate_answer(one: Candidate, round: Round) -> Answer:
-    words = f"{one.label} ({count(one.size, 'model')})"
+    words = f"{one.label}: {_named(one.models)}" if one.size <= FEW else f"{one.label}: {count(one.size, 'model')}"
     if round.winner == one.index:
-        return Answer(words, True, f"{one.label} showed f, so E becomes it.")
+        return Answer(words, True, f"{_name(one)} showed f, so it becomes E.")
     if round.winner is not None and one.index > round.winner:
         return Answer(words, False, "It was not tried any more: the first candidate that shows f wins.")
     belief = "alone" if one.kind == "partition" else "part"
-    return Answer(words, False, f"{one.label} did not show f: something that f needs is missing in it.", belief)
+    return Answer(words, False, f"{_name(one)} did not show f: something that f needs is missing in it.", belief)
+
+
+def _name(one: Candidate) -> str:
+    """Its label at the beginning of a sentence."""
+    return one.label[:1].upper() + one.label[1:]
 
 
 # How E is split next.
 
+# By the setting `growth`, what n does.
+_GROWTH = {
+    "paper": "After each round n grows by one, but never above the number of models.",
+    "steady": "n grows by one after a round without f, but never above the number of models. After a reduction it stays.",
+}
+
 
 def _parts(position: Position, moment: Moment) -> Foretelling | None:
     found = _chapter(position, moment)
-    if found is None:
+    if found is None or settings(moment.after).algorithm != "ddenv":
         return None
     _, round, _ = found
     following = next(
         (each for each in position.chapters if each.kind == "round" and each.number == round.number + 1), None
     )
     after = None if following is None else position.state(following.first).round
-    if following is None or after is None:
+    if following is None or after is None or not _is_regular(round, after):
         return None
-    size, n, before = len(after.environment), len(after.partitions), len(round.environment)
-    reduced = size < before
-    right = "the first candidate with f became E, and n grows" if reduced else "E stays as it is, and n grows"
+    size, n, before = len(after.environment), after.n_partitions, len(round.environment)
+    reduced, grew = size < before, after.n_partitions > round.n_partitions
+    kept = f"{round.candidates[round.winner].label} became E" if round.winner is not None else "E stays as it is"
+    right = f"Right: {kept}, and n {f'grows by {n - round.n_partitions}' if grew else f'stays {n}'}."
     options = {
-        (size, n): (f"Right: {right}.", ""),
-        (before, n + 1 if not reduced else n): (
-            "E is what showed f, and the rest is gone." if reduced else "n grows by one after a round, not by two.",
-            "part" if reduced else "stuck",
-        ),
-        (size, 2): ("Splitting in the same way again would only give parts that were tried already.", "stuck"),
-        (max(1, before // 2), n): ("E gets smaller only by what was shown to be unnecessary.", "proof"),
+        (max(1, before // 2), n): ("E loses only what f was shown not to need.", ""),
+        (size, 2): ("n does not go back to two.", "stuck"),
+        (size, n + 1): (f"n {'grows by one, not by two' if grew else 'stays as it is after this round'}.", ""),
+        (before, n): ("E is what showed f, and the rest is gone." if reduced else right, "part"),
+        (size, n): (right, ""),
     }
     answers = tuple(
         Answer(f"{count(models, 'model')} in {count(parts, 'part')}", (models, parts) == (size, n), why, belief)
@@ -238,13 +205,18 @@ def _parts(position: Position, moment: Moment) -> Foretelling | None:
     )
     if len(answers) < 2:
         return None
-    ended = "showed f" if reduced else "did not show f"
-    first = round.candidates[round.winner].label if round.winner is not None else "no candidate"
-    asked = f"{first} {ended}" if reduced else "no candidate showed f"
+    asked = "no candidate showed f" if round.winner is None else f"{round.candidates[round.winner].label} showed f"
     question = Question(
-        f"Round {round.number} split {count(before, 'model')} in {count(len(round.partitions), 'part')}, and {asked}. "
+        f"Round {round.number} split {count(before, 'model')} into {count(len(round.partitions), 'part')}, and {asked}. "
         "How does the next round split E?",
         answers,
-        "After each round n grows by one, but never above the number of models.",
+        _GROWTH[settings(moment.after).growth],
     )
     return Foretelling(question, following.first)
+
+
+def _is_regular(round: Round, after: Round) -> bool:
+    """Whether a round follows from the one before it, and both have as many parts as n says."""
+    left = round.environment if round.winner is None else round.candidates[round.winner].models
+    as_many = all(len(each.partitions) == each.n_partitions for each in (round, after))
+    return as_many and set(after.environment) == set(left)

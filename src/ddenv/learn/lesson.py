@@ -71,13 +71,6 @@ class Lesson:
     def name(self) -> str:
         return self.file.stem.lstrip("0123456789-")
 
-    @property
-    def asked(self) -> int:
-        """How many questions, predictions, searches and races it has; the prediction of an outcome also asks for the reason."""
-        foretold = [each.foretell for each in self.steps if each.foretell is not None]
-        done = sum(bool(each.question or each.budget or each.race) for each in self.steps)
-        return done + len(foretold) + foretold.count("outcome")
-
 
 # What students often believe, and what is right instead.
 MISCONCEPTIONS = {
@@ -99,7 +92,7 @@ MISCONCEPTIONS = {
     ),
     "fewer": (
         "thinks that fewer models always help the robot",
-        "Leaving something out can change the robot's way, and lead it into another trap.",
+        "Leaving something out can change the robot's path, and lead it into another trap.",
     ),
     "alone": (
         "thinks that one model is the culprit",
@@ -112,6 +105,10 @@ MISCONCEPTIONS = {
     "took": (
         "takes what took part for what is needed",
         "What took part changed a bit of a run. Whether f needs it, only a test without it shows.",
+    ),
+    "never": (
+        "takes what was not seen for what cannot happen",
+        "Another seed may show what no run has shown so far. How likely that is, the interval says.",
     ),
     "stuck": (
         "thinks that a round without f is wasted, or the end",

@@ -78,6 +78,8 @@ class Course:
         self._hint = False
         # Whether the step has something to do that was neither done nor skipped.
         self.due = False
+        # Of which kinds the student was asked for the reason in predictions of one's own.
+        self._explained: frozenset[str] = frozenset()
         # The question of the step, with its answer, and where the run was, while a prediction stands in its place.
         self._own: tuple[Asked | None, int | None, bool, int] | None = None
         position.go(position.ids[0])
@@ -106,7 +108,7 @@ class Course:
         if self._opened is None:
             return FREE
         if self.step == self.last:
-            return "\n\n".join((*summary(self._opened.lesson, self.score), *self._searches()))
+            return "\n\n".join((*summary(self._opened.asked, self.score), *self._searches()))
         return self._said(self._opened.lesson.steps[self.step].text)
 
     def _searches(self) -> Iterator[str]:
@@ -222,10 +224,8 @@ class Course:
         self.position.go(self._opened.places[step])
         if here.question is not None:
             self._asked = Asked(str(step), _filled(here.question, self._said))
-        elif here.foretell is not None:
-            found = foretelling(self.position, self._opened.places[step], here.foretell)
-            if found is not None:
-                self._asked = _asked(str(step), found)
+        elif (found := self._opened.foretold[step]) is not None:
+            self._asked = _asked(str(step), found)
         elif here.race:
             self.due, self._asked = True, Asked(str(step), bet(self._opened.racers(here)))
         elif (attempt := self.attempt) is not None:
@@ -299,7 +299,10 @@ class Course:
             found = None if what is None else foretelling(self.position, id, what)
             if found is not None:
                 self.position.go(id)
-                self._asked, self._chosen, self._hint = _asked(f"free.{id}", found), None, False
+                # What was explained a moment ago is not asked again.
+                shown = found.told if found.kind in self._explained else found
+                self._explained |= {found.kind}
+                self._asked, self._chosen, self._hint = _asked(f"free.{id}", shown), None, False
                 if self._opened is not None:
                     self._own = self._own or before
                 return True

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Lesson
+from ddenv.learn.lesson import MISCONCEPTIONS, Answer
 
 # Of one search; what is longer is no search.
 MOST_MOVES = 2000
@@ -76,15 +76,16 @@ def score_of(data: Any) -> Score:
     return Score(step, data.get("done") is True, answered, streak, best, beliefs, moves)
 
 
-def summary(lesson: Lesson, score: Score) -> list[str]:
-    """The end of a lesson, in sentences."""
-    skipped = max(0, lesson.asked - len(score.answered))
-    lines = [f"You answered {score.right} of {lesson.asked} questions right; {skipped} skipped."]
+def summary(asked: int, score: Score) -> list[str]:
+    """The end of a lesson with so many questions `asked`, in sentences."""
+    skipped = max(0, asked - len(score.answered))
+    lines = [f"You answered {score.right} of {asked} questions right; {skipped} skipped."]
     if score.best > 1:
         lines.append(f"Your longest streak: {score.best} right answers in a row.")
     if not score.misconceptions and score.answered:
         lines.append("No typical misconception was seen.")
-    for name, _ in sorted(score.misconceptions.items(), key=lambda item: -item[1]):
+    for name, number in sorted(score.misconceptions.items(), key=lambda item: -item[1]):
         belief, instead = MISCONCEPTIONS[name]
-        lines.append(f"One of your answers is typical of somebody who {belief}. {instead}")
+        which = "One of your answers is" if number == 1 else f"{number} of your answers are"
+        lines.append(f"{which} typical of somebody who {belief}. {instead}")
     return lines

@@ -10,6 +10,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.learn import lesson_figures
 from ddenv.learn.attempt import Attempt
+from ddenv.learn.foretelling import Foretelling, foretelling
 from ddenv.learn.lesson import Lesson, Step
 from ddenv.learn.lesson_figures import Figures
 from ddenv.learn.plays import Play, recorded_play
@@ -62,6 +63,24 @@ class Opened:
         return lesson_figures.filled(words, Figures(self.position.end, here, self.oracle, self.beside))
 
     @cached_property
+    def foretold(self) -> tuple[Foretelling | None, ...]:
+        """What each step asks to foretell. A reason is asked for once; where it is the same again, it is told."""
+        found: list[Foretelling | None] = []
+        kinds = {""}
+        for step, at in zip(self.lesson.steps, self.places, strict=True):
+            each = None if step.foretell is None else foretelling(self.position, at, step.foretell)
+            found.append(each.told if each is not None and each.kind in kinds else each)
+            kinds |= {"" if each is None else each.kind}
+        return tuple(found)
+
+    @cached_property
+    def asked(self) -> int:
+        """How many questions, predictions with their reasons, searches and races it has."""
+        foretold = [each for each in self.foretold if each is not None]
+        done = sum(bool(each.question or each.budget or each.race) for each in self.lesson.steps)
+        return done + len(foretold) + sum(each.reason is not None for each in foretold)
+
+    @cached_property
     def places(self) -> tuple[int, ...]:
         """The event that each step shows."""
         found, at = [], self.position.ids[0]
@@ -106,6 +125,7 @@ def open_lesson(file: Path) -> Opened:
     plays = {} if oracle is None else _plays(lesson, oracle)
     made = Opened(lesson, opened[0], oracle, {name: _end(run) for name, run in lesson.beside.items()}, plays)
     _check_figures(made)
+    _check_foretold(made)
     return made
 
 
@@ -127,6 +147,16 @@ def _plays(lesson: Lesson, oracle: Oracle) -> dict[str, Play]:
 def _end(run: Path) -> RunState:
     with RunFile(run) as content:
         return fold(content.events())
+
+
+def _check_foretold(opened: Opened) -> None:
+    """Raises UserError if nothing can be foretold where a step asks for it."""
+    for step, found in zip(opened.lesson.steps, opened.foretold, strict=True):
+        if step.foretell is not None and found is None:
+            raise UserError(
+                f"{opened.lesson.file}:{step.line}: foretell: nothing of this kind can be foretold there; "
+                "choose another place in the run"
+            )
 
 
 def _check_figures(opened: Opened) -> None:

@@ -1,10 +1,13 @@
 """Lessons on the screen: the list, a lesson with right, wrong and skipped answers, and any run step by step."""
 
+import json
+import shutil
+
 import pytest
 from textual.widgets import OptionList, Static
 
 from ddenv.learn.score import Score
-from ddenv.learn.shelf import LESSONS, bundled
+from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
@@ -14,6 +17,7 @@ from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.messages import ShowLesson, ShowLessons
+from ddenv.workbench.run.guide_place import place_file
 from tests.tiers import slow
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
@@ -55,17 +59,18 @@ async def test_a_lesson_from_start_to_end(size):
 
 
 async def test_enter_shows_the_rest_of_a_long_text_first():
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(64, 20)) as pilot:
         await pilot.pause()
         pane, course = pilot.app.screen.query_one(LessonPane), pilot.app.screen.course
-        while not pane.max_scroll_y:
-            step = course.step
+        assert pane.max_scroll_y and pane.parent.border_subtitle == "enter shows the rest"
+        while pane.scroll_y < pane.max_scroll_y:
+            before = pane.scroll_y
             await pilot.press("enter")
             await pilot.pause()
-            assert course.step == step + 1
+            assert course.step == 0 and pane.scroll_y > before
+        assert not pane.parent.border_subtitle
         await pilot.press("enter")
-        await pilot.pause()
-        assert course.step == step + 1 and pane.scroll_y > 0
+        assert course.step == 1
 
 
 async def test_at_80_columns_a_hint_is_in_sight_and_the_map_has_the_way_of_the_test_that_is_told():
@@ -86,7 +91,66 @@ async def test_at_80_columns_a_hint_is_in_sight_and_the_map_has_the_way_of_the_t
         with RunFile(LESSONS / "delivery.ddenv") as run:
             assert shown.evidence == run.motion(6) != shown.original
         assert [live.test for live in shown.live] == [6]
-        assert screen.query_one("#lesson-world").border_title == "World: way of test 6"
+        assert screen.query_one("#lesson-world").border_title == "World: path of test 6"
+
+
+async def test_after_a_lesson_comes_the_next_one_by_itself_and_the_list_shows_how_far_one_is():
+    names = [open_lesson(file).lesson.name for file in bundled()]
+    for name in names[:2]:
+        keep_score(name, Score(step=99, done=True))
+    async with Workbench(first=ShowLessons()).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        options = pilot.app.screen.query_one(OptionList)
+        assert options.highlighted == 2, "the first one that is not done"
+        assert "2 of 7 done" in str(pilot.app.screen.query_one("#lessons-header", Static).content)
+        await pilot.press("up", "enter")
+        await pilot.pause()
+        assert "enter opens the next lesson: Order matters" in text(pilot)
+        await pilot.press("enter")
+        await pilot.pause()
+        assert isinstance(pilot.app.screen, LessonScreen)
+        assert pilot.app.screen.course.step == 0 and "step 1 of" in str(
+            pilot.app.screen.query_one("#lesson-header", Static).content
+        )
+        await pilot.press("escape")
+        await pilot.pause()
+        assert pilot.app.screen.query_one(OptionList).highlighted == 2
+    keep_score(names[-1], Score(step=99, done=True))
+    async with Workbench(first=ShowLessons(bundled()[-1])).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        await pilot.press("enter")
+        assert "next lesson" not in text(pilot) and isinstance(pilot.app.screen, LessonScreen)
+
+
+async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it():
+    keep_score("what-delta-debugging-is", Score(step=2))
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        pane = pilot.app.screen.query_one(LessonPane)
+        assert pane.parent.border_subtitle == "a to c answers, s skips"
+        await pilot.press("enter")
+        assert len(pilot.app._notifications) == 1
+        await pilot.press("a")
+        await pilot.pause()
+        assert not pilot.app._notifications
+        # Lines of a remark after its first stand below its words.
+        remark = next(line for line in text(pilot).splitlines() if line.startswith("b ✓"))
+        after = text(pilot).splitlines()[text(pilot).splitlines().index(remark) + 1]
+        assert after.startswith("    ") and len(remark) <= 76
+
+
+async def test_who_walks_through_a_run_leads_those_who_watch_it(tmp_path):
+    run = tmp_path / "mine.ddenv"
+    shutil.copy(LESSONS / "delivery.ddenv", run)
+    async with Workbench(first=ShowLesson(run)).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        await pilot.press("right_curly_bracket")
+        assert json.loads(place_file(run).read_text()) == pilot.app.screen.course.at
+    assert not place_file(run).exists()
+    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
+        await pilot.pause()
+        await pilot.press("right")
+        assert not place_file(LESSONS / "delivery.ddenv").exists()
 
 
 async def test_a_lesson_goes_on_where_it_was_left():

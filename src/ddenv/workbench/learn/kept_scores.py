@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ddenv.amounts import count
 from ddenv.learn.score import Score, data_of, score_of
 from ddenv.runs.remembered import read_state, write_state
 
@@ -22,9 +23,9 @@ def keep_score(lesson: str, score: Score) -> None:
     write_state(FILE, {name: data_of(each) for name, each in scores.items()})
 
 
-def in_words(score: Score | None, asked: int) -> str:
+def in_words(score: Score | None) -> str:
     """How far a student is, for a list."""
     if score is None or not (score.step or score.answered):
         return "not begun"
     state = "done" if score.done else f"at step {score.step + 1}"
-    return f"{state}, {score.right} of {asked} right"
+    return f"{state}, {score.right} of {count(len(score.answered), 'answer')} right"

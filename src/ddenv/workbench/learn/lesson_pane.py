@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from rich.console import Console
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import VerticalScroll
+from textual.widget import Widget
 from textual.widgets import Static
 
 from ddenv.learn.lesson import Question
@@ -12,22 +16,44 @@ from ddenv.learn.lesson_course import LETTERS, Page
 from ddenv.learn.markup import Block
 from ddenv.workbench.wording import plain
 
+# The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines go on below the words.
+BULLET, ANSWER, REMARK = 2, 6, 4
 STYLES = {"": "", "strong": "bold", "emphasis": "italic", "code": "bold"}
 
 
 class LessonPane(VerticalScroll):
     """Scrolls where a text is longer than its panel. A click on an answer gives it."""
 
+    _page: Page | None = None
+
     def compose(self) -> ComposeResult:
         yield Static("", id="lesson-text", markup=False)
 
     def show(self, page: Page) -> None:
         """Another page, from its beginning; with a hint or an answer, its end: that is new."""
-        self.query_one("#lesson-text", Static).update(page_text(page))
+        self._page = page
+        self.query_one("#lesson-text", Static).update(page_text(page, self.scrollable_content_region.width))
         if page.chosen is None and not page.hint:
             self.scroll_home(animate=False)
         else:
             self.call_after_refresh(self.scroll_end, animate=False)
+        self.call_after_refresh(self._say_what_is_next)
+
+    def watch_scroll_y(self, old_value: float, new_value: float) -> None:
+        """What the frame says, too."""
+        super().watch_scroll_y(old_value, new_value)
+        self._say_what_is_next()
+
+    def _say_what_is_next(self) -> None:
+        """In the frame: that there is more to read, or which letters are answers."""
+        if not isinstance(self.parent, Widget):
+            return
+        said = ""
+        if self.scroll_y < self.max_scroll_y:
+            said = "enter shows the rest"
+        elif self._page is not None and self._page.question is not None and self._page.chosen is None:
+            said = f"{LETTERS[0]} to {LETTERS[len(self._page.question.answers) - 1]} answers, s skips"
+        self.parent.border_subtitle = said
 
     def read_on(self) -> bool:
         """Scrolls on to what was not in sight; False if all of the page was."""
@@ -37,20 +63,40 @@ class LessonPane(VerticalScroll):
         return True
 
 
-def page_text(page: Page) -> Text:
-    """A page as text; nothing on it depends on colour alone."""
-    parts = [_block(each) for each in page.text]
+def page_text(page: Page, room: int = 0) -> Text:
+    """A page as text, `room` columns wide; nothing on it depends on colour alone."""
+    parts = [_blocks(page.text, room)]
     if page.question is not None:
-        parts.append(_question(page.question, page))
-    parts += [_block(each) for each in page.after]
-    return Text("\n\n").join(parts)
+        parts.append(_question(page.question, page, room))
+    parts.append(_blocks(page.after, room))
+    return Text("\n\n").join(part for part in parts if part)
 
 
-def _block(block: Block) -> Text:
+def _blocks(blocks: Sequence[Block], room: int) -> Text:
+    """Paragraphs with a line between them; the entries of a list stand close together."""
+    text = Text()
+    for before, block in zip((None, *blocks), blocks, strict=False):
+        if before is not None:
+            text.append("\n" if before.listed and block.listed else "\n\n")
+        text.append_text(_block(block, room))
+    return text
+
+
+def _block(block: Block, room: int) -> Text:
     text = Text("• " if block.listed else "")
     for words, style in block.spans:
         text.append(plain_words(words), STYLES[style])
-    return text
+    return _hung(text, BULLET, room) if block.listed else text
+
+
+def _hung(text: Text, indent: int, room: int) -> Text:
+    """A paragraph whose lines after the first are indented, if it takes more than `room` columns."""
+    if text.cell_len <= room or room < 4 * indent:
+        return text
+    # The first line has the sign in the place of the indent.
+    sign, words = text.divide([indent])
+    lines = words.wrap(Console(width=room), room - indent)
+    return Text("").join([sign, Text(f"\n{' ' * indent}").join(line for line in lines)])
 
 
 def plain_words(words: str) -> str:
@@ -59,25 +105,25 @@ def plain_words(words: str) -> str:
     return f"{' ' if lead else ''}{plain(words)}{' ' if tail and words.strip() else ''}"
 
 
-def _question(question: Question, page: Page) -> Text:
+def _question(question: Question, page: Page, room: int) -> Text:
     text = Text().append(plain(question.text), "bold")
     for place, answer in enumerate(question.answers):
         mark, style = " ", ""
         if page.chosen is not None:
             mark = "✓" if answer.right else "✗" if place == page.chosen else " "
             style = "bold" if answer.right or place == page.chosen else "dim"
-        line = Text(f"\n {mark} {LETTERS[place]}  {plain(answer.text)}", style)
+        line = _hung(Text(f" {mark} {LETTERS[place]}  {plain(answer.text)}", style), ANSWER, room)
         if page.chosen is None:
             line.apply_meta({"@click": f"screen.answer({place})"})
-        text.append_text(line)
+        text.append("\n").append_text(line)
     if page.hint:
         text.append(f"\nHint: {plain(question.hint)}", "italic")
     if page.chosen is not None:
-        text.append_text(_verdict(question, page))
+        text.append_text(_verdict(question, page, room))
     return text
 
 
-def _verdict(question: Question, page: Page) -> Text:
+def _verdict(question: Question, page: Page, room: int) -> Text:
     """Right or wrong, why, and what is wrong with the other answers."""
     if page.chosen is None or page.chosen < 0:
         first = f"\n\nSkipped. {LETTERS[question.right]} is right."
@@ -87,5 +133,5 @@ def _verdict(question: Question, page: Page) -> Text:
         first = f"\n\n✗ No: {LETTERS[question.right]} is right."
     text = Text().append(first, "bold")
     for mark, why in page.remarks:
-        text.append(f"\n{mark} {plain(why)}")
+        text.append("\n").append_text(_hung(Text(f"{mark} {plain(why)}"), REMARK, room))
     return text

@@ -16,6 +16,7 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.learn.attempt import Attempt
 from ddenv.learn.lesson_course import Course
+from ddenv.learn.markup import blocks
 from ddenv.learn.shelf import Opened
 from ddenv.learn.variables import variables
 from ddenv.runfile.position import Position, Step
@@ -32,6 +33,7 @@ from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments, what_happened
+from ddenv.workbench.run.guide_place import GuidePlace
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.observed import Observed
 from ddenv.workbench.run.poll import Snapshot
@@ -56,8 +58,11 @@ def _answer(place: int) -> Binding:
     )
 
 
-class LessonScreen(Screen[None]):
-    """A lesson from where the student left it; or any run step by step. Leaving it keeps the student's place and answers."""
+class LessonScreen(Screen[bool]):
+    """A lesson from where the student left it; or any run step by step. Leaving it keeps the student's place and answers.
+
+    It returns whether the student goes on to the next lesson.
+    """
 
     CSS_PATH = "learn.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
@@ -127,10 +132,13 @@ class LessonScreen(Screen[None]):
         ),
     ]
 
-    def __init__(self, run: Path, opened: Opened | None = None) -> None:
-        """The lesson `opened`, whose run is `run`; without one the run alone. Raises UserError for a damaged run."""
+    def __init__(self, run: Path, opened: Opened | None = None, following: str = "") -> None:
+        """The lesson `opened`, whose run is `run`; without one the run alone. Raises UserError for a damaged run.
+
+        `following` is the title of the next lesson, or "".
+        """
         super().__init__()
-        self._run, self._opened = run, opened
+        self._run, self._opened, self._following = run, opened, following
         self._file = Observed(run)
         self._moments = Moments(self._file)
         if opened is None:
@@ -142,6 +150,8 @@ class LessonScreen(Screen[None]):
             position, score = opened.position, all_scores().get(opened.lesson.name)
         self.course = Course(position, opened, score)
         self._kept = self.course.score
+        # Many may have the same lesson open: only a run that is walked through freely leads those who watch it.
+        self._guide = GuidePlace(run, position) if opened is None else None
         self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
 
     def compose(self) -> ComposeResult:
@@ -166,17 +176,27 @@ class LessonScreen(Screen[None]):
 
     def on_unmount(self) -> None:
         self._file.close()
+        if self._guide is not None:
+            self._guide.close()
 
     # What is shown.
 
     def _show(self) -> None:
         self._show_run()
-        self.query_one(LessonPane).show(self.course.page)
+        course, page = self.course, self.course.page
+        if self._at_next:
+            page = replace(page, after=blocks(f"`enter` opens the next lesson: **{self._following}**."))
+        self.query_one(LessonPane).show(page)
         self.query_one("#lesson-header", Static).update(self._heading())
-        footer, due = self.query_one(KeyFooter), self.course.due and not self.course.is_open
-        footer.say("lesson.activity", self.course.activity or "")
-        footer.say("lesson.on", f"{self.course.activity if due else 'go on'}")
+        footer, due = self.query_one(KeyFooter), course.due and not course.is_open
+        footer.say("lesson.activity", course.activity or "")
+        footer.say("lesson.on", f"{course.activity}" if due else "next lesson" if self._at_next else "go on")
         self._keep_score()
+
+    @property
+    def _at_next(self) -> bool:
+        """Whether the lesson is at its end, and another one follows."""
+        return bool(self._following) and self.course.step == self.course.last
 
     def _keep_score(self) -> None:
         if self._opened is not None and self.course.score != self._kept:
@@ -196,7 +216,7 @@ class LessonScreen(Screen[None]):
         test = told(moment)
         if test is not None:
             snapshot = self._with_way(snapshot, test)
-        self.query_one("#lesson-world").border_title = "World" if test is None else f"World: way of test {test.id}"
+        self.query_one("#lesson-world").border_title = "World" if test is None else f"World: path of test {test.id}"
         self.query_one(Happening).show(snapshot)
         self.query_one(Variables).show(variables(moment))
         self._map.show(snapshot, snapshot.pointed)
@@ -205,7 +225,7 @@ class LessonScreen(Screen[None]):
         self.query_one("#lesson-now").border_subtitle = f"moment {number} of {all_moments}"
 
     def _with_way(self, snapshot: Snapshot, test: Test) -> Snapshot:
-        """With the way of the test that is told, as far as it is recorded, and the robot where it ended."""
+        """With the path of the test that is told, as far as it is recorded, and the robot where it ended."""
         ended = (
             () if test.end_pose is None or len(test.end_pose) < COLUMNS - 1 else (Live(0, test.id, 0.0, test.end_pose),)
         )
@@ -236,8 +256,10 @@ class LessonScreen(Screen[None]):
             return
         if self.course.due and not self.course.is_open:
             self.action_activity()
+        elif self._at_next:
+            self.dismiss(True)
         elif self.course.go_on():
-            self._show()
+            self._moved()
         elif self.course.page.question is not None and self.course.page.chosen is None:
             self._say("choose an answer by its letter, or skip the question with s")
         elif self._opened is None:
@@ -247,7 +269,7 @@ class LessonScreen(Screen[None]):
 
     def action_back(self) -> None:
         if self.course.back():
-            self._show()
+            self._moved()
         else:
             self._say(
                 "the lesson begins here" if self._opened else "no lesson is open: the left arrow goes back in the run"
@@ -255,17 +277,17 @@ class LessonScreen(Screen[None]):
 
     def action_answer(self, place: int) -> None:
         if self.course.answer(place) is not None:
-            self._show()
+            self._moved()
 
     def action_skip(self) -> None:
         if self.course.skip():
-            self._show()
+            self._moved()
         else:
             self._say("no question is open")
 
     def action_hint(self) -> None:
         if self.course.hint():
-            self._show()
+            self._moved()
         else:
             self._say("there is no hint here")
 
@@ -293,7 +315,7 @@ class LessonScreen(Screen[None]):
 
     def action_move(self, what: Step, by: int) -> None:
         if self.course.move(what, by):
-            self._show()
+            self._moved()
         else:
             self._say("this is the end of the run" if by > 0 else "there is none before this moment")
 
@@ -301,7 +323,7 @@ class LessonScreen(Screen[None]):
         if self.course.must_answer:
             self._say("first answer the question of this step, or skip it with s")
         elif self.course.foretell():
-            self._show()
+            self._moved()
         else:
             self._say("nothing is left to predict: go back in the run first")
 
@@ -310,9 +332,16 @@ class LessonScreen(Screen[None]):
 
     def action_close(self) -> None:
         if len(self.app.screen_stack) > 2:
-            self.dismiss(None)
+            self.dismiss(False)
         else:
             self.app.exit(0)
+
+    def _moved(self) -> None:
+        """After a move: what was said before it would only hide the text."""
+        self.app.clear_notifications()
+        self._show()
+        if self._guide is not None:
+            self._guide.browsed()
 
     def _say(self, why: str) -> None:
         self.notify(why, timeout=3, markup=False)

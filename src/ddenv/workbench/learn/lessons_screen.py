@@ -14,6 +14,7 @@ from textual.widgets import OptionList, Static
 
 from ddenv.errors import UserError
 from ddenv.learn.lesson import Lesson
+from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
@@ -40,8 +41,7 @@ class LessonsScreen(Screen[None]):
         self._lessons: list[Lesson] = []
 
     def compose(self) -> ComposeResult:
-        heading = Text(" Lessons", "bold").append("  each with a recorded run: no Drake, no internet", "not bold")
-        yield Static(heading, id="lessons-header")
+        yield Static("", id="lessons-header", markup=False)
         with Framed("Lessons", id="lessons-panel", classes="panel"):
             yield OptionList(id="lessons-list")
         with Vertical(classes="panel", id="lesson-about-panel") as panel:
@@ -56,7 +56,9 @@ class LessonsScreen(Screen[None]):
                 self._lessons.append(glance(file))
             except UserError as error:
                 self.notify(str(error), severity="warning", markup=False)
-        self._fill()
+        scores = all_scores()
+        undone = (place for place, each in enumerate(self._lessons) if not scores.get(each.name, Score()).done)
+        self._fill(next(undone, 0))
         self.query_one(OptionList).focus()
         if self._opens is not None:
             self._open(self._opens)
@@ -68,13 +70,17 @@ class LessonsScreen(Screen[None]):
     def on_resize(self) -> None:
         self._fill()
 
-    def _fill(self) -> None:
+    def _fill(self, at: int | None = None) -> None:
+        """The list, with the lesson number `at` under the cursor, or the one where it is."""
         options, scores = self.query_one(OptionList), all_scores()
-        at = options.highlighted or 0
+        at = (options.highlighted or 0) if at is None else at
+        done = sum(scores.get(lesson.name, Score()).done for lesson in self._lessons)
+        heading = Text(" Lessons", "bold").append(f" · {done} of {len(self._lessons)} done", "not bold")
+        self.query_one("#lessons-header", Static).update(heading)
         width = max(30, self.size.width - 40)
         options.clear_options()
         for number, lesson in enumerate(self._lessons, 1):
-            row = f"{number}  {shorten(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name), lesson.asked)}"
+            row = f"{number}  {shorten(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name))}"
             options.add_option(Text(row, no_wrap=True))
         if self._lessons:
             options.highlighted = min(at, len(self._lessons) - 1)
@@ -95,11 +101,17 @@ class LessonsScreen(Screen[None]):
     def _open(self, file: Path) -> None:
         from ddenv.workbench.learn.lesson_screen import LessonScreen
 
+        place = next((place for place, each in enumerate(self._lessons) if each.file == file), len(self._lessons))
+        after = self._lessons[place + 1 : place + 2]
         try:
             opened = open_lesson(file)
-            self.app.push_screen(LessonScreen(opened.lesson.run, opened))
+            screen = LessonScreen(opened.lesson.run, opened, "".join(plain(each.title) for each in after))
         except UserError as error:
             self.notify(str(error), severity="warning", markup=False)
+            return
+        if place < len(self._lessons):
+            self._fill(place)
+        self.app.push_screen(screen, lambda goes_on: self._open(after[0].file) if goes_on else None)
 
     def action_back(self) -> None:
         if len(self.app.screen_stack) > 2:

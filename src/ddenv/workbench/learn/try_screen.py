@@ -138,7 +138,7 @@ class TryScreen(Screen[None]):
         if not self.attempt.tests_left:
             return models, Text("No test is left. m: the verdict on what you hold.", "dim")
         if not marked:
-            return models, Text("Mark with enter or a click. m: no single one can go.", "dim")
+            return models, Text("Mark models with enter or a click. When no single one can go, press m.", "dim")
         left = len(self.attempt.held) - len(marked)
         return models, Text(f"{len(marked)} marked (*): w tests the other {left}, o tests these alone.", "dim")
 

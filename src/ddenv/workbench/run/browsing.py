@@ -118,6 +118,9 @@ def what_happened(moment: Moment) -> str:
         return _of_test(state, state.tests[moment.event.data["test"] - 1])
     if kind == "created":
         return "the run was made"
+    if kind == "finished":
+        # With what result is explained beside it.
+        return "the run ended"
     return plain(news(kind, moment.before, state, attached=True)).rstrip(".") or kind.replace("_", " ")
 
 

@@ -222,6 +222,8 @@ def _testing(snapshot: Snapshot, current: Round, options: Settings) -> Happening
     # Speculation may run several tests of one candidate at once; the earliest is the one the algorithm is at.
     test = running[0]
     sentences = _first_run(place, options) if test.run == 0 else _rerun(state, candidate, test, place, options)
+    if beside := len(running) - 1:
+        sentences = (*sentences, f"Idle workers make {count(beside, 're-run')} of it at the same time.")
     if ahead:
         sentences = (*sentences, f"Idle workers test {count(ahead, 'later candidate')} at the same time.")
     return "test" if test.run == 0 else "rerun", sentences

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ddenv.workbench.run.browsing import Browsing
+from ddenv.runfile.position import Position
 
 SUFFIX = ".place"
 FOLLOWS = "watching only: no key changes anything; follows the guiding screen"
@@ -21,14 +21,15 @@ def place_file(run: Path) -> Path:
 
 
 class GuidePlace:
-    """Writes the moment of `browsing`, or, if it only watches, brings it to the moment that was written.
+    """Writes the moment of a screen's `position`, or, if it only watches, brings it to the moment that was written.
 
-    `browse(move)` shows the moment to which `move()` goes.
+    A screen that watches gives `browse`: `browse(move)` shows the moment to which `move()` goes.
     """
 
-    def __init__(self, run: Path, browsing: Browsing, watch: bool, browse: Callable[[Callable[[], str]], None]) -> None:
-        self._file, self._browsing, self._watch = place_file(run), browsing, watch
-        self._browse = browse
+    def __init__(
+        self, run: Path, position: Position, browse: Callable[[Callable[[], str]], None] | None = None
+    ) -> None:
+        self._file, self._position, self._browse = place_file(run), position, browse
         self._follows, self._led, self._written = True, False, False
         # What was read last, and when it had been written.
         self._read: tuple[int | None, int] = (None, 0)
@@ -40,24 +41,28 @@ class GuidePlace:
 
     def browsed(self) -> bool:
         """The screen went to another moment. Returns whether it may say something else now."""
-        at = self._browsing.position.at
-        if not self._watch:
+        at = self._position.at
+        if self._browse is None:
             self._write(at)
         elif not self._led:
             # Back at its end it follows again.
             self._follows, self._read = at is None, (None, 0)
-        return self._watch
+        return self._browse is not None
 
     def look(self) -> None:
         """Goes where the guiding screen has gone since the last look."""
-        if not (self._watch and self._follows):
+        if self._browse is None or not self._follows:
             return
         before, self._read = self._read, self._read_place()
         at = self._read[0]
-        if self._read != before and at != self._browsing.position.at:
+        if self._read != before and at != self._position.at:
             self._led = True
-            self._browse(lambda: self._browsing.go(at))
+            self._browse(lambda: self._go(at))
             self._led = False
+
+    def _go(self, at: int | None) -> str:
+        self._position.go(at)
+        return ""
 
     def close(self) -> None:
         """The guiding screen is gone: nobody follows it any more."""

@@ -83,7 +83,7 @@ class RunScreen(Screen[None]):
         self._footer = KeyFooter(shown, first, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
-        self._guide = GuidePlace(run, self.browsing, watch, self._browse)
+        self._guide = GuidePlace(run, self.browsing.position, self._browse if watch else None)
         self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
         self._keys = KeyOffers(self.browsing, self.poll, self._table, self._map, self.asking, self._opening)
         self._pane = "map"
