@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
+from ddenv.engine.mcap_file import _chosen
 from ddenv.engine.ros_messages import DEFINITIONS, header, marker, nanoseconds
 from ddenv.engine.streams import Chosen, Streams, messages
 from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
@@ -20,6 +21,7 @@ from ddenv.robot.sensing.sensors import Imu, Scan
 from ddenv.world import scenario
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Link, Mesh, Model, Plane, Sphere
 from ddenv.world.pose import Pose
+from tests.workbench import fake_moments, fake_run
 
 COLOR = (0.5, 0.5, 0.5, 1.0)
 SHAPES = [
@@ -122,3 +124,13 @@ def test_stamps_are_right_to_the_nanosecond(seconds):
     stamp = header(seconds, "map")["stamp"]
     assert 0 <= stamp["nanosec"] < 1_000_000_000
     assert stamp["sec"] + 1e-9 * stamp["nanosec"] == pytest.approx(seconds, abs=1e-9 + 1e-15 * seconds)
+
+
+def test_the_run_that_passes_is_one_in_the_nearest_world_that_does(tmp_path):
+    for moment, removal in ((fake_moments.finished, None), (fake_moments.isolated, 2)):
+        run = moment(fake_run.FakeRun(tmp_path / f"{moment.__name__}.ddenv"))
+        chosen = dict(_chosen(run.file))
+        assert list(chosen) == ["whole", "left", "passing"]
+        test = run.state.tests[chosen["passing"] - 1]
+        assert (test.outcome, test.removal) == ("pass", removal)
+        run.close()

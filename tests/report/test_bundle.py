@@ -21,7 +21,7 @@ EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 @pytest.fixture
 def run(tmp_path):
-    return fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv")).path
+    return fake_moments.isolated(fake_run.FakeRun(tmp_path / "one.ddenv")).path
 
 
 def trajectories(run):
@@ -48,6 +48,8 @@ def test_the_run_that_goes_along_says_the_same_and_has_only_the_trajectories_tha
         whole.original,
     )
     assert copy.evidence == whole.evidence
+    assert copy.nearest == whole.nearest
+    assert copy.nearest.instants
     assert not copy.troubles
     assert 0 < trajectories(tmp_path / "handed" / "run.ddenv") < trajectories(run)
 
@@ -59,6 +61,7 @@ def test_the_issue_says_what_fails_how_often_and_what_is_needed(run, tmp_path):
     assert "f in 23 of 23 fresh runs (86 % to 100 %)" in issue
     assert "- `crate_00`\n- `crate_01`\n" in issue
     assert "Without crate_00 the robot reaches its goal" in issue
+    assert "The nearest world that passes lacks 1 model of 11 (crate_00)" in issue
 
 
 @pytest.mark.parametrize("name", ["handed", "handed.zip"])

@@ -20,12 +20,13 @@ from ddenv.robot.drake.template import Variants
 from ddenv.robot.result import Progress
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
+from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, reasons
 from ddenv.world.files.access import write_file
 
 
 def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:
-    """Makes the failing run, that of what is left, and one that reaches its goal without one of its models again, and writes their
+    """Makes the failing run, that of what is left, and one that reaches its goal again (`_chosen` says which), and writes their
     streams to `target`; returns a line about each.
 
     `progress(name, seconds)` gets the simulated time, s. Raises UserError, also for runs by a simulator of the user's own and for
@@ -64,12 +65,19 @@ def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
 
 
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:
-    """Names and tests: one that shows f, the last one of what is left, and one without a model of it that reaches its goal."""
+    """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal.
+
+    That is in the nearest world that passes, where it is known, else in what is left without a model of it.
+    """
     state = fold(file.events())
     if state.f_test is not None:
         yield "whole", state.f_test.id
     if state.evidence_test is not None:
         yield "left", state.evidence_test
+    passes = nearest(file, state)
+    if passes is not None and passes.parting is not None:
+        yield "passing", passes.parting.without_test
+        return
     found = () if current(state) is None else reasons(file, state)
     passing = (each.parting for each in found if each.parting and each.ends[0].kind == GOAL)
     for parting in islice(passing, 1):

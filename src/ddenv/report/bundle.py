@@ -156,6 +156,9 @@ def _issue(record: Record, needs: list[str]) -> Iterator[str]:
         yield f"- and {count(len(state.environment) - MOST_NAMES, 'more model')}"
     yield ""
     yield from (f"{printable(sentence(each))}" for each in record.reasons[:MOST_NAMES])
+    if record.nearest is not None:
+        yield ""
+        yield printable(record.nearest.sentences)
     yield ""
     yield "## Reproduce"
     yield ""
