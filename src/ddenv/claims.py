@@ -83,6 +83,21 @@ def rate(fresh: Counted) -> str:
     return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
 
 
+def for_everyone(certificate: Certificate) -> str:
+    """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
+    left, *removals = certificate.claims
+    share = f"{percent(left.low)} to {percent(left.high)} of all drives, with 95 % confidence"
+    said = f"It failed so in {left.shown} of {count(left.runs, 'new drive')} with nothing else there ({share})"
+    if not is_minimal(certificate):
+        return f"{said}, but not every part of this result is shown to hold"
+    if not removals:
+        return said
+    most = max(removals, key=lambda claim: claim.high)
+    one = "it" if len(removals) == 1 else "any one of them"
+    seldom = f"at most {most.shown}" if most.shown else "none"
+    return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
+
+
 def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
     """What runs `there`, in another simulator, show of what is left, or of that without a model; without a full stop.
 

@@ -87,6 +87,25 @@ def words(cell):
     return "".join(part if isinstance(part, str) else part.text for part in parts)
 
 
+def test_it_begins_with_a_paragraph_for_everyone(run):
+    fake_moments.finished(run)
+    report = content(read_run(run.path))
+    assert "".join(words(part) for part in report.lead[0].parts) == (
+        "In short: The robot got stuck before it reached its goal. Of the 11 models of its world, 2 are enough to make it "
+        "fail like that: crate_00 and crate_01. It failed so in 23 of 23 new drives with nothing else there (86 % to 100 % of "
+        "all drives, with 95 % confidence); without any one of them in at most 1 of 12 (at most 35 %). This took 83 simulated "
+        "drives and 0 s of computing."
+    )
+    titles = [section.title for section in report.sections]
+    first = ["The minimal environment", "What it is worth", "Why it fails", "How it got there"]
+    assert [title for title in titles if title in first] == first
+
+
+def test_it_says_so_where_nothing_has_been_checked(run):
+    fake_moments.mid_round(run)
+    assert "Fresh runs have not checked that yet." in "".join(map(words, content(read_run(run.path)).lead[0].parts))
+
+
 def test_a_finished_run_in_a_few_words(run, tmp_path):
     fake_moments.finished(run)
     text = page(run, tmp_path).text

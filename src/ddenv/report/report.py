@@ -23,6 +23,7 @@ from ddenv.page.blocks import (
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.by_hand import guiding
+from ddenv.report.in_short import in_short
 from ddenv.report.others_met import others_met
 from ddenv.report.outcomes import sureness
 from ddenv.report.repeat import repeat, settings
@@ -43,12 +44,12 @@ from ddenv.world.files.access import write_file
 def content(record: Record) -> Report:
     """The report on a run."""
     state = record.state
-    about = (what_is_left, why, worth, way, guiding, sureness, others_met, settings, repeat)
+    about = (what_is_left, worth, why, way, guiding, others_met, sureness, settings, repeat)
     sections = [each(record) for each in about]
     return Report(
         name=plain(state.scenario.get("name", record.path.stem)),
         verdict=_verdict(state),
-        lead=(*_damage(record), *_standing(record), *_failure(state), *_noted(state)),
+        lead=(*in_short(record), *_damage(record), *_standing(record), *_failure(state), *_noted(state)),
         figures=_figures(record),
         sections=tuple(each for each in sections if each is not None),
         foot=_foot(record),
