@@ -19,7 +19,7 @@ CRATE, WALL = (0.8, 0.8, 0.8), (1.8, 0.2, 1.2)  # m
 # No thing is nearer to the straight way to the goal than this, and none to a model of the scenario than that, m.
 CLEAR, APART = 7.0, 1.5
 # One place in so many has a wall, and one in so many a pile of three boards.
-WALLS, PILES = 20, 100
+WALLS, PILES = 20, 400
 # How high a thing begins above the ground, which may slope, m.
 ABOVE = 0.02
 
@@ -38,7 +38,7 @@ def things(scenario: Scenario, world: World) -> Iterator[str]:
         z = height(ground, x, y) + ABOVE
         if number % WALLS == 0:
             yield still(f"wall_{number:04}", WALL, x, y, z, yaw=number)
-        elif number % PILES == 1:
+        elif number % PILES == 21:
             low = z + SIZE[2] / 2
             for side in (0.0, 0.3):
                 yield board(10 * number + round(10 * side), x, y + side, low, 0.0)

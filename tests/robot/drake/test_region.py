@@ -51,6 +51,7 @@ def variants(world, husky, scenario, monkeypatch) -> Callable[[float], Variants]
     def make(width: float) -> Variants:
         monkeypatch.setattr(region, "FEW", EVERYTHING if width == EVERYTHING else 0)
         monkeypatch.setattr(region, "WIDTH", width)
+        monkeypatch.setattr(region, "AROUND", width)
         return Variants(world, husky, scenario)
 
     return make

@@ -17,8 +17,10 @@ from ddenv.arrays import Booleans, Floats
 from ddenv.world.extent import Bounds, model_bounds
 from ddenv.world.model import Model
 
-# How far a region extends to each side of the straight way to the goal, and around each model that can move, m.
+# How far a region extends to each side of the straight way to the goal, m.
 WIDTH = 8.0
+# And around each model that can move, m: most of them fall or lie where they are.
+AROUND = 4.0
 # Whatever is simulated keeps this distance from the edge at each tick, m: between two ticks nothing gets so far and back, unless it
 # does 40 m/s.
 MARGIN = 2.0
@@ -48,9 +50,10 @@ class Region:
     def of(cls, spawn: Place, goal: Place, moving: Iterable[Model]) -> Region:
         """The region around the way from `spawn` to `goal` and around the models `moving`."""
         boxes = (box for model in moving if (box := model_bounds(model)) is not None)
-        places = [((low + high) / 2)[:2] for low, high in boxes]
-        starts, ends = np.array([spawn, *places], dtype=float), np.array([goal, *places], dtype=float)
-        return cls(starts, ends, np.full(len(starts), WIDTH))
+        places = [(((low + high) / 2)[:2], AROUND + np.linalg.norm((high - low)[:2]) / 2) for low, high in boxes]
+        starts = np.array([spawn, *(place for place, _ in places)], dtype=float)
+        ends = np.array([goal, *starts[1:]], dtype=float)
+        return cls(starts, ends, np.array([WIDTH, *(width for _, width in places)]))
 
     def with_place(self, place: Place, times: int) -> Region:
         """A region that extends also around `place` (m), `times` as far as around the way."""
