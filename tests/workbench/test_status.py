@@ -109,6 +109,7 @@ def test_a_branch_is_told_unless_it_is_the_newest(run):
     undone = nodes(None, 0, 1, rejected={2})
     assert branch_of(state.changed(nodes=undone, node=1)) is None
     assert heading(state.changed(nodes=tree, node=2)).rights[0].startswith("branch 1 · round 2")
+    assert ">99 % smaller" in heading(state.changed(elements=tuple(map(str, range(5000))))).rights[0]
     assert "2 pinned" in heading(state.changed(pinned=frozenset(state.elements[:2]))).rights[0]
 
 

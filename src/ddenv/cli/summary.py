@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ddenv.amounts import count, first_of
+from ddenv.amounts import count, first_of, percent
 from ddenv.claims import (
     current,
     drift,
@@ -116,7 +116,7 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     more += f"; {state.implied} implied, not simulated" if state.implied else ""
     names = first_of(state.environment, MOST_NAMES)
     said = [
-        f"{what}: {after} of {count(before, 'model')} ({1 - after / before:.0%} smaller): {names}",
+        f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),
         f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",

@@ -9,6 +9,7 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.amounts import percent
 from ddenv.claims import drift, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
@@ -125,7 +126,7 @@ def heading(state: RunState) -> Heading:
     lefts = tuple(f"{options.name} · {label}" for label in labels(options.algorithm, options.pair))
     total, kept = len(state.elements), len(state.environment)
     size = f"{kept} of {count(total, 'model')}"
-    more = [f"{round(100 * (1 - kept / total))} % smaller"] if kept < total else []
+    more = [f"{percent(1 - kept / total)} smaller"] if kept < total else []
     pinned = [f"{len(state.pinned)} pinned"] if state.pinned else []
     branch = [f"branch {number}"] if (number := branch_of(state)) else []
     step = []
