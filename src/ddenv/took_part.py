@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from ddenv.amounts import count, first_of, percent
-from ddenv.runfile.state import BROKEN, FRESH, Node, RunState
+from ddenv.runfile.state import BROKEN, FRESH, ISOLATE, Node, RunState
 from ddenv.slices import Models, fresh_chance, reasons
 
 # The maximum number of tests that a word on a candidate names.
@@ -87,6 +87,6 @@ def implied_words(state: RunState, tests: Iterable[int]) -> str:
 
 
 def simulated(state: RunState) -> int:
-    """How many tests of the search were simulated, the baseline included, certificates apart."""
+    """How many tests of the search were simulated, the baseline included, certificates and isolation apart."""
     made = (test for test in state.tests if test.is_finished and test.implied_by is None)
-    return sum(test.phase not in FRESH for test in made)
+    return sum(test.phase not in (*FRESH, ISOLATE) for test in made)

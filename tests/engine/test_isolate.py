@@ -231,3 +231,16 @@ def test_the_search_can_go_on_after_it(tmp_path):
         after = journal.state
     assert after.environment == before.environment
     assert after.isolated == before.isolated
+
+
+def test_a_model_that_fresh_runs_show_may_stay_is_put_back(tmp_path):
+    """With the wall back the seeds of the search miss the goal, fresh ones do not."""
+
+    def oracle(keep, seed):
+        missed = "wall" in keep and seed < FIRST_RUN
+        return "similar" if "beam" in keep or missed else "pass"
+
+    state = work(reduced(tmp_path, needs("beam")), FakePool(oracle, 2))
+    assert removed(state) == {"beam"}
+    assert [claim.verdict for claim in state.isolated.checks[-1].claims] == ["passes", "needed"]
+    assert len(state.isolated.checks) > 1

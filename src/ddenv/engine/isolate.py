@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import islice
+from functools import cached_property, lru_cache
 from typing import Any
 
 from ddenv.engine.bench import Bench, Wanted
@@ -13,7 +12,7 @@ from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.sight import Sight
-from ddenv.engine.subjects import Keep
+from ddenv.engine.subjects import HELD, Keep
 from ddenv.rates import wilson_interval
 from ddenv.reduction.algorithms import by_chunks
 from ddenv.reduction.certificate import ERROR, Claim, Procedure, Terms, error_of, falls, settle
@@ -37,7 +36,7 @@ MOST_CHECKS = 6
 FEWEST_RUNS = 20
 # Tests looked for at a time, for each worker: those that run are among them.
 AHEAD = 2
-CHANGED = "a decision of the user ended the isolation; resume the run to go on from there"
+CHANGED = "a decision of the user, or a slice that was wrong, ended the isolation; resume the run to go on from there"
 VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
 # A model that is put back, None for none, with the world that shows what that does, and what fresh runs say so far.
 Named = tuple[str | None, Keep, Claim]
@@ -148,14 +147,25 @@ class Isolator:
 
     def _is_shown(self, check: Check) -> bool:
         """Whether nothing that a check shows sends the search on."""
-        first, *others = check.claims
-        return first.verdict == "passes" and all(claim.verdict != "not needed" for claim in others)
+        return check.claims[0].verdict == "passes" and not self._smaller(check)
+
+    def _smaller(self, check: Check) -> Keep:
+        """What is enough to remove if a check shows that a model may stay; nothing where that was refuted."""
+        needless = next((claim.back for claim in check.claims if claim.verdict == "not needed"), None)
+        smaller = frozenset[str]() if needless is None else self._removed(check.removal) - self._stack(needless)
+        return frozenset() if self._whole - smaller in self._refused else smaller
+
+    @property
+    def _refused(self) -> frozenset[Keep]:
+        """The worlds that do not pass: the whole one, as is known from its baseline, and those that fresh runs refuted."""
+        refuted = (check.removal for check in self._now.checks if check.claims[0].verdict != "passes")
+        return frozenset((self._whole, *(self._whole - self._removed(number) for number in refuted)))
 
     # The search.
 
     def _search(self) -> Keep:
         """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
-        searching, refused = self._searching()
+        searching, refused = self._searching(), self._refused
         winner: Candidate | None = None
         try:
             while True:
@@ -163,27 +173,21 @@ class Isolator:
         except StopIteration as end:
             return frozenset(end.value)
 
-    def _searching(self) -> tuple[Search, frozenset[Keep]]:
-        """The search that the checks so far have sent on, and the worlds that do not pass."""
-        # That the whole world fails is known from its baseline.
-        refused, start = {self._whole}, None
-        for check in self._now.checks:
-            removed = self._removed(check.removal)
-            needless = next((claim.back for claim in check.claims if claim.verdict == "not needed"), None)
-            if check.claims[0].verdict != "passes":
-                refused.add(self._whole - removed)
-                start = None
-            elif needless is not None:
-                start = removed - self._stack(needless)
-        if start is None:
-            algorithm = isolating(self._now.suspects, self._now.size)
-        else:
-            algorithm = by_chunks(tuple(name for name in self._now.suspects if name in start))
-        return self._stacks.expand(algorithm), frozenset(refused)
+    def _searching(self) -> Search:
+        """From the beginning, or from what the last check shows to be enough."""
+        smaller = self._smaller(self._now.checks[-1]) if self._now.checks else frozenset()
+        if smaller:
+            return self._stacks.expand(by_chunks(tuple(name for name in self._now.suspects if name in smaller)))
+        return self._stacks.expand(isolating(self._now.suspects, self._now.size))
 
     def _judge(self, round: Round, refused: frozenset[Keep]) -> Candidate | None:
         """The first candidate of a round without which the robot passes; None if there is none."""
-        keeps = [self._whole - one.models for one in round.candidates]
+
+        # Of thousands of models, the sets of all candidates would take gigabytes.
+        @lru_cache(maxsize=HELD)
+        def keep_of(index: int) -> Keep:
+            return self._whole - round.candidates[index].models
+
         rule = Passing(self._now.wanted, self._now.rather_than)
         enough = AHEAD * max(1, self.journal.state.jobs)
         judged = winner = 0
@@ -191,17 +195,18 @@ class Isolator:
         def wanted() -> Wanted:
             nonlocal judged, winner
             self.check_open()
-            now = standing(islice(keeps, judged, None), self._reached, rule, refused, first=judged, enough=enough)
+            open_ones = map(keep_of, range(judged, len(round.candidates)))
+            now = standing(open_ones, self._reached, rule, refused, first=judged, enough=enough)
             for verdict in now.verdicts:
                 if not verdict:
                     break
-                if keeps[judged] not in refused:
-                    self._record_verdict(keeps[judged], verdict, rule)
+                if keep_of(judged) not in refused:
+                    self._record_verdict(keep_of(judged), verdict, rule)
                 if verdict == "similar":
                     winner = judged + 1
                     return []
                 judged += 1
-            return [(keeps[index], run, self._number(keeps[index])) for index, run in now.wanted]
+            return [(keep, run, self._number(keep)) for index, run in now.wanted for keep in (keep_of(index),)]
 
         self.bench.work(ISOLATE, None, wanted)
         return round.candidates[winner - 1] if winner else None
