@@ -1,11 +1,18 @@
 """`ddenv isolate`, and what `ddenv why` says of its result."""
 
 import json
+import shutil
+import signal
+import subprocess
 
 import pytest
 
-from tests.command import in_process
+from tests.command import DDENV, ddenv, in_process
+from tests.conftest import ROOT
+from tests.waiting import PATIENCE
 from tests.workbench import fake_moments, fake_run
+
+EXAMPLE = ROOT / "docs/examples/any_simulator"
 
 
 @pytest.fixture
@@ -81,3 +88,24 @@ def test_where_no_such_world_is_known_one_line_says_how_to_find_it(run, tmp_path
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert f"ddenv isolate {run.path}" in done.stderr
     assert not there["OUT"].exists()
+
+
+@pytest.mark.programs
+def test_it_stops_on_ctrl_c_and_goes_on_to_the_same_end(tmp_path, home):
+    """By the programs that a user starts, with a simulator of the user's own."""
+    start = ("run", EXAMPLE / "scenario.yaml", "--trust", "--jobs", "2")
+    assert ddenv(*start, "--output", tmp_path / "one.ddenv").returncode == 0
+    shutil.copy(tmp_path / "one.ddenv", tmp_path / "two.ddenv")
+    once = json.loads(ddenv("isolate", tmp_path / "one.ddenv", "--json", "--jobs", "2").stdout)["nearest"]
+    assert once["shown"]
+    assert once["parting"]["apart"] is not None
+    again = [*DDENV, "isolate", str(tmp_path / "two.ddenv"), "--jobs", "1"]
+    with subprocess.Popen(again, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        # Its first finished candidate has a line.
+        while "passes after" not in process.stdout.readline():
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=PATIENCE)[1]
+    assert (process.returncode, f"continue with: ddenv isolate {tmp_path / 'two.ddenv'}" in said) == (130, True)
+    twice = json.loads(ddenv("isolate", tmp_path / "two.ddenv", "--json", "--jobs", "2").stdout)["nearest"]
+    assert (twice["gone"], twice["words"]) == (once["gone"], once["words"])
