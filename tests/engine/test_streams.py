@@ -133,4 +133,6 @@ def test_the_run_that_passes_is_one_in_the_nearest_world_that_does(tmp_path):
         assert list(chosen) == ["whole", "left", "passing"]
         test = run.state.tests[chosen["passing"] - 1]
         assert (test.outcome, test.removal) == ("pass", removal)
+        if removal is not None:
+            assert run.state.tests[chosen["whole"] - 1].seed == test.seed
         run.close()

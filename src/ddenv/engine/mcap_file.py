@@ -21,7 +21,7 @@ from ddenv.robot.result import Progress
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
-from ddenv.runs.reasons import GOAL, reasons
+from ddenv.runs.reasons import GOAL, F, reasons
 from ddenv.world.files.access import write_file
 
 
@@ -67,16 +67,19 @@ def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:
     """Names and tests: one that shows f, the last one of what is left, and one that reaches its goal.
 
-    That is in the nearest world that passes, where it is known, else in what is left without a model of it.
+    That is in the nearest world that passes, where it is known, and then the first one has its seed; else in what is left
+    without a model of it.
     """
     state = fold(file.events())
+    passes = nearest(file, state)
+    pair = None if passes is None else passes.parting
     if state.f_test is not None:
-        yield "whole", state.f_test.id
+        alike = pair is not None and state.tests[pair.with_test - 1].outcome == F
+        yield "whole", pair.with_test if alike and pair is not None else state.f_test.id
     if state.evidence_test is not None:
         yield "left", state.evidence_test
-    passes = nearest(file, state)
-    if passes is not None and passes.parting is not None:
-        yield "passing", passes.parting.without_test
+    if pair is not None:
+        yield "passing", pair.without_test
         return
     found = () if current(state) is None else reasons(file, state)
     passing = (each.parting for each in found if each.parting and each.ends[0].kind == GOAL)
