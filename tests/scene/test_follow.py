@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
-from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, pose_at, replay_time, shot, shot_of
+from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, replay_time, shot, shot_of
 
 
 def live(test: int, slot: int = 0) -> Live:
@@ -169,26 +167,6 @@ def test_a_replay_pauses_at_its_end_and_begins_again():
     assert replay_time(1.0, length) == pytest.approx(SPEED)
     assert replay_time(length / SPEED + PAUSE / 2, length) == length
     assert replay_time(length / SPEED + PAUSE + 1.0, length) == pytest.approx(SPEED)
-
-
-def turn(yaw: float) -> list[float]:
-    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
-
-
-def test_poses_between_rows():
-    rows = np.array([[0.0, 0, 0, 0, *turn(0.0)], [2.0, 4, 0, 0, *(-part for part in turn(1.0))]])
-    assert pose_at(rows, 1.0).position == pytest.approx((2, 0, 0))
-    assert pose_at(rows, 1.0).yaw() == pytest.approx(0.5)
-    assert pose_at(rows, -1.0).position == pytest.approx((0, 0, 0))
-    assert pose_at(rows, 9.0).position == pytest.approx((4, 0, 0))
-    assert pose_at(rows[:1], 1.0).position == (0, 0, 0)
-
-
-@given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.floats(0, 1))
-def test_rotations_stay_of_unit_length(quaternion, part):
-    rows = np.array([[0.0, 0, 0, 0, *turn(0.3)], [1.0, 0, 0, 0, *quaternion]])
-    length = math.hypot(*pose_at(rows, part).quaternion)
-    assert length == pytest.approx(1.0) or length == 0.0
 
 
 def test_live_pose():

@@ -17,8 +17,9 @@ from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
 from ddenv.scene.draw import Scenery, circle, flag, mark
-from ddenv.scene.shot import Shot, live_pose, pose_at, replay_time, shot, shot_of
+from ddenv.scene.shot import Shot, live_pose, replay_time, shot, shot_of
 from ddenv.scene.stage import Stage
+from ddenv.world.motion import pose_at
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Goal, Spawn
 

@@ -1,16 +1,15 @@
-"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, and from time to poses."""
+"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, and the time of a replay."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.store import Live
 from ddenv.runfile.tested import Purpose, purpose
+from ddenv.world.motion import pose_of
 from ddenv.world.pose import Pose
 
 SPEED = 4.0  # of a replay, relative to real time
@@ -101,27 +100,6 @@ def replay_time(elapsed: float, length: float) -> float:
     return min(length, elapsed % (length / SPEED + PAUSE) * SPEED)
 
 
-def pose_at(samples: np.ndarray, time: float) -> Pose:
-    """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
-    after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
-    if len(samples) == 1:
-        return _pose(samples[0, 1:])
-    first, second = samples[after - 1], samples[after]
-    span = second[0] - first[0]
-    part = float(np.clip((time - first[0]) / span, 0.0, 1.0)) if span > 0 else 1.0
-    # Of the two quaternions of a rotation, the one on the same side gives the shorter path.
-    sign = -1.0 if first[4:] @ second[4:] < 0 else 1.0
-    quaternion = (1 - part) * first[4:] + part * sign * second[4:]
-    return _pose(np.concatenate([(1 - part) * first[1:4] + part * second[1:4], quaternion]))
-
-
-def _pose(values: Iterable[float]) -> Pose:
-    x, y, z, *quaternion = map(float, values)
-    length = math.hypot(*quaternion) or 1.0
-    w, i, j, k = (part / length for part in quaternion)
-    return Pose((x, y, z), (w, i, j, k))
-
-
 def live_pose(row: Live) -> Pose:
     """The robot's pose in a running test."""
-    return _pose(row.pose)
+    return pose_of(row.pose)
