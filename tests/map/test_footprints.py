@@ -1,5 +1,7 @@
 """Outlines of shapes seen from above."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -62,3 +64,12 @@ def test_a_model_without_shapes_is_a_point():
     assert seen.polygons == ()
     assert seen.center == (4, 5)
     assert seen.area == 0
+
+
+def test_a_model_that_moved_and_tipped_over_covers_what_it_lies_on():
+    upright = Pose((1.0, 0.0, 1.0))
+    link = Link("link", upright, None, (Collision("post", Box((0.2, 0.2, 2.0)), upright, 1.0),), ())
+    model = Model("post", upright, False, (link,), (), (), 1)
+    there = Pose.from_rpy(4.0, 0.0, 0.1, 0.0, math.pi / 2, 0.0)
+    moved = footprint(model, moved=there @ model.links[0].pose.inverse())
+    assert (*moved.low, *moved.high) == pytest.approx((3.0, -0.1, 5.0, 0.1), abs=1e-6)

@@ -111,7 +111,7 @@ async def test_models_are_pinned_and_tried_by_the_map_or_by_name(run):
             ("try", {"models": [1, 2, 3]}),
         ]
         assert "try 4: 2 models, only crate_00, crate_04" in session.said()
-        world.clear_selection()
+        world.select(())
         await session.press("2", "w")
         await session.press("tab", "down", "tab", "enter")
         assert session.asked() == [("try", {"models": [2, 3, 4]})]

@@ -24,7 +24,7 @@ from ddenv.world.model import (
     World,
     is_ground,
 )
-from ddenv.world.pose import Pose, Vector, vector
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # Corners of the polygon that stands for a circle on a character map.
 ROUND = 12
@@ -67,17 +67,21 @@ def footprints(world: World, corners: int = ROUND) -> tuple[Footprint, ...]:
     return tuple(sorted(prints, key=lambda each: -each.area))
 
 
-def footprint(model: Model, corners: int = ROUND) -> Footprint:
-    """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners."""
-    outlines = [_outline(each, corners) for each in model.collisions if not isinstance(each.shape, Plane)]
+def footprint(model: Model, corners: int = ROUND, moved: Pose = HERE) -> Footprint:
+    """The footprint of `model`; a point without collision shapes. Circles become polygons with `corners` corners.
+
+    `moved` is how the model has moved as a whole since the world's file, in the world frame.
+    """
+    outlines = [_outline(each, corners, moved) for each in model.collisions if not isinstance(each.shape, Plane)]
     polygons = tuple(outline for outline in outlines if len(outline))
-    points = np.vstack(polygons) if polygons else np.array([model.pose.position[:2]])
+    points = np.vstack(polygons) if polygons else np.array([(moved @ model.pose).position[:2]])
     low, high = points.min(axis=0), points.max(axis=0)
     return Footprint(model.name, polygons, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
 
 
-def _outline(collision: Collision, corners: int) -> np.ndarray:
-    return convex_hull(_points(collision.shape, collision.pose, corners) + collision.pose.position[:2])
+def _outline(collision: Collision, corners: int, moved: Pose) -> np.ndarray:
+    pose = moved @ collision.pose
+    return convex_hull(_points(collision.shape, pose, corners) + pose.position[:2])
 
 
 def _points(shape: Shape, pose: Pose, corners: int) -> np.ndarray:

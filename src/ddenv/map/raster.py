@@ -24,7 +24,7 @@ SHORT = 3
 EMPTY = -1  # the owner of a pixel without a model
 # The bit of a braille glyph (U+2800 + bits) for the dot at [row, column] of its 4 x 2 grid.
 DOTS = (0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80)
-ARROWS = "→↗↑↖←↙↓↘"
+ARROWS, HOLLOW = "→↗↑↖←↙↓↘", "⇒⇗⇑⇖⇐⇙⇓⇘"
 # Limits of the scale, m per pixel.
 FINEST, COARSEST = 0.002, 1e6
 MOST_PIXELS = 2_000_000  # painted at a time
@@ -372,9 +372,9 @@ def _floored(dots: np.ndarray) -> np.ndarray:
     return whole
 
 
-def arrow(yaw: float) -> str:
+def arrow(yaw: float, signs: str = ARROWS) -> str:
     """The arrow nearest to a heading, rad, 0 along x."""
-    return ARROWS[round(yaw / (math.pi / 4)) % 8]
+    return signs[round(yaw / (math.pi / 4)) % 8]
 
 
 def heading(quaternion: Sequence[float]) -> float:

@@ -66,7 +66,8 @@ class Parting:
 class Reason:
     """What happens without the model `without` and what rests on it, all of `gone`.
 
-    `ends` are those of the `runs` fresh runs, the most frequent one first. `parting` is None where no pair of runs shows it.
+    `ends` are those of the `runs` fresh runs, the most frequent one first. `parting` is None where no pair of runs shows it;
+    `lacks` says why, if the run file does not have what it takes.
     """
 
     without: str
@@ -74,12 +75,13 @@ class Reason:
     runs: int
     ends: tuple[End, ...]
     parting: Parting | None
+    lacks: str = ""
 
 
 def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
     """A reason for each model that the current certificate left out.
 
-    Raises UserError where there is none, or where trajectories are damaged.
+    Raises UserError where there is none.
     """
     certificate = current(state)
     if certificate is None:
@@ -106,7 +108,10 @@ def _reason(
     gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
     pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == ends[0].kind != F)
     pair = next(pairs, None)
-    return Reason(name, gone, len(mine), ends, None if pair is None else _parting(file, *pair, gone))
+    try:
+        return Reason(name, gone, len(mine), ends, None if pair is None else _parting(file, *pair, gone))
+    except UserError as error:
+        return Reason(name, gone, len(mine), ends, None, str(error))
 
 
 def _kind(test: Test) -> str:
@@ -182,7 +187,7 @@ def parting_sentence(reason: Reason) -> str:
     """Where the ways with and without the models part, in one or two sentences; "" if no pair of runs shows it."""
     one = reason.parting
     if one is None:
-        return ""
+        return f"Where the ways part is not known: {reason.lacks}." if reason.lacks else ""
     it = "it" if len(reason.gone) == 1 else "one of them"
     met = (
         ""

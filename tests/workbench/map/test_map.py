@@ -108,7 +108,7 @@ async def test_enter_selects_the_model_under_the_crosshair_and_again_no_longer(b
         assert "* selected" in world.legend(80).plain
         await pilot.press("enter")
         assert pilot.app.selections[-1] == {"crate_03"}
-        world.clear_selection()
+        world.select(())
         assert world.selection == frozenset()
 
 

@@ -14,7 +14,7 @@ from textual.widgets import Static
 
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches
-from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
+from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS, OF_WAYS
 from ddenv.workbench.wording import CLAIM, DROPS, OUTCOME, STATUS, VERDICT
 
 Signs = tuple[tuple[str, str], ...]
@@ -24,6 +24,13 @@ def signs() -> dict[str, Signs]:
     """(sign, meaning) by where they stand."""
     return {
         "On the map": (*MORE_SIGNS[:1], ("a b", "not in the candidate that is shown"), *MORE_SIGNS[1:], *LEGEND),
+        "On the map of tests played back": (*OF_WAYS, ("a", "in one of the two only")),
+        "On the time of a test": (
+            ("●", "the instant that is shown"),
+            ("┤", "its end"),
+            ("▾", "touches a model"),
+            OF_WAYS[-1],
+        ),
         "How a test ended": (*_split(OUTCOME), ("▶", "it runs")),
         "Verdicts of candidates": (*_split(VERDICT), (DROPS, "it drops a model that rests on one that is gone")),
         "Verdicts of a certificate": _joined(CLAIM),

@@ -191,7 +191,7 @@ class TryScreen(Screen[None]):
             self._say(str(error))
             return
         self._asked = False
-        self._map.clear_selection()
+        self._map.select(())
         self._keep(self.attempt)
         self._show()
 

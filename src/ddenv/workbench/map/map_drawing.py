@@ -15,9 +15,9 @@ from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
 from ddenv.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
-from ddenv.workbench.map.map_words import sensed_order
+from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
-from ddenv.workbench.map.picture import Line, Mark, Picture, Seen, crosshair, follow, picture, robots, seen
+from ddenv.workbench.map.picture import Line, Mark, Picture, Seen, crosshair, follow, picture, riders, robots, seen
 from ddenv.workbench.map.place import Point, Shown
 from ddenv.workbench.run.poll import Snapshot
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     pass
 
 T = TypeVar("T")
-# Dots of the original path, and of the gaps in it.
+# Dots of the original path, or of the second way, and of the gaps in it.
 DASH = 5
 
 
@@ -70,6 +70,7 @@ class MapDrawing:
         """A view of all important places."""
         path = _path(self._evidence, shown.snapshot.evidence)
         points = path[np.isfinite(path).all(axis=1)].tolist()
+        points += [point for way in shown.ways for point in way.points.tolist()]
         points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
         return fit(shown.place.prints, points, columns, rows, margin=0.4)
 
@@ -86,7 +87,10 @@ class MapDrawing:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         still = self._still(shown, view, palette)
         canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
-        robots(canvas, view, still.written, shown.snapshot, trails, palette)
+        if shown.ways:
+            riders(canvas, view, still.written, shown.ways, palette, DASH)
+        else:
+            robots(canvas, view, still.written, shown.snapshot, trails, palette)
         if cursor is not None:
             crosshair(canvas, cursor, still.written, palette)
         return canvas, still
@@ -105,10 +109,14 @@ class MapDrawing:
             lines = [Line(evidence, palette.path)] if "path" in layers else []
             if "original" in layers and not self.same_paths(snapshot):
                 lines.insert(0, Line(original, palette.original, DASH))
+            if shown.ways:
+                both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)
+                lines = [Line(way.points, color, dash) for way, color, dash in both][::-1]
             marks = tuple(_marks(shown, palette))
             return picture(models, how, removed="removed" in layers, lines=lines, marks=marks)
 
-        made_of = (models, how, palette, layers, evidence, original, place, snapshot.state.baseline)
+        ways = (shown.parting, *(way.points for way in shown.ways))
+        made_of = (models, how, palette, layers, evidence, original, place, snapshot.state.baseline, *ways)
         return self._picture.get(made_of, draw)
 
     def _who(self, shown: Shown) -> Kept:
@@ -158,4 +166,5 @@ def _marks(shown: Shown, palette: Palette) -> Iterator[Mark]:
     places = [(shown.start, "S", palette.start), (shown.place.goal, "G", palette.goal)]
     if "failure" in shown.layers:
         places.append((shown.failure, "×", palette.failure))
+    places.append((shown.parting, PARTING, palette.selected))
     return (Mark(point, sign, ground) for point, sign, ground in places if point and np.isfinite(point).all())

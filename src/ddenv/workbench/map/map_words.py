@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -40,6 +40,14 @@ PARTS, SELECTED, PINNED, FALLING, SENSED, NO_PART, FIRST_PATH = MORE_SIGNS = (
     ("a b", "took no part"),
     ("⠒ ⠒", "path of f"),
 )
+# On a map of finished tests.
+PARTING = "≠"
+SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
+    ("⠒", "the first way"),
+    ("⠒ ⠒", "the second way"),
+    ("→ ⇒", "their robots"),
+    (PARTING, "they part"),
+)
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
@@ -59,12 +67,24 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
         FIRST_PATH: "original" in layers and not same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]
+    usual = LEGEND if state.elements else LEGEND[:2]
     text = Text(no_wrap=True, overflow="ellipsis")
-    for sign, meaning in (*signs, *(LEGEND if state.elements else LEGEND[:2])):
+    for sign, meaning in _of_ways(shown) if shown.ways else (*signs, *usual):
         if text.cell_len + len(sign) + len(meaning) + 3 > width:
             break
         text.append(sign, "bold").append(f" {meaning}  ", "dim")
     return text
+
+
+def _of_ways(shown: Shown) -> Iterator[tuple[str, str]]:
+    """The signs of a map of finished tests."""
+    for (sign, _), way in zip((SOLID, DASHED), shown.ways, strict=False):
+        yield sign, way.name
+    if shown.parting is not None:
+        yield PARTED
+    if shown.apart is not None:
+        yield shown.apart
+    yield from (each for each in LEGEND if each[0] in "SG×·#")
 
 
 def sensed_order(state: RunState) -> dict[str, int]:

@@ -14,10 +14,10 @@ from textual.strip import Strip
 from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.paint import NUMBERED, Canvas, readable
-from ddenv.map.raster import Outlines, Spans, View, arrow, braille, heading, owners, spans
+from ddenv.map.raster import ARROWS, HOLLOW, Outlines, Spans, View, arrow, braille, heading, owners, spans
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts
-from ddenv.workbench.map.place import Point
+from ddenv.workbench.map.place import Point, Way
 from ddenv.workbench.run.poll import Snapshot
 
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
@@ -147,6 +147,19 @@ def robots(
     for live in snapshot.live:
         color = colors[live.test]
         canvas.put(view.cell(live.pose[0], live.pose[1]), arrow(heading(live.pose[3:])), readable(color), color)
+
+
+def riders(canvas: Canvas, view: View, written: np.ndarray, ways: Sequence[Way], palette: Palette, dash: int) -> None:
+    """The robots on one or two ways, the first one as an arrow, the second one below it as a hollow arrow; behind each its path."""
+    both = list(zip(ways, (palette.live, palette.dull), (ARROWS, HOLLOW), (0, dash), strict=False))
+    for way, color, _, gap in reversed(both):
+        bits = braille(way.points[: way.gone], view, gap)
+        bits[written] = 0
+        canvas.dots(bits, color)
+    for way, color, signs, _ in reversed(both):
+        if way.robot is not None:
+            x, y, yaw = way.robot
+            canvas.put(view.cell(x, y), arrow(yaw, signs), readable(color), color)
 
 
 def crosshair(canvas: Canvas, cell: Cell, written: np.ndarray, palette: Palette) -> None:

@@ -11,9 +11,11 @@ from ddenv.workbench.run.observed import Busy, Observed
 from ddenv.workbench.run.poll import Snapshot
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ddenv.map.footprints import Footprint
     from ddenv.runfile.state import Candidate, Trial
-    from ddenv.world.model import World
+    from ddenv.world.model import Model, World
     from ddenv.world.scenario import Scenario
 
 # The layers of the map, which can be hidden.
@@ -27,20 +29,36 @@ PATIENCE = 10.0
 class Place:
     """What the map shows besides the run, in m: where the robot starts (x, y, yaw), its goal and the models.
 
-    `elements` are the names of the models that may be removed.
+    `elements` are the names of the models that may be removed, `movable` the models that can move, by name.
     """
 
     prints: tuple[Footprint, ...] = ()
     spawn: tuple[float, float, float] | None = None
     goal: Point | None = None
     elements: frozenset[str] = frozenset()
+    movable: dict[str, Model] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """The robot's way in a finished test, `points` (N, 2) m, which the legend calls `name`.
+
+    The robot is now at `robot`, x, y m and yaw rad, and came through the first `gone` points; without it only the way is shown.
+    """
+
+    name: str
+    points: np.ndarray
+    robot: tuple[float, float, float] | None = None
+    gone: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
     """All that a map shows: a world, the current state of its run, and the `candidate` whose models stand out.
 
-    `layers` are from LAYERS; `selection` are the names of the models that the user selected.
+    `layers` are from LAYERS; `selection` are the names of the models that the user selected. With `ways`, one or two, these are
+    shown in place of the run's own paths; they part at `parting`, m. `apart` are the sign and the words of the
+    models that are not in both, for the legend.
     """
 
     place: Place = field(default_factory=Place)
@@ -48,6 +66,9 @@ class Shown:
     candidate: Candidate | Trial | None = None
     layers: frozenset[str] = frozenset(LAYERS) - {"sensed", "took part"}
     selection: frozenset[str] = frozenset()
+    ways: tuple[Way, ...] = ()
+    parting: Point | None = None
+    apart: tuple[str, str] | None = None
 
     @property
     def start(self) -> Point | None:
@@ -66,7 +87,8 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
     from ddenv.map.footprints import footprints
 
     protected = frozenset(scenario.protected) if scenario else frozenset()
-    place = Place(footprints(world), elements=frozenset(world.elements(protected)))
+    movable = {model.name: model for model in world.models if not model.static}
+    place = Place(footprints(world), elements=frozenset(world.elements(protected)), movable=movable)
     if scenario is None:
         return place
     spawn, goal = scenario.robot.spawn, scenario.goal

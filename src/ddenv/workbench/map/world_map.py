@@ -22,12 +22,13 @@ from ddenv.workbench.map.map_colors import Palette, palette_of
 from ddenv.workbench.map.map_drawing import MapDrawing
 from ddenv.workbench.map.map_words import describe, legend
 from ddenv.workbench.map.picture import Picture, strip
-from ddenv.workbench.map.place import Place, Point, Shown
+from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
+    from ddenv.map.footprints import Footprint
     from ddenv.runfile.state import Candidate, Trial
 
 # One step of the wheel zooms by this factor.
@@ -159,6 +160,16 @@ class WorldMap(Widget, can_focus=True):
         else:
             self.draw()
 
+    def show_ways(
+        self, ways: tuple[Way, ...], parting: Point | None, apart: tuple[str, str] | None, prints: tuple[Footprint, ...]
+    ) -> None:
+        """Shows finished tests in place of the run's own paths (see `Shown`), and the models at `prints`."""
+        known = [way.points for way in self.shown.ways]
+        place = self.place if prints is self.place.prints else replace(self.place, prints=prints)
+        self.shown = replace(self.shown, place=place, ways=ways, parting=parting, apart=apart)
+        same = len(known) == len(ways) and all(way.points is old for way, old in zip(ways, known, strict=True))
+        self.draw() if same or not self.viewport.fitted else self._refit()
+
     def toggle_layer(self, name: str) -> None:
         """Shows one of `LAYERS`, or hides it."""
         self.shown = replace(self.shown, layers=self.shown_layers ^ {name})
@@ -211,10 +222,6 @@ class WorldMap(Widget, can_focus=True):
             self.post_message(self.SelectionChanged(selection))
             self.draw()
 
-    def clear_selection(self) -> None:
-        """Clears the selection."""
-        self.select(())
-
     def action_neighbour(self, step: int) -> None:
         """The model before or after the one under the crosshair, in the order of the world."""
         state = self.snapshot.state
@@ -231,7 +238,7 @@ class WorldMap(Widget, can_focus=True):
         name, state, port = self.model_at_cursor, self.snapshot.state, self.viewport
         if self._picking and port.view is not None:
             self.post_message(self.PlacePicked(*(round(value, 3) for value in port.view.point(port.cursor))))
-        elif name is None or not state.elements:
+        elif name is None or not state.elements or self.shown.ways:
             return
         elif name in state.environment:
             self.select(self.selection ^ {name})

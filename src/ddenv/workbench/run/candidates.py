@@ -19,7 +19,7 @@ from textual.strip import Strip
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.words import first_of
-from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Listed, Words, fitting, listed, words
+from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 
@@ -86,8 +86,13 @@ class Candidates(ScrollView, can_focus=True, inherit_bindings=False):
         return len(self._listed)
 
     @property
+    def item(self) -> Item | None:
+        """What the row under the cursor is about, also in the tables of the baseline and of a certificate."""
+        return self._listed.item(self.cursor_row)
+
+    @property
     def under_cursor(self) -> Candidate | Trial | None:
-        item = self._listed.item(self.cursor_row)
+        item = self.item
         return None if isinstance(item, Test | FreshRuns) else item
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 from rich.text import Text
@@ -27,18 +28,19 @@ class FactsDialog(ModalScreen[None]):
     BINDINGS: ClassVar = [
         Binding("left", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
         Binding("right", "step(1)", "next test", id="facts.next", tooltip="the next test"),
+        Binding("p,P", "play", "play", id="facts.play", tooltip="play this test back on the map"),
         Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
         Binding("escape,i,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
     ]
 
-    def __init__(self, position: Position, test: int, run: str) -> None:
-        """`run` is what a shell calls the run."""
+    def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:
+        """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
         super().__init__()
-        self._position, self._test, self._run = position, test, run
+        self._position, self._test, self._run, self._play = position, test, run, play
         self._facts: Facts | None = None
 
     def compose(self) -> ComposeResult:
-        hints = "← → other tests   c copies the command   escape closes"
+        hints = "← → other tests   p plays it   c copies the command   escape closes"
         with Framed("", hints, classes="dialog reading"), VerticalScroll():
             yield Static("", id="facts", markup=False)
 
@@ -59,6 +61,10 @@ class FactsDialog(ModalScreen[None]):
 
     def action_step(self, by: int) -> None:
         self._show(self._test + by)
+
+    def action_play(self) -> None:
+        if why := self._play(self._test):
+            self.query_one(Framed).say(plain(why))
 
     def action_copy(self) -> None:
         if self._facts is not None:

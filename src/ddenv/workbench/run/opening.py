@@ -9,19 +9,22 @@ from typing import Any
 from rich.text import Text
 from textual.screen import Screen
 
+from ddenv.errors import UserError
 from ddenv.guiding.course import GoBack
 from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
-from ddenv.guiding.situation import Row
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import RunState
 from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
 from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.processes import Scene
+from ddenv.workbench.run.tests_of_row import of_row
 from ddenv.workbench.wording import attach_name
 
 
@@ -83,18 +86,55 @@ class Opening:
         dialog = Rounds(tuple(position.chapters), position.at)
         self._screen.app.push_screen(dialog, lambda chapter: then(chapter.last) if chapter else None)
 
-    def facts(self, position: Position, row: Row | None) -> None:
-        """Shows the raw facts of the last test of a row that showed f, or of its last one, or of the last one of all."""
+    def facts(self, position: Position, item: Item | None) -> None:
+        """Shows the raw facts of the test that tells most of a row, or of the last one of all."""
         from ddenv.workbench.run.facts_dialog import FactsDialog
 
-        tests = position.now.tests
-        if not tests:
+        test, _ = of_row(position.now, item)
+        if test is None:
             self._asking.refuse("there are no tests yet")
             return
-        mine = [id for id in row.tests if 0 < id <= len(tests)] if row is not None else []
-        similar = [id for id in mine if tests[id - 1].outcome == "similar"]
-        test = (similar or mine or [len(tests)])[-1]
-        self._screen.app.push_screen(FactsDialog(position, test, attach_name(self._poll.path)))
+        self._screen.app.push_screen(
+            FactsDialog(position, test, attach_name(self._poll.path), lambda number: self._play(position, number))
+        )
+
+    def play(self, position: Position, item: Item | None) -> None:
+        """Plays back the finished test that tells most of a row; of a certificate's row without a model, the one with it, too."""
+        test, beside = of_row(position.now, item, finished=True)
+        if test is None:
+            self._asking.refuse("no test is finished yet: only a finished test can be played back")
+        elif why := self._play(position, test, beside):
+            self._asking.refuse(why)
+
+    def _play(self, position: Position, test: int, beside: int | None = None) -> str:
+        """Returns why a test cannot be played back, or ""."""
+        from ddenv.workbench.playback.playback_screen import Playback
+
+        try:
+            self._screen.app.push_screen(Playback(self._poll.file, position, self._world.place, test, beside))
+        except UserError as error:
+            return str(error)
+        return ""
+
+    def why(self, position: Position) -> None:
+        """Shows what happens without each model that is left."""
+        from ddenv.workbench.why.why_screen import WhyScreen
+
+        def look() -> tuple[RunState, bool]:
+            return position.now, self._poll.snapshot.engine != "absent"
+
+        self._screen.app.push_screen(WhyScreen(self._poll.file, position, self._world.place, look))
+
+    def open(self, what: str) -> None:
+        """A dialog or another screen, by its name in the keys."""
+        {
+            "signs": self.signs,
+            "history": self.history,
+            "failures": self.failures,
+            "export": self.export,
+            "method": self.method,
+            "scene": self.scene,
+        }[what]()
 
     def signs(self) -> None:
         """Shows what the signs mean."""

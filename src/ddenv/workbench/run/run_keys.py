@@ -69,7 +69,7 @@ _KEYS = [
     ),
     Binding(
         "h",
-        "history",
+        "open('history')",
         "history",
         id="run.history",
         tooltip="history: the tree of reductions; go back to any, branch from there, compare two",
@@ -83,10 +83,17 @@ _KEYS = [
     ),
     Binding(
         "E",
-        "export",
+        "open('export')",
         "export",
         id="run.export",
         tooltip="export: the world that is left, a scenario that runs it, the report",
+    ),
+    Binding(
+        "W",
+        "why",
+        "why",
+        id="run.why",
+        tooltip="why the robot fails: what happens without each model that is left, in words and on the map",
     ),
     Binding("question_mark,f1", "app.help", "help", id="run.help", tooltip="show every key", key_display="?"),
     Binding("q", "quit", "quit", id="run.quit", tooltip="leave; asks whether to stop the engine"),
@@ -94,7 +101,7 @@ _KEYS = [
     _hidden("t", "guide('mode')", "ask", "run.mode", "accept reductions automatically, or ask before each one"),
     _hidden(
         "f",
-        "failures",
+        "open('failures')",
         "failures",
         "run.failures",
         "other failures that the tests met: each with its smallest environment; reduce one in a branch",
@@ -102,8 +109,8 @@ _KEYS = [
     _hidden("slash", "find", "find", "run.find", "find a model by its name, and show it on the map", "/"),
     _hidden("l", "layers", "layers", "run.layers", "choose what the map shows"),
     _hidden("y", "copy", "copy", "run.copy", "copy the names of the models left, or the command to come back"),
-    _hidden("m", "scene", "scene", "run.scene", "start the 3-D scene and show its address"),
-    _hidden("e", "method", "explain", "run.method", "explain how this run is reduced"),
+    _hidden("m", "open('scene')", "scene", "run.scene", "start the 3-D scene and show its address"),
+    _hidden("e", "open('method')", "explain", "run.method", "explain how this run is reduced"),
     _hidden("1", "pane('map')", "map", "run.map", "the map"),
     _hidden("2", "pane('round')", "round", "run.table", "the table of candidates and tries"),
     _hidden("3", "pane('chart')", "chart", "run.chart", "the chart of models left by test"),
@@ -153,7 +160,8 @@ _KEYS = [
     _hidden("right_curly_bracket", "browse('reduction', 1)", "", "run.next_reduction", "to the next reduction", "}"),
     _hidden("b", "rounds", "rounds", "run.rounds", "the list of all rounds so far: go to the end of any"),
     _hidden("i", "facts", "facts", "run.facts", "the raw facts of a test, and the command that makes it again"),
-    _hidden("k", "signs", "signs", "run.signs", "what the signs and letters on this screen mean"),
+    _hidden("P", "play", "play", "run.play", "play a finished test of the row under the cursor back on the map"),
+    _hidden("k", "open('signs')", "signs", "run.signs", "what the signs and letters on this screen mean"),
     _hidden("r", "guide('resume')", "resume", "run.resume", "start the engine again"),
     _hidden("R", "app.runs", "runs", "run.runs", "the list of all runs"),
     _hidden("d", "detach", "detach", "run.detach", "leave the workbench; the engine goes on"),
@@ -163,7 +171,17 @@ KEYS: list[BindingType] = [*_KEYS]
 GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
 GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
 # The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = ("run.signs", "run.facts", "run.rounds", "run.find", "run.layers", "run.copy", "run.scene", "run.runs")
+MORE = (
+    "run.signs",
+    "run.facts",
+    "run.play",
+    "run.rounds",
+    "run.find",
+    "run.layers",
+    "run.copy",
+    "run.scene",
+    "run.runs",
+)
 SHOWN = tuple(
     id
     for binding in _KEYS
@@ -183,6 +201,7 @@ FIRST = (
     "run.undo",
     "run.history",
     "run.export",
+    "run.why",
     "run.change",
     "run.only",
     *MORE,
@@ -190,7 +209,7 @@ FIRST = (
 # While an earlier moment is shown, and while the map has the focus.
 BROWSING = (
     *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
-    *("run.quit", "run.signs"),
+    *("run.quit", "run.play", "run.signs"),
 )
 ON_MAP = (
     *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
@@ -202,6 +221,8 @@ LOOKING = (
         "run.history",
         "run.rounds",
         "run.facts",
+        "run.play",
+        "run.why",
         "run.export",
         "run.find",
         "run.copy",

@@ -297,17 +297,17 @@ class RunScreen(Screen[None]):
 
     # Dialogs and other screens.
 
+    def action_open(self, what: str) -> None:
+        self._opening.open(what)
+
     def action_facts(self) -> None:
-        self._opening.facts(self.browsing.position, self._table.under_cursor)
+        self._opening.facts(self.browsing.position, self._table.item)
 
-    def action_signs(self) -> None:
-        self._opening.signs()
+    def action_play(self) -> None:
+        self._opening.play(self.browsing.position, self._table.item)
 
-    def action_history(self) -> None:
-        self._opening.history()
-
-    def action_failures(self) -> None:
-        self._opening.failures()
+    def action_why(self) -> None:
+        self._opening.why(self.browsing.position)
 
     def action_find(self) -> None:
         names = [each.name for each in self._map.place.prints]
@@ -318,15 +318,6 @@ class RunScreen(Screen[None]):
 
     def action_copy(self) -> None:
         self._opening.copy(self._keys.pointed.models)
-
-    def action_export(self) -> None:
-        self._opening.export()
-
-    def action_method(self) -> None:
-        self._opening.method()
-
-    def action_scene(self) -> None:
-        self._opening.scene()
 
     def action_detach(self) -> None:
         self._opening.detach()
@@ -382,7 +373,7 @@ class RunScreen(Screen[None]):
         if self.browsing.is_past:
             self._browse(lambda: self.browsing.go(None))
             return
-        self._map.clear_selection()
+        self._map.select(())
         self._table.follow()
         self._table.show(self.snapshot)
 

@@ -1,0 +1,123 @@
+"""A finished test as it is played back: where the robot and the models that moved were at any instant, from the run file alone."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ddenv.errors import UserError
+from ddenv.runfile.position import Position
+from ddenv.runfile.state import Test
+from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
+from ddenv.runfile.tested import purpose
+from ddenv.world.motion import pose_at
+from ddenv.world.pose import Pose
+
+# Time between two frames: a run file has a row of each motion so often, s.
+FRAME = 0.1
+# No test lasts longer, s, and nothing goes farther in one, m.
+LONGEST, FARTHEST = 1e6, 1e6
+
+ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's way is stored, and models stay where they start."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """A finished test. `words` say what it was made for; `models` were in it, None if that is known no more.
+
+    `rows` are the robot's, flat rows of `COLUMNS` floats, empty if the run file lacks them; `moving` has those of each model that
+    moved. `lacks` says in sentences what is missing.
+    """
+
+    test: Test
+    words: str
+    models: tuple[str, ...] | None
+    rows: array[float]
+    moving: dict[str, np.ndarray]
+    lacks: tuple[str, ...] = ()
+
+    @property
+    def robot(self) -> np.ndarray:
+        """The robot's rows, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz."""
+        return _table(self.rows)
+
+    @property
+    def length(self) -> float:
+        """How long the test lasted, simulated s."""
+        return self.rows[-COLUMNS] if self.rows else 0.0
+
+    def pose(self, time: float) -> Pose | None:
+        """Where the robot was at simulated `time`, s; None if that is not stored."""
+        return pose_at(self.robot, time) if self.rows else None
+
+
+def played(file: RunFile, position: Position, number: int) -> Played:
+    """The finished test with this number. Raises UserError if there is none; what the file lacks of it is said in `lacks`."""
+    tests = position.end.tests
+    if not 0 < number <= len(tests):
+        raise UserError(f"{file.path}: there is no test {number}")
+    test = tests[number - 1]
+    if not test.is_finished:
+        why = "still runs" if test.outcome == "running" else "was lost"
+        raise UserError(f"test {number} {why}: only a finished test is stored")
+    lacks = [ANOTHER_SIMULATOR] if position.end.scenario.get("oracle") else []
+    try:
+        start = position.start_of(number)
+        made = purpose(position.end if start is None else start.after, test)
+        words, models = made.words, made.models
+    except UserError:
+        words, models = f"test {number}", None
+    if models is None:
+        lacks.append("Which models were in it is not known any more: the map shows what is left.")
+    rows, moving = array("d"), {}
+    for name, samples in _motions(file, number, lacks):
+        if name == ROBOT:
+            rows = samples
+        else:
+            moving[name] = _table(samples)
+    if not rows:
+        lacks.append(f"The run file has no way of the robot in test {number}: nothing moves here.")
+    return Played(test, words, models, rows, moving if rows else {}, tuple(lacks))
+
+
+def _motions(file: RunFile, number: int, lacks: list[str]) -> Iterator[tuple[str, array[float]]]:
+    """The motions that can be played; of the others it is said that they are damaged."""
+    for name, samples in _stored(file, number, lacks).items():
+        if _makes_sense(samples):
+            yield name, samples
+        else:
+            lacks.append(f"The motion of {name or 'the robot'} in test {number} is damaged: it stays where it starts.")
+
+
+def _stored(file: RunFile, number: int, lacks: list[str]) -> dict[str, array[float]]:
+    """All motions; where one of them cannot be read, the robot's alone if that can be."""
+    try:
+        return file.motions(number)
+    except UserError as error:
+        lacks.append(f"{error}.")
+    try:
+        robot = file.motion(number)
+    except UserError:
+        return {}
+    return {} if robot is None else {ROBOT: robot}
+
+
+def _makes_sense(samples: array[float]) -> bool:
+    """Whether these are rows of finite places, whose times grow."""
+    times = samples[::COLUMNS]
+    in_order = all(one <= other for one, other in pairwise(times))
+    return (
+        bool(times)
+        and in_order
+        and times[0] >= 0
+        and times[-1] <= LONGEST
+        and all(-FARTHEST <= value <= FARTHEST for value in samples)
+    )
+
+
+def _table(samples: array[float]) -> np.ndarray:
+    return np.frombuffer(samples, dtype=float).reshape(-1, COLUMNS) if samples else np.zeros((0, COLUMNS))

@@ -1,0 +1,1 @@
+"""A finished test played back on the map, alone or over another one."""

@@ -1,0 +1,76 @@
+"""What the robot meets in the tests that are played back, up to the instant that is shown and after it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from rich.text import Text
+from textual.widget import Widget
+
+from ddenv.map.names import shortened
+from ddenv.runfile.state import Test
+from ddenv.workbench.playback.timeline import ROBOTS
+from ddenv.workbench.run.facts import log
+from ddenv.workbench.wording import plain
+
+HERE = "▸"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """At `time`, simulated s, `words` happened in the test with this sign."""
+
+    time: float
+    sign: str
+    words: str
+
+
+def lines_of(tests: tuple[Test, ...]) -> list[Line]:
+    """What happened in one or two tests, in order."""
+    signs = ROBOTS if len(tests) > 1 else ("",)
+    found = [Line(at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in log(test)]
+    return sorted(found, key=lambda line: line.time)
+
+
+class Met(Widget):
+    """The lines around the instant; what is still to come is dim. `lacks` stand above them."""
+
+    def __init__(self, *, id: str | None = None) -> None:
+        super().__init__(id=id)
+        self._lines: list[Line] = []
+        self._lacks: tuple[str, ...] = ()
+        self._now = 0
+
+    def put(self, tests: tuple[Test, ...], lacks: tuple[str, ...]) -> None:
+        """Other tests."""
+        self._lines, self._lacks, self._now = lines_of(tests), lacks, 0
+        self.refresh()
+
+    def show(self, time: float) -> None:
+        """Another instant, simulated s."""
+        now = bisect_right(self._lines, time, key=lambda line: line.time)
+        if now != self._now:
+            self._now = now
+            self.refresh()
+
+    def render(self) -> Text:
+        width, height = self.size
+        lacks = Text("\n".join(f"▲ {plain(words)}" for words in self._lacks), "bold")
+        above = lacks.wrap(self.app.console, max(1, width)) if self._lacks else ()
+        text = Text("", no_wrap=True, overflow="ellipsis")
+        for words in above:
+            text.append_text(words).append("\n")
+        room = max(1, height - len(above))
+        # The latest line stands in the middle once there are more than fit.
+        first = max(0, min(self._now - room // 2 - 1, len(self._lines) - room))
+        for number in range(first, min(first + room, len(self._lines))):
+            text.append_text(self._line(number, width)).append("\n")
+        return text
+
+    def _line(self, number: int, width: int) -> Text:
+        line = self._lines[number]
+        here = HERE if number == self._now - 1 else " "
+        head = f"{here}{line.time:6.1f} s {line.sign}{' ' if line.sign else ''}"
+        words = shortened(line.words, max(4, width - len(head)))
+        return Text(f"{head}{words}", "" if number < self._now else "dim", no_wrap=True)

@@ -1,0 +1,83 @@
+"""What a map shows of finished tests: the models where they were at an instant, and the robots' ways."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ddenv.map.footprints import Footprint, footprint
+from ddenv.runfile.events import Names
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.state import Round, RunState, Split, Trial
+from ddenv.runs.playback import Played
+from ddenv.workbench.map.place import Place, Way
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.world.motion import pose_at
+from ddenv.world.pose import Pose
+
+
+class Moving:
+    """The models of a place as they move in a test: only those that have moved since the last call are drawn anew."""
+
+    def __init__(self, place: Place, one: Played) -> None:
+        self._prints = place.prints
+        numbers = {each.name: number for number, each in enumerate(place.prints)}
+        self._motions = [
+            (numbers[name], place.movable[name], samples)
+            for name, samples in one.moving.items()
+            if name in numbers and name in place.movable
+        ]
+        self._poses: dict[int, Pose] = {}
+
+    def at(self, time: float) -> tuple[Footprint, ...]:
+        """The footprints of all models at simulated `time`, s; the same object if nothing has moved."""
+        changed: dict[int, Footprint] = {}
+        for number, model, samples in self._motions:
+            pose = pose_at(samples, time)
+            if pose != self._poses.get(number):
+                self._poses[number] = pose
+                changed[number] = footprint(model, moved=pose @ model.links[0].pose.inverse())
+        if changed:
+            self._prints = tuple(changed.get(number, each) for number, each in enumerate(self._prints))
+        return self._prints
+
+
+class RobotWay:
+    """The robot's way in a test, made once, for any instant of it."""
+
+    def __init__(self, one: Played, name: str) -> None:
+        self._one, self._name = one, name
+        self._rows = one.robot
+        self.points = np.ascontiguousarray(self._rows[:, 1:3])
+
+    @property
+    def whole(self) -> Way:
+        """The way without a robot on it."""
+        return Way(self._name, self.points)
+
+    def at(self, time: float) -> Way:
+        """The way with the robot where it was at simulated `time`, s."""
+        pose = self._one.pose(time)
+        if pose is None:
+            return self.whole
+        gone = int(np.searchsorted(self._rows[:, 0], time, side="right"))
+        return Way(self._name, self.points, (*pose.position[:2], pose.yaw()), gone)
+
+    def place(self, time: float) -> tuple[float, float] | None:
+        """Where the robot was at simulated `time`, s: x, y m."""
+        pose = self._one.pose(time)
+        return None if pose is None else pose.position[:2]
+
+
+def snapshot_with(state: RunState, there: Names, groups: tuple[Names, ...]) -> Snapshot:
+    """The run as if these models were its environment, and these `groups` the parts of its round, each with a letter."""
+    round = Round(0, len(groups), Split(there, groups), PersistentTuple()) if groups else None
+    bare = state.changed(environment=there, round=round, trials=(), pinned=frozenset(), supports=())
+    return Snapshot(bare, past=True)
+
+
+def without(there: Names, gone: Iterable[str]) -> Trial:
+    """What the map takes for a candidate: the others of these models stand back, in small letters."""
+    missing = frozenset(gone)
+    return Trial(0, tuple(name for name in there if name not in missing), 0)

@@ -1,0 +1,1 @@
+"""Why the robot fails: what happens without each model that is left."""

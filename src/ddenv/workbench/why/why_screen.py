@@ -1,0 +1,275 @@
+"""Why the robot fails: what happens without each model that is left, in words, with its rates, and on the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.screen import Screen
+from textual.widgets import OptionList, Static
+from textual.widgets.option_list import Option
+
+from ddenv.claims import current
+from ddenv.errors import UserError
+from ddenv.runfile.position import Position
+from ddenv.runfile.progress import Certificate
+from ddenv.runfile.state import RunState, partition_letter
+from ddenv.runfile.store import RunFile
+from ddenv.runs.playback import played
+from ddenv.runs.reasons import Reason, parting_sentence, reasons, sentence
+from ddenv.workbench.background import call_if_open
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.help.signs import SignsDialog
+from ddenv.workbench.map.place import Place, Way, place_of_run
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
+from ddenv.workbench.playback.playback_screen import Playback
+from ddenv.workbench.run.observed import Observed
+from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.why.why_words import head, head_of, nothing_yet, remedy, row, said
+from ddenv.workbench.wording import attach_name, plain
+
+SMALLEST = (64, 18)
+# Time between two looks at the run, s.
+PERIOD = 0.5
+# The maximum number of models in the list.
+LISTED = 200
+
+
+def _ids(names: str) -> tuple[str, ...]:
+    return tuple(f"why.{name}" for name in names.split())
+
+
+SHOWN = _ids("play copy closer farther fit signs help close")
+FIRST = _ids("help close play copy signs closer farther fit")
+
+
+class WhyScreen(Screen[None]):
+    """`look` returns the run as it is shown, and whether an engine works on it; `place` is its world, if it is read already."""
+
+    CSS_PATH = "why.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
+    VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
+    AUTO_FOCUS = "#why-list"
+    BINDINGS: ClassVar = [
+        Binding(
+            "enter",
+            "play",
+            "play both runs",
+            id="why.play",
+            tooltip="play the run with the model and the one without it over each other",
+            priority=True,
+        ),
+        Binding(
+            "c", "copy", "copy", id="why.copy", tooltip="copy all sentences, or the command that is named (OSC 52)"
+        ),
+        Binding("plus,equals_sign", "zoom(1.25)", "closer", id="why.closer", tooltip="map: closer", key_display="+"),
+        Binding("minus", "zoom(0.8)", "farther", id="why.farther", tooltip="map: farther away", key_display="-"),
+        Binding("0", "fit", "fit", id="why.fit", tooltip="map: show all that matters"),
+        Binding("k", "signs", "signs", id="why.signs", tooltip="what the signs and letters on the map mean"),
+        Binding("question_mark,f1", "app.help", "help", id="why.help", tooltip="show every key", key_display="?"),
+        Binding("escape,W,q", "close", "close", id="why.close", tooltip="back to the run", key_display="esc"),
+    ]
+
+    def __init__(
+        self, file: RunFile, position: Position, place: Place, look: Callable[[], tuple[RunState, bool]]
+    ) -> None:
+        super().__init__()
+        self._file, self._position, self._place, self._look_at = file, position, place, look
+        self._seen: tuple[object, ...] = ()
+        self._state = RunState()
+        self._reasons: tuple[Reason, ...] = ()
+        self._snapshot = Snapshot()
+        self.map = WorldMap(id="why-map")
+
+    def compose(self) -> ComposeResult:
+        yield Static("", id="why-header", markup=False)
+        with Horizontal(id="why-body"):
+            with Vertical(id="why-left"):
+                with Framed("Without each model", id="why-models", classes="panel"):
+                    yield Static("", id="why-head", markup=False)
+                    yield OptionList(id="why-list", compact=True, markup=False)
+                with Framed("What happens", id="why-happens", classes="panel"), VerticalScroll(id="why-scroll"):
+                    yield Static("", id="why-said", markup=False)
+            with Framed("World", id="why-world", classes="panel"):
+                yield self.map
+                yield Static("", id="why-legend", markup=False)
+        with VerticalScroll(id="why-nothing"):
+            yield Static("", id="why-empty", markup=False)
+        yield KeyFooter(SHOWN, FIRST)
+        yield Static(f"ddenv needs {SMALLEST[0]} x {SMALLEST[1]}", id="small", markup=False)
+
+    def on_mount(self) -> None:
+        self._look()
+        self.set_interval(PERIOD, self._look)
+        if self._place.prints:
+            self._placed(self._place, "")
+        else:
+            self.call_after_refresh(self._read_world)
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._list)
+
+    @work(thread=True, group="world", exclusive=True)
+    def _read_world(self) -> None:
+        try:
+            place, notice = place_of_run(self._file.path), ""
+        except UserError as error:
+            place, notice = Place(), str(error)
+        call_if_open(self, self._placed, place, notice)
+
+    def _placed(self, place: Place, notice: str) -> None:
+        self._place = place
+        self.map.set_place(place, notice)
+        self._show_reason()
+
+    # What is known.
+
+    def _look(self) -> None:
+        """Reads the reasons again once there is another certificate."""
+        state, works = self._look_at()
+        seen = current(state), works, state.status, state.tests_done if current(state) is None else 0
+        if seen == self._seen:
+            return
+        self._seen, self._state = seen, state
+        self.query_one("#why-header", Static).update(Text(f" {head_of(state)}", no_wrap=True, overflow="ellipsis"))
+        if current(state) is None:
+            self._found((), "")
+        else:
+            self._read(state)
+
+    @work(thread=True, group="reasons", exclusive=True)
+    def _read(self, state: RunState) -> None:
+        """Comparing the ways of many runs takes a while."""
+        try:
+            with Observed(self._file.path) as file:
+                found, trouble = reasons(file, state), ""
+        except UserError as error:
+            found, trouble = (), str(error)
+        call_if_open(self, self._found, found, trouble)
+
+    def _found(self, found: tuple[Reason, ...], trouble: str) -> None:
+        self._reasons = found[:LISTED]
+        self.set_class(not found, "-empty")
+        if not found:
+            _, works = self._look_at()
+            words = trouble or nothing_yet(self._state, works, attach_name(self._file.path))
+            self.query_one("#why-empty", Static).update(Text(plain_lines(words)))
+            return
+        more = f" · the first {LISTED} of {len(found)}" if len(found) > LISTED else ""
+        self.query_one("#why-models").border_title = Text(f"Without each model{more}")
+        groups = tuple(each.gone for each in self._reasons)
+        self._snapshot = snapshot_with(self._state, self._state.environment, groups)
+        self._list()
+
+    @property
+    def _certificate(self) -> Certificate | None:
+        return current(self._state)
+
+    def _list(self) -> None:
+        certificate, options = self._certificate, self.query_one("#why-list", OptionList)
+        if certificate is None or not self._reasons:
+            return
+        claims = {claim.without: claim for claim in certificate.claims}
+        width = max(20, options.size.width - options.styles.scrollbar_size_vertical)
+        at = options.highlighted or 0
+        rows = (row(number, each, claims.get(each.without), width) for number, each in enumerate(self._reasons))
+        options.set_options(Option(words) for words in rows)
+        self.query_one("#why-head", Static).update(head(width))
+        options.highlighted = min(at, len(self._reasons) - 1)
+        self._show_reason()
+
+    # What is shown.
+
+    @property
+    def reason(self) -> Reason | None:
+        """The reason under the cursor."""
+        at = self.query_one("#why-list", OptionList).highlighted
+        return self._reasons[at] if at is not None and at < len(self._reasons) else None
+
+    @on(OptionList.OptionHighlighted)
+    def _show_reason(self) -> None:
+        certificate, one = self._certificate, self.reason
+        if certificate is None or one is None:
+            return
+        claim = next((each for each in certificate.claims if each.without == one.without), None)
+        words = said(one, claim, certificate)
+        ways, lacks = self._ways(one)
+        for line in lacks:
+            words.append(f"\n\n▲ {plain(line)}", "bold")
+        self.query_one("#why-said", Static).update(words)
+        self.query_one("#why-scroll").scroll_home(animate=False)
+        there, letter = self._state.environment, partition_letter(self._reasons.index(one)).lower()
+        self.map.show(self._snapshot, without(there, one.gone))
+        parting = None if one.parting is None else one.parting.place
+        self.map.show_ways(ways, parting, (letter, "left out in one"), self._place.prints)
+        title = "World" if one.parting is None or not ways else f"The two ways, seed {one.parting.seed}"
+        self.query_one("#why-world").border_title = Text(title)
+        legend = self.query_one("#why-legend", Static)
+        legend.update(self.map.legend(legend.size.width))
+
+    def _ways(self, one: Reason) -> tuple[tuple[Way, ...], Sequence[str]]:
+        """The ways of the two runs that are compared, and what the run file lacks of them."""
+        if one.parting is None:
+            return (), ()
+        try:
+            found = [
+                played(self._file, self._position, test) for test in (one.parting.with_test, one.parting.without_test)
+            ]
+        except UserError as error:
+            return (), (str(error),)
+        lacks = dict.fromkeys(line for each in found for line in each.lacks)
+        names = ("with", "without")
+        ways = tuple(RobotWay(each, name).whole for each, name in zip(found, names, strict=True) if each.rows)
+        return (ways if len(ways) == 2 else ()), tuple(lacks)
+
+    # The keys.
+
+    def action_play(self) -> None:
+        one = self.reason
+        if one is None or one.parting is None:
+            self._refuse(
+                "there are no two runs to play: none with the model and one without it have the same seed and other ends"
+            )
+            return
+        try:
+            both = one.parting.with_test, one.parting.without_test
+            self.app.push_screen(Playback(self._file, self._position, self._place, *both))
+        except UserError as error:
+            self._refuse(str(error))
+
+    def action_copy(self) -> None:
+        _, works = self._look_at()
+        command = remedy(self._state, works, attach_name(self._file.path))
+        lines = [f"{sentence(one)} {parting_sentence(one)}".rstrip() for one in self._reasons]
+        if not lines and not command:
+            self._refuse("there is nothing to copy yet")
+            return
+        self.app.copy_to_clipboard("\n".join(map(plain, lines or [command])))
+        self.notify("copied, if the terminal allows it", timeout=3)
+
+    def action_zoom(self, factor: float) -> None:
+        self.map.zoom(factor)
+
+    def action_fit(self) -> None:
+        self.map.fit()
+
+    def action_signs(self) -> None:
+        self.app.push_screen(SignsDialog())
+
+    def action_close(self) -> None:
+        self.dismiss(None)
+
+    def _refuse(self, why: str) -> None:
+        self.notify(plain(why), severity="warning", timeout=4, markup=False)
+
+
+def plain_lines(text: str) -> str:
+    """As `plain`, but lines stay lines."""
+    return "\n".join(map(plain, text.split("\n")))

@@ -1,0 +1,72 @@
+"""The words of the why view: a row for each model that is left, what happens without it, and why there is nothing to show yet."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from ddenv.claims import current, in_the_making, made_of_usual, meaning, rate
+from ddenv.map.names import padded, shortened
+from ddenv.runfile.progress import Certificate, Claim
+from ddenv.runfile.state import RunState, partition_letter
+from ddenv.runs.reasons import Reason, parting_sentence, sentence
+from ddenv.workbench.wording import CLAIM, percent, plain
+
+# The width of a row without the model's name.
+FIGURES = 23
+
+
+def head(width: int) -> Text:
+    """What the columns of `row` are."""
+    return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
+
+
+def row(number: int, reason: Reason, claim: Claim | None, width: int) -> Text:
+    """The letter of a model on the map, its name, how often f shows without it, and the interval of that in %."""
+    name = padded(shortened(reason.without, _name(width)), _name(width))
+    text = Text(f"{partition_letter(number):<3}", "bold", no_wrap=True).append(name, "not bold")
+    if claim is None:
+        return text
+    interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs else ""
+    figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
+    return text.append(figures, "not bold")
+
+
+def _name(width: int) -> int:
+    return max(4, width - FIGURES)
+
+
+def said(reason: Reason, claim: Claim | None, certificate: Certificate) -> Text:
+    """What happens without a model, with the rates, and where the ways part."""
+    text = Text(plain(sentence(reason)), "bold")
+    if claim is not None:
+        text.append(f"\n\n{rate(claim)}; {meaning(claim, certificate)}.", "not bold")
+    parting = plain(parting_sentence(reason))
+    return text.append(f"\n\n{parting}" if parting else "", "not bold")
+
+
+def head_of(state: RunState) -> str:
+    """How often f shows in what is left, for the head of the screen."""
+    certificate = current(state)
+    if certificate is None:
+        return "Why it fails"
+    return f"Why it fails · what is left: {rate(certificate.claims[0])}"
+
+
+def nothing_yet(state: RunState, works: bool, run: str) -> str:
+    """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell calls the run."""
+    shows = "Full runs of what is left, and of that without each of its models, show why it fails: the certificate makes them."
+    making, command = in_the_making(state), remedy(state, works, run)
+    if current(state) is not None:
+        return "Nothing is left that could be left out: there is no model to look at."
+    if command:
+        return f"{shows}\n\nWhat is left has none. Make one, and come back: {command}   (c copies that)"
+    if making is not None:
+        return f"{shows}\n\nIt is being made: {made_of_usual(state, making)}. This page fills by itself."
+    return f"{shows}\n\nIt is made once the search has ended, and this page fills by itself. The search still goes on."
+
+
+def remedy(state: RunState, works: bool, run: str) -> str:
+    """The command by which the run gets a certificate; "" if it needs none, or comes to one by itself."""
+    if current(state) is not None or works:
+        return ""
+    return f"ddenv {'certify' if state.status == 'finished' else 'resume'} {run}"

@@ -1,0 +1,124 @@
+"""The why view: each model that is left, what happens without it, and the robot's ways with and without it on one map."""
+
+import sqlite3
+
+import fake_moments
+import fake_run
+import pytest
+from attached import Attached
+from textual.widgets import OptionList
+
+from ddenv.runfile.store import RunFile
+from ddenv.runs.reasons import parting_sentence, reasons, sentence
+from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.why.why_screen import WhyScreen
+
+
+async def opened(session):
+    await session.press("W")
+    await session.app.workers.wait_for_complete()
+    await session.pilot.pause()
+    screen = session.app.screen
+    assert isinstance(screen, WhyScreen)
+    return screen
+
+
+def words(screen, selector):
+    return str(screen.query_one(selector).render())
+
+
+@pytest.mark.parametrize("watch", [False, True])
+async def test_each_model_has_its_sentence_its_rate_and_its_two_ways(run, watch):
+    fake_moments.finished(run)
+    with RunFile(run.path) as file:
+        known = reasons(file, run.state)
+    async with Attached(run, watch=watch) as session:
+        screen = await opened(session)
+        assert "what is left: f in 23 of 23 fresh runs (86 % to 100 %)" in words(screen, "#why-header")
+        options = screen.query_one(OptionList)
+        for number, one in enumerate(known):
+            row = str(options.get_option_at_index(number).prompt)
+            assert row.split()[:2] == ["AB"[number], one.without]
+            said = words(screen, "#why-said")
+            assert sentence(one) in said and parting_sentence(one) in said
+            assert "fresh runs (" in said and "needed: without it" in said
+            assert [way.name for way in screen.map.shown.ways] == ["with", "without"]
+            assert one.without not in screen.map.candidate.models
+            await session.press("down")
+        await session.press("c")
+        assert session.app.clipboard.splitlines()[0].startswith(sentence(known[0]))
+        await session.press("escape")
+        assert isinstance(session.app.screen, RunScreen)
+        assert session.commands() == []
+
+
+async def test_without_a_certificate_it_says_what_to_do(run):
+    fake_moments.uncertified(run)
+    async with Attached(run, size=(80, 24)) as session:
+        screen = await opened(session)
+        assert "Make one, and come back: ddenv certify crates-1" in words(screen, "#why-empty")
+        await session.press("c", "enter")
+        assert session.app.clipboard == "ddenv certify crates-1"
+        assert "no two runs" in session.said()
+
+
+async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
+    fake_moments.certifying(run).hold()
+    async with Attached(run) as session:
+        screen = await opened(session)
+        assert "It is being made: 16 of usually" in words(screen, "#why-empty")
+        run.certify_all(2, "crate_01", "ppp")
+        run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp"))
+        run.write("finished", minimal=True, reason="no single model can be removed")
+        await session.look()
+        screen._look()
+        await session.app.workers.wait_for_complete()
+        await session.pilot.pause()
+        assert screen.query_one(OptionList).option_count == 2
+
+
+async def test_before_the_search_has_ended_there_is_nothing_to_do(run):
+    fake_moments.mid_round(run).hold()
+    async with Attached(run) as session:
+        assert "The search still goes on" in words(await opened(session), "#why-empty")
+
+
+async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):
+    fake_moments._rounds(run).start_certificate()
+    run.certify_all(2, None, 6 * "s")
+    run.finish_certificate((None, "kept", 6 * "s"))
+    async with Attached(run) as session:
+        assert "Nothing is left that could be left out" in words(await opened(session), "#why-empty")
+
+
+async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):
+    fake_moments.finished(run)
+    with sqlite3.connect(run.path) as database:
+        database.execute("DELETE FROM motion")
+    database.close()
+    async with Attached(run) as session:
+        screen = await opened(session)
+        said = words(screen, "#why-said")
+        assert "Without crate_00 the robot reaches its goal" in said
+        assert "Where the ways part is not known" in said and "has no trajectory" in said
+        await session.press("enter")
+        assert isinstance(session.app.screen, WhyScreen)
+
+
+async def test_stacks_are_left_out_together(runs):
+    data = fake_run.scenario()
+    data["reduction"]["keep_supports"] = True
+    run = fake_run.FakeRun(runs / "crates-1.ddenv", data)
+    run.created().supports(("crate_01", "crate_00"))
+    run.baseline()
+    run.start_round(2)
+    run.reduce(0, run.elements[:6], run.similar(0))
+    run.start_certificate()
+    run.certify_all(1, None, 6 * "s")
+    run.certify_all(1, "crate_00", 4 * "p")
+    run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", 4 * "p"))
+    async with Attached(run) as session:
+        screen = await opened(session)
+        assert "what rests on it (1 model)" in words(screen, "#why-said")
+        assert set(screen.map.candidate.models) == set(run.elements[2:6])
+    run.close()
