@@ -98,6 +98,9 @@ PICTURES = {
     "past": Picture("RunScreen", "An earlier moment of a run"),
     "rounds": Picture("Rounds", "The rounds of a run"),
     "facts": Picture("FactsDialog", "The raw facts of a test"),
+    "why": Picture("WhyScreen", "Why it fails: what happens without each model"),
+    "playback": Picture("Playback", "A test played over another one with the same seed"),
+    "beside": Picture("Beside", "Which test to play beside another one"),
     "signs": Picture("SignsDialog", "What the signs mean"),
     "export": Picture("ExportScreen", "Writing what is left"),
     "runs": Picture("RunsScreen", "The list of runs"),
@@ -146,6 +149,7 @@ async def make_all() -> None:
         await begin(pilot, run)
         await guide(pilot)
         await look_back(pilot)
+        await tell_why(pilot)
         await export(pilot, run)
         await branch(pilot)
     await list_runs()
@@ -290,6 +294,19 @@ async def look_back(pilot: Pilot[int]) -> None:
         await take(pilot, name)
         await press(pilot, "escape")
     await press(pilot, "escape")
+
+
+async def tell_why(pilot: Pilot[int]) -> None:
+    """What happens without a platform, and both of its runs played, a while after they part."""
+    await press(pilot, "W")
+    await drawn(pilot)
+    await pilot.app.workers.wait_for_complete()
+    await take(pilot, "why")
+    await press(pilot, "enter", "p", *["right"] * 15)
+    await take(pilot, "playback")
+    await press(pilot, "o")
+    await take(pilot, "beside")
+    await press(pilot, "escape", "escape", "escape")
 
 
 async def export(pilot: Pilot[int], run: Path) -> None:

@@ -26,7 +26,24 @@ from tests.tiers import slow
 # A batch of runs is one test.
 SIZE = 5
 BATCHES = slow(pytest.mark.fuzz, range(int(os.environ.get("DDENV_HOSTILE_BATCHES", "8"))), but=[0])
-KEYS = ("1", "4", "h", "escape", "e", "escape", "E", "escape")
+KEYS = (
+    "1",
+    "4",
+    "h",
+    "escape",
+    "e",
+    "escape",
+    "E",
+    "escape",
+    "W",
+    "down",
+    "enter",
+    "escape",
+    "escape",
+    "P",
+    "right",
+    "escape",
+)
 
 
 @pytest.fixture(scope="module")

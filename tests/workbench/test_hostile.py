@@ -103,7 +103,7 @@ async def test_no_name_steers_the_terminal(runs, size):
         run.write("command_refused", command=1, why="no \x1b]0;title\x07\u202e")
         await session.look()
         assert "not done" in session.said()
-        for key in ("2", "4", "5", "h", "slash", "E", "R", "y", "question_mark"):
+        for key in ("2", "4", "5", "h", "P", "W", "slash", "E", "R", "y", "question_mark"):
             await session.press(key)
             await session.pilot.pause()
             assert steering(session.app) == []
@@ -248,7 +248,7 @@ KEYS = [
         "left_square_bracket",
         "right_square_bracket",
     ),
-    *("f1", "ctrl+p", *"abcefghijklnopstuvwxyzACEGLNS0123456"),
+    *("f1", "ctrl+p", *"abcefghijklnopstuvwxyzACEGLNPSW0123456"),
 ]
 SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 

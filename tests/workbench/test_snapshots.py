@@ -1,6 +1,7 @@
 """What the screens look like. Update with `pytest tests/workbench --snapshot-update` after looking at them."""
 
 import math
+from array import array
 from contextlib import suppress
 
 import fake_moments
@@ -11,6 +12,7 @@ from textual.worker import WorkerCancelled
 
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, open_lesson
+from ddenv.runfile.store import ROBOT
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.messages import ShowLessons
@@ -134,6 +136,9 @@ OPENED = {
     "rounds": ["b"],
     "facts": ["i"],
     "signs": ["k"],
+    "why-empty": ["W"],
+    "playback": ["P", "right", "right"],
+    "beside": ["P", "o"],
 }
 
 
@@ -149,6 +154,31 @@ OPENED = {
 def test_what_a_key_opens(snap_compare, run, name, theme, size):
     fake_moments.guided(run).hold()
     assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown(theme, *OPENED[name]))
+
+
+def parts(run):
+    """A finished run in which the robot is faster without crate_00."""
+    fake_moments.finished(run)
+    samples = fake_run.path_samples()[: 8 * 60]
+    samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
+    run.file.append("paused", {"test": 61}, {ROBOT: samples.tobytes()})
+
+
+@pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[USUAL]), ids=str)
+@pytest.mark.parametrize(
+    "keys", slow(pytest.mark.screens, [(), ("enter", *["right"] * 20)], but=[()]), ids=["why", "both"]
+)
+def test_why_it_fails(snap_compare, run, keys, size):
+    parts(run)
+    assert snap_compare(Workbench(run.path), terminal_size=size, run_before=shown("ddenv", "W", *keys))
+
+
+@pytest.mark.screens
+def test_both_runs_in_no_colour(snap_compare, run, monkeypatch):
+    monkeypatch.setenv("NO_COLOR", "1")
+    parts(run)
+    keys = ("W", "enter", *["right"] * 20)
+    assert snap_compare(Workbench(run.path), terminal_size=SMALL, run_before=shown("ddenv", *keys))
 
 
 @pytest.mark.screens
