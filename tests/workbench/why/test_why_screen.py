@@ -9,6 +9,7 @@ from attached import Attached
 from textual.widgets import OptionList
 
 from ddenv.runfile.store import RunFile
+from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen
@@ -122,3 +123,33 @@ async def test_stacks_are_left_out_together(runs):
         assert "what rests on it (1 model)" in words(screen, "#why-said")
         assert set(screen.map.candidate.models) == set(run.elements[2:6])
     run.close()
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_side_by_side(run, damaged):
+    fake_moments.isolated(run)
+    with RunFile(run.path) as file:
+        known = nearest(file, run.state)
+    if damaged:
+        with sqlite3.connect(run.path) as database:
+            database.execute("DELETE FROM motion")
+        database.close()
+    async with Attached(run) as session:
+        screen = await opened(session)
+        options = screen.query_one(OptionList)
+        await session.press("end")
+        assert "nearest world that passes" in str(options.get_option_at_index(options.option_count - 1).prompt)
+        said = words(screen, "#why-said")
+        assert known.words[1:] in said
+        assert set(screen.map.candidate.models) == set(run.elements) - set(known.gone)
+        if damaged:
+            assert "has no trajectory" in said
+            return
+        assert known.sentences in said
+        assert [way.name for way in screen.map.shown.ways] == ["fails", "passes"]
+        last = known.instants[-1]
+        assert f"{last.apart:.2f} m" in said.splitlines()[-1]
+        await session.press("enter")
+        await session.app.workers.wait_for_complete()
+        played = session.app.screen
+        assert [one.test.id for one in played._tests] == [known.parting.with_test, known.parting.without_test]

@@ -1,4 +1,4 @@
-"""Why the robot fails: what happens without each model that is left, in words, with its rates, and on the map."""
+"""Why the robot fails: what happens without each model that is left, and the nearest world that passes, in words and on the map."""
 
 from __future__ import annotations
 
@@ -17,29 +17,25 @@ from textual.widgets.option_list import Option
 from ddenv.claims import current
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
-from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import RunState, partition_letter
+from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import played
-from ddenv.runs.reasons import Reason, parting_sentence, reasons, sentence
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
 from ddenv.workbench.map.place import Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.playback.moving import RobotWay, snapshot_with, without
+from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.why.entries import Entry, entries
 from ddenv.workbench.why.why_words import head, head_of, nothing_yet, remedy, row, said
 from ddenv.workbench.wording import attach_name, plain
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
 PERIOD = 0.5
-# The maximum number of models in the list.
-LISTED = 200
 
 
 def _ids(names: str) -> tuple[str, ...]:
@@ -84,8 +80,7 @@ class WhyScreen(Screen[None]):
         self._file, self._position, self._place, self._look_at = file, position, place, look
         self._seen: tuple[object, ...] = ()
         self._state = RunState()
-        self._reasons: tuple[Reason, ...] = ()
-        self._snapshot = Snapshot()
+        self._entries: tuple[Entry, ...] = ()
         self.map = WorldMap(id="why-map")
 
     def compose(self) -> ComposeResult:
@@ -127,112 +122,100 @@ class WhyScreen(Screen[None]):
     def _placed(self, place: Place, notice: str) -> None:
         self._place = place
         self.map.set_place(place, notice)
-        self._show_reason()
+        self._show_entry()
 
     # What is known.
 
     def _look(self) -> None:
-        """Reads the reasons again once there is another certificate."""
+        """Reads all again once there is another certificate, or another nearest world that passes."""
         state, works = self._look_at()
-        seen = current(state), works, state.status, state.tests_done if current(state) is None else 0
+        known = current(state) is not None or state.isolated is not None
+        seen = current(state), state.isolated, works, state.status, 0 if known else state.tests_done
         if seen == self._seen:
             return
         self._seen, self._state = seen, state
         self.query_one("#why-header", Static).update(Text(f" {head_of(state)}", no_wrap=True, overflow="ellipsis"))
-        if current(state) is None:
-            self._found((), "")
-        else:
+        if known:
             self._read(state)
+        else:
+            self._found((), 0, "")
 
-    @work(thread=True, group="reasons", exclusive=True)
+    @work(thread=True, group="why", exclusive=True)
     def _read(self, state: RunState) -> None:
         """Comparing the ways of many runs takes a while."""
+        found: tuple[Entry, ...] = ()
+        more, trouble = 0, ""
         try:
             with Observed(self._file.path) as file:
-                found, trouble = reasons(file, state), ""
+                found, more = entries(file, state)
         except UserError as error:
-            found, trouble = (), str(error)
-        call_if_open(self, self._found, found, trouble)
+            trouble = str(error)
+        call_if_open(self, self._found, found, more, trouble)
 
-    def _found(self, found: tuple[Reason, ...], trouble: str) -> None:
-        self._reasons = found[:LISTED]
+    def _found(self, found: tuple[Entry, ...], more: int, trouble: str) -> None:
+        self._entries = found
         self.set_class(not found, "-empty")
         if not found:
             _, works = self._look_at()
             words = trouble or nothing_yet(self._state, works, attach_name(self._file.path))
             self.query_one("#why-empty", Static).update(Text(plain_lines(words)))
             return
-        more = f" · the first {LISTED} of {len(found)}" if len(found) > LISTED else ""
-        self.query_one("#why-models").border_title = Text(f"Without each model{more}")
-        groups = tuple(each.gone for each in self._reasons)
-        self._snapshot = snapshot_with(self._state, self._state.environment, groups)
+        beyond = f" · {more} more are not listed" if more else ""
+        self.query_one("#why-models").border_title = Text(f"Without each model{beyond}")
         self._list()
 
-    @property
-    def _certificate(self) -> Certificate | None:
-        return current(self._state)
-
     def _list(self) -> None:
-        certificate, options = self._certificate, self.query_one("#why-list", OptionList)
-        if certificate is None or not self._reasons:
+        options = self.query_one("#why-list", OptionList)
+        if not self._entries:
             return
-        claims = {claim.without: claim for claim in certificate.claims}
         width = max(20, options.size.width - options.styles.scrollbar_size_vertical)
         at = options.highlighted or 0
-        rows = (row(number, each, claims.get(each.without), width) for number, each in enumerate(self._reasons))
-        options.set_options(Option(words) for words in rows)
+        options.set_options(Option(row(each, width)) for each in self._entries)
         self.query_one("#why-head", Static).update(head(width))
-        options.highlighted = min(at, len(self._reasons) - 1)
-        self._show_reason()
+        options.highlighted = min(at, len(self._entries) - 1)
+        self._show_entry()
 
     # What is shown.
 
     @property
-    def reason(self) -> Reason | None:
-        """The reason under the cursor."""
+    def entry(self) -> Entry | None:
+        """What is under the cursor."""
         at = self.query_one("#why-list", OptionList).highlighted
-        return self._reasons[at] if at is not None and at < len(self._reasons) else None
+        return self._entries[at] if at is not None and at < len(self._entries) else None
 
     @on(OptionList.OptionHighlighted)
-    def _show_reason(self) -> None:
-        certificate, one = self._certificate, self.reason
-        if certificate is None or one is None:
+    def _show_entry(self) -> None:
+        one = self.entry
+        if one is None:
             return
-        claim = next((each for each in certificate.claims if each.without == one.without), None)
-        words = said(one, claim, certificate)
         ways, lacks = self._ways(one)
-        for line in lacks:
-            words.append(f"\n\n▲ {plain(line)}", "bold")
-        self.query_one("#why-said", Static).update(words)
+        self.query_one("#why-said", Static).update(said(one, lacks))
         self.query_one("#why-scroll").scroll_home(animate=False)
-        there, letter = self._state.environment, partition_letter(self._reasons.index(one)).lower()
-        self.map.show(self._snapshot, without(there, one.gone))
+        self.map.show(one.snapshot, without(one.snapshot.state.environment, one.gone))
         parting = None if one.parting is None else one.parting.place
-        self.map.show_ways(ways, parting, (letter, "left out in one"), self._place.prints)
+        self.map.show_ways(ways, parting, (one.letter.lower(), "left out in one"), self._place.prints)
         title = "World" if one.parting is None or not ways else f"The two ways, seed {one.parting.seed}"
         self.query_one("#why-world").border_title = Text(title)
         legend = self.query_one("#why-legend", Static)
         legend.update(self.map.legend(legend.size.width))
 
-    def _ways(self, one: Reason) -> tuple[tuple[Way, ...], Sequence[str]]:
+    def _ways(self, one: Entry) -> tuple[tuple[Way, ...], Sequence[str]]:
         """The ways of the two runs that are compared, and what the run file lacks of them."""
         if one.parting is None:
             return (), ()
+        both = one.parting.with_test, one.parting.without_test
         try:
-            found = [
-                played(self._file, self._position, test) for test in (one.parting.with_test, one.parting.without_test)
-            ]
+            found = [played(self._file, self._position, test) for test in both]
         except UserError as error:
             return (), (str(error),)
         lacks = dict.fromkeys(line for each in found for line in each.lacks)
-        names = ("with", "without")
-        ways = tuple(RobotWay(each, name).whole for each, name in zip(found, names, strict=True) if each.rows)
+        ways = tuple(RobotWay(each, name).whole for each, name in zip(found, one.ways, strict=True) if each.rows)
         return (ways if len(ways) == 2 else ()), tuple(lacks)
 
     # The keys.
 
     def action_play(self) -> None:
-        one = self.reason
+        one = self.entry
         if one is None or one.parting is None:
             self._refuse(
                 "there are no two runs to play: none with the model and one without it have the same seed and other ends"
@@ -247,7 +230,7 @@ class WhyScreen(Screen[None]):
     def action_copy(self) -> None:
         _, works = self._look_at()
         command = remedy(self._state, works, attach_name(self._file.path))
-        lines = [f"{sentence(one)} {parting_sentence(one)}".rstrip() for one in self._reasons]
+        lines = [one.text for one in self._entries]
         if not lines and not command:
             self._refuse("there is nothing to copy yet")
             return

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.text import Text
 
-from ddenv.claims import current, in_the_making, made_of_usual, meaning, rate
+from ddenv.claims import current, in_the_making, made_of_usual, rate
 from ddenv.map.names import padded, shortened
-from ddenv.runfile.progress import Certificate, Claim
-from ddenv.runfile.state import RunState, partition_letter
-from ddenv.runs.reasons import Reason, parting_sentence, sentence
+from ddenv.runfile.state import RunState
+from ddenv.workbench.why.entries import NEAREST, Entry
 from ddenv.workbench.wording import CLAIM, percent, plain
 
 # The width of a row without the model's name.
@@ -20,28 +21,31 @@ def head(width: int) -> Text:
     return Text(f"   {padded('without', _name(width))}  {'f':>7} {'95 %':>10}", no_wrap=True)
 
 
-def row(number: int, reason: Reason, claim: Claim | None, width: int) -> Text:
+def row(one: Entry, width: int) -> Text:
     """The letter of a model on the map, its name, how often f shows without it, and the interval of that in %."""
-    name = padded(shortened(reason.without, _name(width)), _name(width))
-    text = Text(f"{partition_letter(number):<3}", "bold", no_wrap=True).append(name, "not bold")
-    if claim is None:
-        return text
+    if one.claim is None:
+        return Text(f"{'○' if one.name == NEAREST else ' '}  {shortened(one.name, max(4, width - 3))}", no_wrap=True)
+    name, claim = padded(shortened(one.name, _name(width)), _name(width)), one.claim
     interval = f"{percent(claim.low)[:-2]} to {percent(claim.high)[:-2]}" if claim.runs else ""
     figures = f" {CLAIM.get(claim.verdict, '?')}{f'{claim.shown}/{claim.runs}':>7} {interval:>10}"
-    return text.append(figures, "not bold")
+    return Text(f"{one.letter:<3}", "bold", no_wrap=True).append(f"{name}{figures}", "not bold")
 
 
 def _name(width: int) -> int:
     return max(4, width - FIGURES)
 
 
-def said(reason: Reason, claim: Claim | None, certificate: Certificate) -> Text:
-    """What happens without a model, with the rates, and where the ways part."""
-    text = Text(plain(sentence(reason)), "bold")
-    if claim is not None:
-        text.append(f"\n\n{rate(claim)}; {meaning(claim, certificate)}.", "not bold")
-    parting = plain(parting_sentence(reason))
-    return text.append(f"\n\n{parting}" if parting else "", "not bold")
+def said(one: Entry, lacks: Sequence[str]) -> Text:
+    """What happens without the models, with the rates, where the ways part, and what the run file `lacks` of them."""
+    text = Text(plain(one.sentence), "bold")
+    for words in filter(None, one.more):
+        text.append(f"\n\n{plain(words)}", "not bold")
+    for words in lacks:
+        text.append(f"\n\n▲ {plain(words)}", "bold")
+    if one.rows:
+        text.append(f"\n\n{'time':>8}   {'fails: x, y':>13}   {'passes: x, y':>13}   apart", "dim not bold")
+        text.append("".join(f"\n{line}" for line in one.rows), "not bold")
+    return text
 
 
 def head_of(state: RunState) -> str:
