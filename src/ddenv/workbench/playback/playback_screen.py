@@ -51,7 +51,7 @@ def _hidden(key: str, action: str, words: str, name: str, tooltip: str, display:
 
 
 SHOWN = _ids("play back on frame_back frame_on slower faster parting beside swap before next help close")
-FIRST = _ids("help close play frame_back frame_on parting beside swap slower faster before next back on")
+FIRST = _ids("help close play beside frame_back frame_on parting slower faster swap before next back on")
 
 
 class Playback(Screen[None]):
@@ -62,9 +62,7 @@ class Playback(Screen[None]):
     VERTICAL_BREAKPOINTS = [(0, "-flat"), (SMALLEST[1], "-low")]
     AUTO_FOCUS = ""
     BINDINGS: ClassVar = [
-        Binding(
-            "space", "play", "play/pause", id="playback.play", tooltip="play, or pause; at the end: from the start"
-        ),
+        Binding("space", "play", "play", id="playback.play", tooltip="play, or pause; at the end: from the start"),
         _hidden("left", f"step({-STEP})", "1 s back", "back", "one second back"),
         _hidden("right", f"step({STEP})", "1 s on", "on", "one second on"),
         _hidden("comma", "frame(-1)", "frame back", "frame_back", f"one frame ({FRAME:g} s) back, and pause", ","),
