@@ -1,22 +1,15 @@
-#!/usr/bin/env python3
 """The robot of the lessons on flaky failures and on certificates: luck is part of its rule.
 
 It drives along a quay, straight on. Now and then it comes off its line by itself; oil and ramp make that much likelier. Off its
 line it gets stuck at the gate; without the gate it gets stuck at the crate behind it; without both it arrives all the same.
-
-    quay.py WORLD SEED     prints the pose log; exit codes: 0 goal reached, 1 time is up
 """
 
 from __future__ import annotations
 
-import os
 import random
-import sys
-import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from collections.abc import Iterable
 
-SPEED, STEP = 0.5, 0.5  # m/s, s
+STEP = 0.5  # s
 START, GOAL, OFF = (-6.0, 0.0), (6.0, 0.0), 0.5
 # Where a robot off its line stops: x, m.
 GATE_STOP, CRATE_STOP = 1.8, 3.9
@@ -37,7 +30,7 @@ def rate(models: Iterable[str]) -> float:
 
 
 def way(models: Iterable[str], seed: int) -> tuple[list[tuple[float, float]], bool]:
-    """The corners of the robot's way among these models, m, and whether it reaches the goal."""
+    """The corners of the robot's path among these models, m, and whether it reaches the goal."""
     there = frozenset(models)
     # Every model changes the drive a little, so the dice fall otherwise in every part of the world.
     is_off = random.Random(f"{seed} {' '.join(sorted(there))}").random() < off_line(there)
@@ -49,31 +42,3 @@ def way(models: Iterable[str], seed: int) -> tuple[list[tuple[float, float]], bo
     if "crate" in there:
         return [*begin, (CRATE_STOP, OFF)], False
     return [*begin, GOAL], True
-
-
-def places(corners: list[tuple[float, float]], seconds: float) -> Iterator[tuple[float, float, float]]:
-    """Time (s), x and y (m) along the way, until the robot is there or time is up."""
-    time = 0.0
-    for (x, y), (to_x, to_y) in pairwise(corners):
-        count = max(1, round(((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5 / (SPEED * STEP)))
-        for number in range(count):
-            yield time, x + (to_x - x) * number / count, y + (to_y - y) * number / count
-            time += STEP
-    x, y = corners[-1]
-    yield time, x, y
-    while corners[-1] != GOAL and time < seconds:
-        time += 1.0
-        yield time, x, y
-
-
-def main() -> int:
-    models = [model.get("name", "") for model in ET.parse(sys.argv[1]).getroot().iter("model")]
-    corners, reached = way(models, int(sys.argv[2]))
-    print("t,x,y,z,qx,qy,qz,qw")
-    for time, x, y in places(corners, float(os.environ["DDENV_TIMEOUT"])):
-        print(f"{time:.1f},{x:.3f},{y:.3f},0.2,0,0,0,1")
-    return 0 if reached else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

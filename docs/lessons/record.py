@@ -23,7 +23,7 @@ from typing import Any
 import yaml
 from docs.lessons.delivery import outcome
 from docs.lessons.quay import rate
-from docs.lessons.toys import DELIVERY, QUAY, TOYS, Box, Toy
+from docs.lessons.toys import DELIVERY, QUAY, SIMULATOR, TOYS, Box, Toy
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
@@ -94,9 +94,9 @@ def record(name: str) -> None:
 
 def written(toy: Toy, folder: Path, reduction: Mapping[str, Any]) -> Path:
     """Writes a toy world, its robot, its simulator and its scenario with these settings; returns the scenario's file."""
-    for file in ("robot.sdf", toy.simulator):
+    for file in ("robot.sdf", SIMULATOR, f"{toy.rule}.py"):
         shutil.copy(HERE / file, folder / file)
-    (folder / toy.simulator).chmod(0o755)
+    (folder / SIMULATOR).chmod(0o755)
     (folder / "world.sdf").write_text(world_of(toy), encoding="utf-8")
     walls = [name for name, *_ in toy.walls]
     scenario = folder / "scenario.yaml"

@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+SIMULATOR = "driving.py"
 # Name, x, y, size along x and y, m; a model may have several boxes, and so several entries.
 Box = tuple[str, float, float, float, float]
 
 
 @dataclass(frozen=True)
 class Toy:
-    """A world of boxes in which a small `simulator` drives a robot. `walls` always stay."""
+    """A world of boxes in which a robot drives by a `rule`, a file beside this one. `walls` always stay."""
 
-    simulator: str
+    rule: str
     walls: tuple[Box, ...]
     models: tuple[Box, ...]
     scenario: dict[str, Any]
@@ -55,14 +56,14 @@ _MORE_OF_YARD = (
 )
 
 
-def _scenario(name: str, description: str, simulator: str, **sections: dict[str, Any]) -> dict[str, Any]:
+def _scenario(name: str, description: str, rule: str, **sections: dict[str, Any]) -> dict[str, Any]:
     return {
         "name": name,
         "description": description,
         "world": "world.sdf",
         "robot": {"model": "robot.sdf", "spawn": {"x": -6.0, "y": 0.0, "z": 0.2}},
         "goal": {"x": 6.0, "y": 0.0, "tolerance": 0.3},
-        "oracle": {"command": f"./{simulator} {{world}} {{seed}}"},
+        "oracle": {"command": f"./{SIMULATOR} {rule} {{world}} {{seed}}"},
         "failure": {"timeout": 40, "epsilon": 0.5},
         **sections,
     }
@@ -70,30 +71,28 @@ def _scenario(name: str, description: str, simulator: str, **sections: dict[str,
 
 _DELIVERY = "A delivery robot drives from one end of a yard to the other. It gets stuck in the left lane."
 DELIVERY = Toy(
-    "delivery.py",
+    "delivery",
     _YARD_WALLS,
     _YARD_MODELS,
     _scenario(
         "delivery",
         _DELIVERY,
-        "delivery.py",
+        "delivery",
         reduction={"as_printed": True, "baseline_runs": 3, "iterations": 1},
     ),
 )
 # In this yard nothing is random: one run settles a candidate.
 YARD = Toy(
-    "delivery.py",
+    "delivery",
     _YARD_WALLS,
     (*_YARD_MODELS, *_MORE_OF_YARD),
-    _scenario(
-        "yard", _DELIVERY, "delivery.py", reduction={"accept_rate": "first", "baseline_runs": 1, "iterations": 0}
-    ),
+    _scenario("yard", _DELIVERY, "delivery", reduction={"accept_rate": "first", "baseline_runs": 1, "iterations": 0}),
 )
 _SIGN = tuple(box for box in YARD.models if box[0] == "sign")
 # The same yard, with a sign that always stays: all that f needs then is near to where the robot gets stuck.
 NAILED = replace(YARD, walls=(*YARD.walls, *_SIGN), models=tuple(box for box in YARD.models if box not in _SIGN))
 QUAY = Toy(
-    "quay.py",
+    "quay",
     (("kerb_left", 0, 2.6, 14, 0.3), ("kerb_right", 0, -2.6, 14, 0.3)),
     (
         ("bench", -4.9, 1.8, 1.2, 0.6),
@@ -109,6 +108,6 @@ QUAY = Toy(
         ("crate", 4.5, 0.7, 0.6, 0.6),
         ("lamp", 5.3, 1.9, 0.3, 0.3),
     ),
-    _scenario("quay", "A robot drives along a quay. Off its line it gets stuck at the gate.", "quay.py"),
+    _scenario("quay", "A robot drives along a quay. Off its line it gets stuck at the gate.", "quay"),
 )
 TOYS = {"delivery": DELIVERY, "yard": YARD, "nailed": NAILED, "quay": QUAY}

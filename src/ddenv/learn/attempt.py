@@ -13,7 +13,7 @@ from ddenv.learn.plays import Play
 from ddenv.learn.recorded_oracle import Oracle
 
 NAMED = 5
-BOUND = "The last line: so many answers of yes or no single out such a set, if nothing is known before."
+BOUND = "The last line: how many answers of yes or no it takes to single out such a set if nothing is known beforehand."
 
 
 @dataclass(frozen=True, slots=True)

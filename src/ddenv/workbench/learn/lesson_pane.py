@@ -116,7 +116,8 @@ def _question(question: Question, page: Page, room: int) -> Text:
         if page.chosen is None:
             line.apply_meta({"@click": f"screen.answer({place})"})
         text.append("\n").append_text(line)
-    if page.hint:
+    # Answered, the hint would only take the room of what is said of the answers.
+    if page.hint and page.chosen is None:
         text.append(f"\nHint: {plain(question.hint)}", "italic")
     if page.chosen is not None:
         text.append_text(_verdict(question, page, room))
