@@ -1,9 +1,10 @@
-"""Where Drake has no wheels, what needs it says so in one line."""
+"""Where Drake has no wheels, what needs it says so in one line, and all that only looks works. Windows lacks more than Drake."""
 
 import os
 
 import pytest
 
+from ddenv.learn.shelf import LESSONS
 from tests.command import ddenv
 from tests.conftest import DATA
 
@@ -12,13 +13,30 @@ COMMANDS = {
     "test": ["test", DATA / "wall.yaml"],
     "settle": ["world", "settle", DATA / "wall.sdf", "-o", "settled.sdf"],
 }
+RUN = LESSONS / "ditch.ddenv"
+LOOKS = {
+    "learn": (["learn", "--list"], "7  Groups"),
+    "page": (["learn", "5", "--page", "five.html"], "wrote five.html"),
+    "report": (["report", RUN, "-o", "ditch.html"], "wrote ditch.html"),
+    "show": (["world", "show", "ditch"], "43 models"),
+}
+
+
+def without(home, modules, words):
+    (home / "sitecustomize.py").write_text(f"import sys\n\nsys.modules.update(dict.fromkeys({modules!r}))\n")
+    path = os.pathsep.join([str(home), os.environ.get("PYTHONPATH", "")])
+    return ddenv(*words, cwd=home, env=os.environ | {"PYTHONPATH": path, "DDENV_HOME": str(home)})
+
+
+@pytest.mark.parametrize(("words", "said"), LOOKS.values(), ids=LOOKS)
+def test_what_only_looks_needs_none_of_them(home, words, said):
+    done = without(home, ("pydrake", "fcntl", "termios", "sklearn"), words)
+    assert done.returncode == 0 and said in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
 def test_what_needs_drake_says_so(home, words):
-    (home / "sitecustomize.py").write_text("import sys\n\nsys.modules['pydrake'] = None\n")
-    path = os.pathsep.join([str(home), os.environ.get("PYTHONPATH", "")])
-    done = ddenv(*words, cwd=home, env=os.environ | {"PYTHONPATH": path, "DDENV_HOME": str(home)})
+    done = without(home, ("pydrake",), words)
     assert done.returncode == 2
     last = done.stderr.strip().splitlines()[-1]
     assert "Drake, which is not installed here: pip install drake" in last

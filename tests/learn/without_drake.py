@@ -1,4 +1,4 @@
-"""Opens a lesson, a run step by step, the run screen with its map, and a report; the caller has blocked what Windows lacks."""
+"""Opens lessons, a real run with its map, scene and report, and a race; the caller has blocked what Windows lacks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from pathlib import Path
 from shutil import copy
 from tempfile import mkdtemp
 
-from ddenv.learn.shelf import LESSONS, bundled
+from ddenv.learn.handout import handout
+from ddenv.learn.shelf import LESSONS, bundled, open_lesson
+from ddenv.page.html import html
 from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
 from ddenv.scene.player import Player
@@ -17,7 +19,7 @@ from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.messages import ShowLesson, ShowLessons, ShowRace
 
-RUN = LESSONS / "delivery.ddenv"
+TOY, REAL = LESSONS / "delivery.ddenv", LESSONS / "ditch.ddenv"
 
 
 async def main() -> None:
@@ -28,22 +30,24 @@ async def main() -> None:
         await pilot.press("s", "enter", "enter")
         await shown(pilot)
         assert isinstance(pilot.app.screen, TryScreen)
-    async with Workbench(first=ShowLesson(RUN)).run_test(size=(120, 36)) as pilot:
+    async with Workbench(first=ShowLesson(REAL)).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("right_curly_bracket")
-        assert len(pilot.app.screen.course.position.now.environment) == 6
-    copy(RUN, other := Path(mkdtemp()) / "other.ddenv")
-    async with Workbench(first=ShowRace((RUN, other))).run_test(size=(120, 36)) as pilot:
+        assert len(pilot.app.screen.course.position.now.environment) == 31
+    copy(TOY, other := Path(mkdtemp()) / "other.ddenv")
+    async with Workbench(first=ShowRace((TOY, other))).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
         await pilot.press("end")
         assert pilot.app.screen.race.over
-    async with Workbench(RUN, watch=True).run_test(size=(120, 36)) as pilot:
+    async with Workbench(REAL, watch=True).run_test(size=(120, 36)) as pilot:
         await shown(pilot)
     sent = []
-    with RunFile(RUN) as run:
+    with RunFile(REAL) as run:
         Player(run, Stage(lambda message, _: sent.append(message)), lambda **_: None).tick(0.0)
     assert sent
-    write_report(RUN, Path(mkdtemp()) / "report.html", False)
+    write_report(REAL, Path(mkdtemp()) / "report.html", False)
+    for file in bundled():
+        assert html(handout(open_lesson(file)))
     print("all shown")
 
 

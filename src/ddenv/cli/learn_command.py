@@ -118,11 +118,13 @@ def _page(name: str | None, file: Path) -> int:
     from ddenv.page.html import html
     from ddenv.world.files.access import write_file
 
+    if name is None:
+        raise UserError(f"--page: expected a lesson, as in 'ddenv learn 1 --page {file}'")
     if file.suffix.lower() not in (".html", ".htm"):
         raise UserError(f"--page: {file}: must end in .html")
     if file.exists():
         raise UserError(f"--page: {file}: exists already; choose another name")
-    write_file(file, html(handout(open_lesson(_lesson(name or "")))).encode())
+    write_file(file, html(handout(open_lesson(_lesson(name)))).encode())
     print(printable(f"wrote {file}"))
     return 0
 
