@@ -164,6 +164,8 @@ def slim(run: Path, shown: bool, told: set[int]) -> None:
     with RunFile(run) as file:
         state = fold(file.events())
         events = file.events()
+    if state.status != "finished":
+        sys.exit(f"{run.name}: did not come to its end")
     kept = {event.data["evidence_test"] for event in events if event.data.get("evidence_test")}
     kept |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
     made_for = {(test.round, test.candidate) for test in state.tests if test.id in told}

@@ -19,7 +19,7 @@ def handout(opened: Opened) -> Report:
     """The page of a lesson."""
     lesson, state = opened.lesson, opened.position.end
     end = state.revision
-    about = f"The run of this lesson is {lesson.run.name}; it takes about {lesson.minutes} minutes."
+    about = f"The lesson takes about {lesson.minutes} minutes; its run is {lesson.run.name}."
     lead = (say(Strong("Aim:"), f" {lesson.aim}"), say(about))
     steps = Picture("chart", chart(state), "How many models were left after each test")
     beliefs = tuple((f"One {belief}.", right) for belief, right in MISCONCEPTIONS.values())
