@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import cluster_option, jobs_option, json_option, trust_option, whole
 from ddenv.errors import UserError
 
 
 @click.command("certify")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @click.option(
     "--runs",
     type=whole(1),

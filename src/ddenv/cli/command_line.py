@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ddenv.cli.certify_command import certify_command
+from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.config_command import config_command
 from ddenv.cli.doctor_command import doctor_command
 from ddenv.cli.export_command import export_command
@@ -46,10 +48,18 @@ class Commands(click.Group):
         word = args[0]
         if self.get_command(ctx, word) is not None or word.startswith("-"):
             return super().resolve_command(ctx, args)
-        if not _can_be_opened(word):
+        # While a line is typed, the shell only asks what can follow.
+        if not ctx.resilient_parsing and not _can_be_opened(word):
             known = [*self.list_commands(ctx), *bundled()]
             raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
         return open_command.name, open_command, args
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Commands and options, and what can be opened."""
+        commands = super().shell_complete(ctx, incomplete)
+        others = [] if incomplete.startswith("-") else runs_and_scenarios(ctx, None, incomplete)
+        # The shell lists files only where nothing else fits.
+        return [*commands, *(each for each in others if each.type == "plain" or not commands)]
 
 
 def _can_be_opened(word: str) -> bool:

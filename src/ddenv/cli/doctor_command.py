@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import json_option
 from ddenv.cli.wrapping import wrapped
 from ddenv.doctor.finding import Finding, is_well
@@ -21,7 +22,7 @@ SIGNS = {"ok": " ", "note": "!", "wrong": "✗"}
 
 
 @click.command("doctor")
-@click.argument("run", required=False)
+@click.argument("run", required=False, shell_complete=runs)
 @click.option(
     "--repair", type=Path, metavar="COPY", help="Write all that is whole of RUN to a new run file; RUN stays as it is."
 )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import announce, announced, trust_option
 from ddenv.errors import UserError, printable
 
@@ -14,7 +15,7 @@ LONGEST_URI = 80
 
 
 @click.command("export")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @click.option("--sdf", type=Path, help="Write the environment as an SDF world.")
 @click.option(
     "--passes",

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import cluster_option, jobs_option, json_option, trust_option, whole
 from ddenv.errors import UserError, printable
 
 
 @click.command("isolate")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @click.option(
     "--runs",
     type=whole(1),

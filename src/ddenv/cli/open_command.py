@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.options import given_reading, reading_options
 from ddenv.errors import UserError
 
@@ -15,7 +16,7 @@ FILES = (".yaml", ".yml", ".sdf", ".world")
 
 
 @click.command("open")
-@click.argument("run", metavar="RUN_OR_FILE", type=click.Path())
+@click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
 @reading_options
 @click.option("--watch", is_flag=True, help="Only watch: changes and writes nothing, not even beside RUN.")
 @click.option("--lines", is_flag=True, help="Plain lines that are never drawn again, for screen readers: type help.")

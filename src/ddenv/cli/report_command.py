@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.errors import UserError, printable
 
 
 @click.command("report")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @click.option(
     "-o",
     "--output",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import jobs_option, json_option, trust_option
 
 # As `git bisect run` reads them.
@@ -15,7 +16,7 @@ FAILS, PASSES, CANNOT_SAY = 1, 0, 125
 
 
 @click.command("reproduce")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @click.option("--most", type=click.IntRange(1, 10_000), default=60, show_default=True, help="Runs at most.")
 @click.option(
     "--folder",

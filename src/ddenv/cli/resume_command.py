@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import announce, cluster_option, jobs_option, json_option, trust_option
 from ddenv.errors import UserError
 
 
 @click.command("resume")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @jobs_option()
 @cluster_option()
 @click.option("--mixed", is_flag=True, help="Go on even if other versions or another processor give other results.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ddenv.cli.completing import scenarios
 from ddenv.cli.options import (
     announce,
     chosen_scenario,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @click.command("run")
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=scenarios)
 @scenario_options
 @reading_options
 @setting_options()

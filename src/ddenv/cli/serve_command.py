@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import whole
 from ddenv.errors import UserError
 
@@ -21,7 +22,7 @@ def _refuse_host(_: Any, __: Any, value: str | None) -> None:
 
 
 @click.command("serve")
-@click.argument("run", required=False)
+@click.argument("run", required=False, shell_complete=runs)
 @click.option("--port", type=whole(1, 65535), default=PORT, show_default=True, help="Port on 127.0.0.1.")
 @click.option(
     "--font-size",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.options import (
     announce,
     chosen_scenario,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @click.command("test")
-@click.argument("subject", metavar="SCENARIO_OR_RUN")
+@click.argument("subject", metavar="SCENARIO_OR_RUN", shell_complete=runs_and_scenarios)
 @scenario_options
 @setting_options(only=("timeout",))
 @reading_options

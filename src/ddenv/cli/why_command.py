@@ -9,11 +9,12 @@ from dataclasses import asdict
 
 import click
 
+from ddenv.cli.completing import runs
 from ddenv.cli.options import json_option
 
 
 @click.command("why")
-@click.argument("run")
+@click.argument("run", shell_complete=runs)
 @json_option
 def why_command(run: str, as_json: bool) -> int:
     """Says why the robot fails in what RUN (a name or a file) has left: what it does without each model, and where the ways part.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ddenv.cli.completing import scenarios
 from ddenv.cli.options import Numbers, announce, reading_options
 from ddenv.errors import UserError, printable
 
@@ -25,7 +26,7 @@ def world_group() -> None:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def check(file: Path, as_json: bool, **reading: Any) -> int:
@@ -39,7 +40,7 @@ def check(file: Path, as_json: bool, **reading: Any) -> int:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
 @reading_options
 @click.option("--spawn", type=Numbers("x,y,yaw", 2, 3), help="Mark the robot's start, m and rad.")
 @click.option("--goal", type=Numbers("x,y", 2, 2), help="Mark the robot's goal, m.")
@@ -82,7 +83,7 @@ def show(
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
 @reading_options
 @click.option(
     "-o", "--output", type=Path, required=True, help="The SDF file to write; meshes go to a folder beside it."
@@ -97,7 +98,7 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
 
 
 @world_group.command()
-@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE_OR_SCENARIO", type=click.Path(path_type=Path), shell_complete=scenarios)
 @reading_options
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:

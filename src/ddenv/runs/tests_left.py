@@ -127,12 +127,13 @@ class Rough:
         return low, likely, high
 
 
-def rough_run(models: int, asked: Reduction) -> Rough:
-    """Before there is a run: of `models` that can be removed, if all runs of the baseline show f."""
+def rough_run(models: int, asked: Reduction, rate: float | None = None) -> Rough:
+    """Before there is a run: of `models` that can be removed, where f shows at `rate`, or if all runs of the baseline show it."""
     runs = 1 + asked.iterations
     runs = runs if asked.accept_rate == "first" else min(runs, FEWEST_MISSES)
     search = rough_tests(models, asked.algorithm, runs, asked.growth == "paper")
     low, likely, high = (asked.baseline_runs + each for each in search)
-    rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
+    if rate is None:
+        rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
     certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs)
     return Rough((low, likely, high), certificate)

@@ -32,17 +32,17 @@ def test_seconds_come_from_earlier_runs_of_the_same_scenario(runs):
     other = fake_run.scenario(name="other")
     fake_run.FakeRun(runs / "b.ddenv", other).created().baseline(4).close()
     (runs / "bad.ddenv").write_text("no run")
-    assert past_of(scenario(), runs) == Past(1, 2.0)
+    assert past_of(scenario(), runs) == Past(1, 2.0, 0.75)
     assert past_of(scenario(), runs / "none") == Past()
 
 
 def test_tests_and_time_are_told():
-    known = Past(1, 3.0)
+    known = Past(1, 3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
     assert "with 2 jobs; baseline 4, certificate 124; 3.0 s a test in earlier runs" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown.endswith("baseline 4, certificate 124; no time known yet")
+    assert unknown.endswith(") if f always shows; baseline 4, certificate 124")
     assert whole_cost(scenario(budget=9), 43, 1, known).startswith("9 tests at most, 27 s with 1 job")
 
 

@@ -53,8 +53,8 @@ COLUMNS = (
 )
 FRESH_COLUMNS = (
     Column("runs", 5, right=True),
-    Column("ended", 10, right=True, spare=1),
-    Column("f", 7, right=True),
+    Column("ended", 10, right=True, spare=2),
+    Column("f", 7, right=True, spare=1),
     Column("95 %", 11, right=True),
     Column("verdict", 14),
 )

@@ -13,7 +13,7 @@ from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import CLAIM, count, percent, signs, simulated
 
 # Maximum width of a model's name, in cells.
-NAME = 20
+NAME = 18
 
 
 def name_of(one: FreshRuns) -> str:

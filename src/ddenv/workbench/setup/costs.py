@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from statistics import median
+from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
 from ddenv.errors import UserError
@@ -19,15 +19,17 @@ if TYPE_CHECKING:
 
 # The maximum number of runs to read, and how many of the same scenario are enough.
 LOOKED_AT, ENOUGH = 30, 3
-UNKNOWN_TIME = "no time known yet"
+# What the numbers assume before the first run of a scenario.
+UNKNOWN_RATE = "if f always shows"
 
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """From earlier `runs` of a scenario: the median time of a test, real `seconds`."""
+    """From earlier `runs` of a scenario: the median time of a test, real `seconds`, and the `rate` of f in their baselines."""
 
     runs: int = 0
     seconds: float | None = None
+    rate: float | None = None
 
 
 def past_of(scenario: Scenario, folder: Path) -> Past:
@@ -36,14 +38,14 @@ def past_of(scenario: Scenario, folder: Path) -> Past:
         paths = sorted(folder.glob("*.ddenv"), key=lambda path: -path.stat().st_mtime)
     except OSError:
         return Past()
-    runs = (times for path in paths[:LOOKED_AT] if (times := _times(path, scenario)) is not None)
+    runs = (one for path in paths[:LOOKED_AT] if (one := _costs(path, scenario)) is not None)
     found = list(islice(runs, ENOUGH))
-    seconds = [each for times in found for each in times]
-    return Past(len(found), median(seconds) if seconds else None)
+    seconds, rates = ([each for one in found for each in one[part]] for part in (0, 1))
+    return Past(len(found), median(seconds) if seconds else None, mean(rates) if rates else None)
 
 
-def _times(path: Path, scenario: Scenario) -> list[float] | None:
-    """The real times of a run's tests, s; None for another scenario's run or a damaged one."""
+def _costs(path: Path, scenario: Scenario) -> tuple[list[float], list[float]] | None:
+    """The real times of a run's tests, s, and the rate in its baseline; None for another scenario's run or a damaged one."""
     try:
         with RunFile(path) as run:
             if not _alike(json.loads(run.document("scenario")), scenario):
@@ -52,7 +54,8 @@ def _times(path: Path, scenario: Scenario) -> list[float] | None:
     except (UserError, ValueError, RecursionError):
         return None
     times = [_positive(event.data.get("wall_seconds")) for event in events if event.kind == "test_finished"]
-    return [each for each in times if each is not None]
+    rates = [_positive(event.data.get("rate")) for event in events if event.kind == "baseline_finished"]
+    return [each for each in times if each is not None], [min(each, 1.0) for each in rates if each is not None]
 
 
 def _alike(data: Any, scenario: Scenario) -> bool:
@@ -72,7 +75,7 @@ def _positive(value: Any) -> float | None:
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
-    rough = rough_run(models, reduction)
+    rough = rough_run(models, reduction, past.rate)
     low, middle, high = rough.tests
     budget = getattr(reduction, "budget", None)
     if budget is not None:
@@ -82,7 +85,9 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
         words, parts = f"{count(budget, 'test')} at most", f"baseline {reduction.baseline_runs}"
+    if past.rate is None:
+        words = f"{words} {UNKNOWN_RATE}"
     if past.seconds is None:
-        return f"{words}; {parts}; {UNKNOWN_TIME}"
+        return f"{words}; {parts}"
     spent = duration(middle * past.seconds / jobs)
     return f"{words}, {spent} with {count(jobs, 'job')}; {parts}; {past.seconds:.1f} s a test in earlier runs"
