@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
@@ -230,18 +230,27 @@ async def begin(pilot: Pilot[int], run: Path) -> None:
         await take(other, "tiny")
     await press(pilot, "a")
     await take_live(pilot, "run", pilot)
-    for name, size, theme in (("run-large", LARGE, ""), ("run-light", MIDDLE, "ddenv-light")):
-        async with opened(run, size, theme) as other:
-            await take_live(other, name, pilot)
-    async with opened(run, MIDDLE, "ansi-dark") as other:
-        await take_live(other, "run-ansi", pilot)
-    async with opened(run, SMALL) as other:
-        await press(other, "1")
-        await take_live(other, "run-map", pilot)
-        await press(other, "2")
-        await take_live(other, "run-table", pilot)
-    async with opened(run, MIDDLE, watch=True) as other:
-        await take_live(other, "watch", pilot)
+    # The next screens take a moment to open.
+    await pause(pilot, True)
+    await other_failures(pilot)
+    await from_elsewhere(pilot, run)
+
+
+async def from_elsewhere(pilot: Pilot[int], run: Path) -> None:
+    """The same round on other screens. All are opened first: the rounds of this run are soon over."""
+    async with AsyncExitStack() as stack:
+
+        async def other(size: tuple[int, int], theme: str = "", *, watch: bool = False) -> Pilot[int]:
+            return await stack.enter_async_context(opened(run, size, theme, watch=watch))
+
+        views = {"run-map": await other(SMALL), "run-table": await other(SMALL), "run-large": await other(LARGE)}
+        views |= {"run-light": await other(MIDDLE, "ddenv-light"), "run-ansi": await other(MIDDLE, "ansi-dark")}
+        views["watch"] = await other(MIDDLE, watch=True)
+        await press(views["run-map"], "1")
+        await press(views["run-table"], "2")
+        for name, view in views.items():
+            await take_live(view, name, pilot)
+    await pause(pilot, True)
 
 
 async def take_dialogs(pilot: Pilot[int]) -> None:
@@ -259,18 +268,26 @@ async def take_dialogs(pilot: Pilot[int]) -> None:
     await press(pilot, "x")
 
 
-async def guide(pilot: Pilot[int]) -> None:
-    """Another failure is looked at, a platform is pinned, and the platforms are tried alone: they are enough."""
+async def other_failures(pilot: Pilot[int]) -> None:
+    """A candidate that fell is not similar. Early, since later rounds of this run may meet no other failure."""
     while not (rows := others(state(pilot))):
+        if state(pilot).certificate is not None:
+            raise RuntimeError("the rounds are over, and none met another failure")
+        await pause(pilot, False)
         await accept_if_waiting(pilot)
         await pilot.pause(0.05)
-    await press(pilot, "space")
-    await until(pilot, lambda: state(pilot).paused)
+    await pause(pilot, True)
     await press(pilot, "2", "home", *["down"] * rows[0], "a")
     await take(pilot, "other")
     await press(pilot, "n", "f")
     await take(pilot, "failures")
-    await press(pilot, "escape", "p", *"near", "tab", "enter")
+    await press(pilot, "escape")
+
+
+async def guide(pilot: Pilot[int]) -> None:
+    """A platform is pinned, and the platforms are tried alone: they are enough."""
+    await pause(pilot, True)
+    await press(pilot, "p", *"near", "tab", "enter")
     await until(pilot, lambda: bool(state(pilot).pinned))
     await press(pilot, "o", *"asphalt", "tab", "down", "tab")
     await take(pilot, "choose")
@@ -431,7 +448,8 @@ async def take(pilot: Pilot[int], name: str, *, at_once: bool = False) -> None:
 
 
 async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
-    """A picture while a robot moves, also at its end; `guiding` accepts what waits meanwhile."""
+    """A picture while a robot moves, also at its end; `guiding` lets the run go on, and accepts what waits meanwhile."""
+    await pause(guiding, False)
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         await accept_if_waiting(guiding)
@@ -441,6 +459,13 @@ async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
             if is_under_way(pilot):
                 return
     raise TimeoutError(name)
+
+
+async def pause(pilot: Pilot[int], wanted: bool) -> None:
+    """Pauses the run, or lets it go on."""
+    if state(pilot).paused is not wanted:
+        await press(pilot, "space")
+        await until(pilot, lambda: state(pilot).paused is wanted)
 
 
 async def accept_if_waiting(pilot: Pilot[int]) -> None:

@@ -139,7 +139,9 @@ def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, 
     if isinstance(first, FreshRuns):
         names = (certificate_rows.name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
         longest = Column("environment", max(13, *(cell_len(name) + 1 for name in names)))
-        return _fitted((longest, *FRESH_COLUMNS), width, narrow)
+        rest = (each for each in FRESH_COLUMNS if not (narrow and each.name == "ended"))
+        # How often f showed goes only where there is no room for it.
+        return _fitted((longest, *rest), width, narrow=False)
     unused: tuple[str, ...] = () if isinstance(first, Candidate) else OF_CANDIDATES
     if isinstance(first, Candidate) and first.distance is None:
         unused = ("distance",)
