@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ddenv.engine import ahead
 from ddenv.engine.__main__ import _begin
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
@@ -31,8 +32,10 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run, read_parts
 from ddenv.runs.scenarios import scenario_for_world
 
-SHORTEST, LONGEST = 20.0, 60.0  # s
+SHORTEST, LONGEST_TEST = 20.0, 60.0  # s
 NEEDED = 3
+# Simulated time stands still while the engine thinks.
+ahead.LONGEST = 60.0
 BOX = """<model name="box_{0}"><static>true</static><pose>{1} {2} 0.5 0 0 0</pose><link name="link">
 <collision name="c"><geometry><box><size>0.4 0.4 1</size></box></geometry></collision></link></model>"""
 GROUND = """<model name="ground_plane"><static>true</static><link name="link"><collision name="c"><geometry><plane>
@@ -65,7 +68,7 @@ class Simulated:
         return len(self.running)
 
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        takes = random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST)
+        takes = random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST_TEST)
         self.made, self.busy_for = self.made + 1, self.busy_for + takes
         heapq.heappush(self.running, (self.clock + takes, test, self.needed <= keep, seed))
 

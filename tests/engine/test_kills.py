@@ -24,8 +24,10 @@ from tests.engine.killing import story
 from tests.waiting import PATIENCE, PERIOD
 
 KILLS = int(os.environ.get("DDENV_KILLS", "6"))
-# An engine is killed within this time after its workers were started, and so is one of them, s: some before they are ready.
-LIFE = 4.0
+# An engine is killed within this time after its first test began, and so is one of its workers, s. One engine in so many dies
+# before that, within this time after its workers were started.
+LIFE = 3.0
+EARLY, ONE_IN = 1.5, 5
 
 # Fails where the deck and the wall are. It starts no Python: a test takes a few hundredths of a second.
 ROBOT = """
@@ -67,14 +69,21 @@ def workers(engine: int) -> list[int]:
     return found
 
 
+def tests_begun(run: Path) -> int:
+    """How many tests ever began in a run."""
+    with RunFile(run) as file:
+        return sum(event.kind == "test_started" for event in file.events())
+
+
 def lives(run: Path, dice: random.Random, most: int) -> int:
     """One engine's life on a run: a worker is killed, and then the engine. Returns how many kills there were, at most `most`."""
+    before = tests_begun(run)
     engine = start_engine(run, 2, anyway="yes")
-    kills, began = 0, math.inf
-    moments = sorted(dice.uniform(0.0, LIFE) for _ in range(min(2, most)))
+    kills, began, early = 0, math.inf, dice.randrange(ONE_IN) == 0
+    moments = sorted(dice.uniform(0.0, EARLY if early else LIFE) for _ in range(min(2, most)))
     while engine.poll() is None and kills < len(moments):
         time.sleep(PERIOD)
-        if began == math.inf and workers(engine.pid):
+        if began == math.inf and (workers(engine.pid) if early else tests_begun(run) > before):
             began = time.monotonic()
         if time.monotonic() - began < moments[kills]:
             continue

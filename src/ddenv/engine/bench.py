@@ -28,7 +28,7 @@ from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import BROKEN, Trial
+from ddenv.runfile.state import AHEAD, BROKEN, Trial
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.world.scenario import FailureSpec
 
@@ -69,6 +69,8 @@ PATIENCE = 1.0
 MOST_BROKEN = 25
 
 Wanted = list[tuple[Keep, int, int | None]]
+# So many tests that are likely to be wanted and not started yet, the likeliest first.
+Likely = Callable[[int, Callable[[Asked], bool]], list[Asked]]
 
 
 class Bench:
@@ -98,37 +100,44 @@ class Bench:
         round: int | None,
         wanted: Callable[[], Wanted],
         meanwhile: Iterator[object] | None = None,
+        likely: Likely | None = None,
     ) -> None:
         """Makes tests until none is wanted. While tests run, advances `meanwhile` (`Thinking`).
 
         `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is called again after every look. Raises Stopped, Steered, and UserError if nothing can be simulated or all
-        tests break.
+        them; it is called again after every look. Several workers take what is `likely` to be wanted, the likeliest first, if that
+        is given. Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
         """
-        full = self._journal.is_full(phase)
         self._thinking.begin(meanwhile)
         while tests := wanted():
-            # With hundreds of workers thousands are wanted at every look: only those that can start are put together.
-            due = ((keep, run, candidate) for keep, run, candidate in tests if (keep, run, full) not in self._started)
-            if self._start(
-                [Asked(phase, keep, run, round, candidate) for keep, run, candidate in islice(due, self._free)], full
-            ):
+            if self._start(self._next(phase, round, tests, likely)):
                 # Other tests may be wanted now.
                 self._look(0.0)
             else:
                 self.tick()
 
-    @property
-    def _free(self) -> int:
-        """How many tests of a phase may start now. A step is one test, the next in order; nothing runs ahead."""
-        return self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+    def _next(self, phase: str, round: int | None, tests: Wanted, likely: Likely | None) -> list[Asked]:
+        """The tests to start now, as many as workers are free. A step is one test, the next in order; nothing runs ahead."""
+        speculates = self._control.speculates()
+        free = self._pool.idle if speculates else int(self._pool.busy == 0)
+        if not free or not self._control.may_start():
+            return []
+        if likely is not None and speculates and self._journal.state.jobs > 1:
+            found = likely(free, self._is_started)
+            if found or self._pool.busy:
+                return found
+        asked = (Asked(phase, keep, run, round, candidate) for keep, run, candidate in tests)
+        return list(islice((one for one in asked if not self._is_started(one)), free))
 
-    def _start(self, tests: list[Asked], full: bool) -> bool:
+    def _is_started(self, asked: Asked) -> bool:
+        return (asked.keep, asked.run, self._journal.is_full(asked.phase)) in self._started
+
+    def _start(self, tests: list[Asked]) -> bool:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
         for asked in tests:
             if not self._control.may_start():
                 return False
-            implied = self._make(asked, full)
+            implied = self._make(asked)
             if implied is None:
                 return False
             self._control.started()
@@ -136,12 +145,12 @@ class Bench:
                 return True
         return False
 
-    def _make(self, asked: Asked, full: bool) -> bool | None:
+    def _make(self, asked: Asked) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
         Raises Stopped if it is used up and no test runs.
         """
-        journal = self._journal
+        journal, full = self._journal, self._journal.is_full(asked.phase)
         source = journal.implying(asked.keep, asked.run, full)
         if source is not None and asked.phase != "audit" and not audit_is_due(journal.state, asked.phase):
             journal.imply(asked, source)
@@ -176,10 +185,9 @@ class Bench:
         """Starts tests of tries, also while the rounds are paused. Raises Stopped if the budget is used up."""
         if not self._journal.state.failures or not open_trials(self._journal):
             return
-        full = self._journal.is_full("hand")
         wanted = [Asked("hand", keep, run, trial=trial) for keep, run, trial in judge_trials(self._journal)]
-        for asked in [one for one in wanted if (one.keep, one.run, full) not in self._started][: self._pool.idle]:
-            if self._make(asked, full) is None:
+        for asked in [one for one in wanted if not self._is_started(one)][: self._pool.idle]:
+            if self._make(asked) is None:
                 return
 
     def _is_spent(self) -> bool:
@@ -213,7 +221,8 @@ class Bench:
         for test, result in finished:
             self._record(test, result)
             self._thinking.test_ended()
-            self._give_up_if_all_break(result)
+            if self._journal.state.tests[test - 1].phase != AHEAD:
+                self._give_up_if_all_break(result)
         self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()

@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count, islice, takewhile
 from typing import Any
 
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
-from ddenv.engine.subjects import Keep
+from ddenv.engine.subjects import Asked, Keep
 from ddenv.rates import wilson_interval
-from ddenv.reduction.certificate import Claim, Procedure, Terms, error_of, falls, good_enough, keeps, settle
+from ddenv.reduction.certificate import Claim, Procedure, Terms, Verdict, error_of, falls, good_enough, keeps, settle
+from ddenv.reduction.chances_ahead import certificate_ahead, not_needed
 from ddenv.reduction.stepping_back import groups_again, last_good
+from ddenv.reduction.verdict import Shown
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, FRESH_RUNS
 
 # After this many steps back what is left stays as it is, and is not called minimal.
 MOST_STEPS_BACK = 14
+# With so many workers, what is likely to be wanted is looked at again after each test; with more, as much more rarely.
+WORKERS_A_LOOK = 8
 CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
+
+
+@dataclass
+class _Look:
+    """How likely fresh runs were to be wanted when so many `tests` had ended."""
+
+    tests: int = -1
+    chances: dict[tuple[Keep, int], float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,7 @@ class Certifier:
     bench: Bench
     free: Sequence[str]
     moves: bool
+    _look: _Look = field(default_factory=_Look)
 
     def certify(self, at_least: int, anew: bool = False) -> None:
         """Makes the certificate, unless this search has one already and no other is asked for. Raises as `Bench.work`."""
@@ -42,7 +57,7 @@ class Certifier:
         if last is None or (anew and last.claims):
             self._start(at_least)
         if not self._certificate.claims:
-            self.bench.work("certify", None, self._wanted)
+            self.bench.work("certify", None, self._wanted, likely=self._likely)
             named = [claim for claim in self._claims() if claim[1].verdict]
             tests = self._tests(claim for _, claim in named)
             journal.record("certificate_finished", claims=[self._plain(*claim) for claim in named], tests=tests)
@@ -61,42 +76,97 @@ class Certifier:
         return frozenset(self.journal.state.environment)
 
     def _start(self, at_least: int) -> None:
-        journal = self.journal
-        number = len(journal.state.certificates) + 1
-        journal.record(
+        new = self.foreseen(at_least)
+        self.journal.record(
             "certificate_started",
-            certificate=number,
-            run=journal.fresh_run,
-            rate=journal.rate_of_whole(),
-            keep_rate=journal.state.scenario["reduction"]["keep_rate"],
-            error=error_of(number),
+            certificate=new.number,
+            run=new.first_run,
+            rate=new.rate,
+            keep_rate=new.keep_rate,
+            error=new.error,
             at_least=at_least,
         )
 
     def _claims(self) -> list[tuple[str | None, Claim]]:
         """What is known so far: of what is left, then of each model; up to a claim that ends the certificate."""
-        now, left, whole = self._certificate, self._left, self.journal.whole
-        error = now.error / 2
-        first = self._settle(keeps(left, whole, Terms(now.keep_rate, now.rate, error, now.at_least)))
-        claims: list[tuple[str | None, Claim]] = [(None, first)]
-        if first.verdict == "lost":
-            return claims
-        for name in self.free:
-            terms = Terms(now.keep_rate, now.rate, error / len(self.free), now.at_least)
-            claims.append((name, self._settle(falls(self.journal.without(name), whole, terms))))
-            if self.moves and claims[-1][1].verdict == "not needed" and self._can_go(name):
+        claims: list[tuple[str | None, Claim]] = []
+        for name in (None, *self.free):
+            claims.append((name, self._settle(self._procedure(name, self._certificate))))
+            if self._ends(name, claims[-1][1].verdict):
                 break
         return claims
+
+    def _procedure(self, name: str | None, now: Certificate) -> Procedure:
+        """What shows the claim of what is left, or of the model `name`."""
+        left, whole, error = self._left, self.journal.whole, now.error / 2
+        if name is None:
+            return keeps(left, whole, Terms(now.keep_rate, now.rate, error, now.at_least))
+        terms = Terms(now.keep_rate, now.rate, error / len(self.free), now.at_least)
+        return falls(self.journal.without(name), whole, terms)
+
+    def _ends(self, name: str | None, verdict: Verdict) -> bool:
+        """Whether no later claim is made."""
+        if name is None:
+            return verdict == "lost"
+        return self.moves and verdict == "not needed" and self._can_go(name)
 
     def _can_go(self, name: str) -> bool:
         return self.journal.without(name) not in self.journal.refused
 
-    def _settle(self, procedure: Procedure) -> Claim:
-        first, jobs = self._certificate.first_run, max(1, self.journal.state.jobs)
-        return settle(procedure, lambda keep, run: self.journal.shown(keep, first + run, full=True), jobs)
+    def _settle(self, procedure: Procedure, ahead: int = 1) -> Claim:
+        return settle(procedure, self._shown(self._certificate.first_run), ahead)
+
+    def _shown(self, first: int) -> Callable[[Keep, int], Shown]:
+        return lambda keep, run: self.journal.shown(keep, first + run, full=True)
+
+    def ahead(self, now: Certificate, names: Sequence[str | None]) -> dict[tuple[Keep, int], float]:
+        """How likely each fresh run is to be wanted that is not made yet, by (models, run), for the claims of `names`."""
+        journal, shown, whole = self.journal, self._shown(now.first_run), self.journal.whole
+        begin = [partial(self._procedure, name, now) for name in names]
+        rates = {whole: now.rate, self._left: now.rate}
+        without = {journal.without(name) for name in names if name is not None} - rates.keys()
+        spared = {keep: not_needed(now.rate, *self._counts(keep, now)) for keep in without}
+        chances = certificate_ahead(begin, lambda i, verdict: self._ends(names[i], verdict), shown, rates, spared)
+        return {(keep, now.first_run + run): chance for (keep, run), chance in chances.items()}
+
+    def _counts(self, keep: Keep, now: Certificate) -> tuple[int, int]:
+        """How many of the first fresh runs of `keep` showed f, and how many missed it."""
+        shown = list(takewhile(lambda one: one is not None, map(partial(self._shown(now.first_run), keep), count())))
+        return shown.count(True), shown.count(False)
+
+    def foreseen(self, at_least: int) -> Certificate:
+        """The certificate that comes next, if the search ends here."""
+        journal, number = self.journal, len(self.journal.state.certificates) + 1
+        keep_rate: float = journal.state.scenario["reduction"]["keep_rate"]
+        rate = journal.rate_of_whole()
+        return Certificate(number, journal.state.node, journal.fresh_run, keep_rate, rate, error_of(number), at_least)
+
+    def _likely(self, most: int, is_started: Callable[[Asked], bool]) -> list[Asked]:
+        """As `Bench.work` wants it. What is sure to be wanted needs no play."""
+        undecided = [claim for claim in self._claims() if not claim[1].verdict]
+        due = [asked for keep, run, _ in self._wanted_by(undecided[:1]) if not is_started(asked := _asked(keep, run))]
+        if len(due) >= most:
+            return due[:most]
+        look, made, shown = self._look, self.journal.state.tests_done, self.journal.shown
+
+        def found() -> list[Asked]:
+            likely = (_asked(*test) for test in sorted(look.chances, key=lambda test: -look.chances[test]))
+            new = (one for one in likely if shown(one.keep, one.run, True) is None and not is_started(one))
+            return list(islice(new, most))
+
+        # A look takes some ms, and one test more changes little where there are many.
+        soon = look.tests >= 0 and made - look.tests <= self.journal.state.jobs // WORKERS_A_LOOK
+        if soon and (known := found()):
+            return known
+        if made != look.tests:
+            look.tests, look.chances = made, self.ahead(self._certificate, [name for name, _ in undecided])
+        return found()
 
     def _wanted(self) -> Wanted:
-        wanted = dict.fromkeys(test for _, claim in self._claims() for test in self._in_order(claim))
+        return self._wanted_by(self._claims())
+
+    def _wanted_by(self, claims: Iterable[tuple[str | None, Claim]]) -> Wanted:
+        wanted = dict.fromkeys(test for _, claim in claims for test in self._in_order(claim))
         return [(keep, self._certificate.first_run + run, None) for keep, run in wanted]
 
     def _in_order(self, claim: Claim) -> Sequence[tuple[Keep, int]]:
@@ -152,7 +222,8 @@ class Certifier:
         judged_last: dict[Keep, Claim] = {}
 
         def judged(keep: Keep) -> Claim:
-            judged_last[keep] = self._settle(good_enough(keep, now.rate, now.keep_rate, lost_rate))
+            procedure = good_enough(keep, now.rate, now.keep_rate, lost_rate)
+            judged_last[keep] = self._settle(procedure, max(1, journal.state.jobs))
             return judged_last[keep]
 
         def wanted() -> Wanted:
@@ -183,3 +254,7 @@ class Certifier:
             environment=[index for index, each in enumerate(state.elements) if each in keep],
             evidence_test=journal.evidence_of(tests),
         )
+
+
+def _asked(keep: Keep, run: int) -> Asked:
+    return Asked("certify", keep, run)

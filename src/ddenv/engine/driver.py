@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from typing import Any
 
 from ddenv.claims import current, is_minimal, verdict_on
+from ddenv.engine.ahead import Ahead, Now
+from ddenv.engine.announcing import announce
 from ddenv.engine.auditing import compare
 from ddenv.engine.baseline import run_baseline
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.certify import CHANGED, Certifier
 from ddenv.engine.control import Control, Steered, Stopped
+from ddenv.engine.forecasting import forecasting
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
 from ddenv.engine.slicing import audit_slice, slice_environment
-from ddenv.engine.subjects import Keep, other_way
+from ddenv.engine.subjects import Asked, Keep
 from ddenv.engine.wall_limit import limit_after
-from ddenv.errors import UserError
 from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.forecast import Memory, Moment, interval, playing
-from ddenv.reduction.guide import Search, make_guide, search
+from ddenv.reduction.forecast import Memory, Moment
+from ddenv.reduction.guide import Guide, Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.rounds_ahead import Path, RoundsAhead, foreseeing
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Standing, standing
@@ -38,8 +40,8 @@ from ddenv.words import count
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
-# Tests looked for at a time, for each worker: those that run are among them.
-AHEAD = 4
+# Of larger environments, only so many claims of a certificate are foreseen.
+MOST_CLAIMS = 20
 # The sets of models of so many candidates are held: with thousands of models, one takes a while to make and to find in the ledger,
 # and 10,000 of them would take gigabytes.
 HELD = 64
@@ -61,6 +63,8 @@ class Driver:
         self._learnt: set[int] = set()
         self._number = {name: index for index, name in enumerate(journal.state.elements)}
         self._pinned: Keep = frozenset()
+        # The winners of this search's rounds so far.
+        self._path: Path = ()
         # By the identities of candidates, which live as long as they are held here.
         self._keeps: dict[int, tuple[Candidate, Keep]] = {}
         # How many candidates of the round were dissimilar, and how many refusals there were at that time.
@@ -132,7 +136,7 @@ class Driver:
     ) -> Search:
         """The algorithm and the schemas by name; first it leaves out the groups `again`. Raises UserError for unknown names."""
         partitioning, prioritization = split_pair(asked.pair)
-        elements, self._memory = self._stacks.representatives, Memory()
+        elements, self._memory, self._foreseen = self._stacks.representatives, Memory(), Memory()
         self._guide = make_guide(
             partitioning,
             prioritization,
@@ -146,11 +150,18 @@ class Driver:
             rate=self._rate,
             runs=lambda: self._journal.rule.misses,
         )
-        guide = self._memory.of(replace(self._guide, broke=self._broke))
-        if not again:
-            return self._stacks.expand(search(asked.algorithm, elements, guide))
-        searched = partial(search, asked.algorithm, guide=guide)
-        return self._stacks.expand(tried_again(elements, again, searched))
+        guide = replace(self._guide, broke=self._broke)
+
+        def begin(guide: Guide) -> Search:
+            if not again:
+                return self._stacks.expand(search(asked.algorithm, elements, guide))
+            searched = partial(search, asked.algorithm, guide=guide)
+            return self._stacks.expand(tried_again(elements, again, searched))
+
+        rounds = RoundsAhead(lambda: begin(foreseeing(guide, self._memory, self._foreseen, asked.pair)))
+        self._path = ()
+        self._ahead = Ahead(self._journal, rounds, self._pinned, self._certifier, asked.baseline_runs)
+        return begin(self._memory.of(guide))
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
@@ -186,9 +197,18 @@ class Driver:
         # Their results count, too.
         self._bench.finish_trials()
         free = [name for name in self._stacks.representatives if name in kept]
-        # Whoever accepts each reduction by hand also goes back by hand.
-        moves = self._reduction.accept_rate == "kept" and self._journal.state.accept_mode == "automatic"
-        self._certify(free, self._reduction.baseline_runs, moves)
+        self._certify(free, self._reduction.baseline_runs, self._moves)
+
+    @property
+    def _moves(self) -> bool:
+        """Whether the run goes on by a certificate. Whoever accepts each reduction by hand also goes back by hand."""
+        return self._reduction.accept_rate == "kept" and self._journal.state.accept_mode == "automatic"
+
+    def _certifier(self) -> Certifier:
+        """For the environment as it is now, if that has only so many claims."""
+        there = frozenset(self._journal.state.environment)
+        free = islice((name for name in self._stacks.representatives if name in there), MOST_CLAIMS)
+        return Certifier(self._journal, self._bench, list(free), self._moves)
 
     def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
         """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
@@ -233,7 +253,7 @@ class Driver:
         # Whoever waits before the first test of a round sees its candidates.
         audit_slice(self._journal, self._bench)
         self._judged = 0
-        forecast = self._forecast(number, self._moment(round))
+        forecast = forecasting(self._journal, number, self._moment(round))
         winner = self._judge(number, round, forecast)
         while winner is not None and not self._is_accepted(number, winner):
             winner = self._judge(number, round, forecast)
@@ -246,28 +266,13 @@ class Driver:
         if winner is not None and self._journal.current.number == number and slice_environment(self._journal):
             # The search goes on in the slice.
             raise Steered
+        self._path = (*self._path, winner)
         return None if winner is None else round.candidates[winner]
 
     def _announce(self, number: int, round: Round) -> None:
         # These schemas score by distance in m, which is useful to show.
         shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
-
-        def distance(candidate: Candidate) -> float | None:
-            return float(f"{round.scores[candidate.partition]:.3f}") if shown else None
-
-        partitions = [self._numbers(partition) for partition in round.partitions]
-        more: dict[str, Any] = {"pinned": self._numbers(self._pinned)} if self._pinned else {}
-        self._journal.record_once(
-            "round_started",
-            number,
-            n_partitions=round.n_partitions,
-            environment=self._numbers((*round.environment, *self._pinned)),
-            partitions=partitions,
-            candidates=[[one.kind, one.partition, distance(one)] for one in round.candidates],
-            **more,
-        )
-        if self._journal.partitions[number] != partitions:
-            raise UserError(other_way(number))
+        announce(self._journal, number, round, self._pinned, shown)
         if self._journal.current.number != number:
             return
         for index, one in enumerate(round.candidates) if self._journal.refused else ():
@@ -289,17 +294,6 @@ class Driver:
             max(1, self._journal.state.jobs),
         )
 
-    def _forecast(self, number: int, moment: Moment) -> Iterator[object]:
-        """Simulates the search from `moment` on, and records how many tests are left; once a round."""
-        if self._journal.has("forecast", number):
-            return
-        done, tests = self._journal.state.tests_done, list[float]()
-        for play in playing(moment):
-            tests += [] if play is None else [play]
-            yield play
-        if tests:
-            self._journal.record_once("forecast", number, tests=interval(tests), tests_done=done)
-
     def _judge(self, number: int, round: Round, forecast: Iterator[object]) -> int | None:
         """The index of the first similar candidate that was not rejected, or None when all are judged."""
 
@@ -311,16 +305,17 @@ class Driver:
             self._record_verdicts(number, round, now.verdicts)
             return [(self._keep(round.candidates[index]), run, index) for index, run in now.wanted]
 
-        self._bench.work("round", number, wanted, forecast)
+        def likely(most: int, is_started: Callable[[Asked], bool]) -> list[Asked]:
+            return self._ahead.likely(Now(self._path, number, round, self._judged), most, is_started)
+
+        self._bench.work("round", number, wanted, forecast, likely)
         return self._standing(round).winner
 
     def _standing(self, round: Round) -> Standing:
         """Tests of the candidates that have no verdict yet."""
         open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
         shown, rule, refused = self._journal.shown, self._rule(round), self._journal.refused
-        return standing(
-            open_ones, shown, rule, refused, first=self._judged, enough=AHEAD * max(1, self._journal.state.jobs)
-        )
+        return standing(open_ones, shown, rule, refused, first=self._judged, enough=1)
 
     def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
         """Records verdicts in the order of candidates: tests that ran ahead of time wait for their turn."""
@@ -332,15 +327,15 @@ class Driver:
                 # What has lost the rate is not tested.
                 lost = models in self._journal.refused
                 tests = [] if lost else self._journal.tests_of(models, self._rule(round))
-                if (
-                    verdict == "dissimilar"
-                    and not standing([models], self._journal.shown, self._journal.rule).verdicts[0]
-                ):
+                # By these tests alone: more of them may have been made ahead of time.
+                shown = sum(self._journal.state.tests[test - 1].outcome == "similar" for test in tests)
+                if verdict == "dissimilar" and not self._journal.rule.verdict(shown, len(tests) - shown):
                     verdict = "missed"
                 known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
                 self._journal.record_once(
                     "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
                 )
+                self._ahead.judged(round, self._judged, verdict == "similar")
             if verdict == "similar":
                 return
             self._judged += 1
@@ -391,6 +386,7 @@ class Driver:
     def _look_at(self, test: int | None) -> None:
         """The schemas see `test`, the last similar run."""
         assert test is not None
+        self._foreseen = Memory()
         self._evidence = self._sight.evidence(
             self._journal.state, test, rows_of(self._journal.file, test), self._trials
         )

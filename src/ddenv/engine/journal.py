@@ -13,7 +13,7 @@ from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, ISOLATE, Round, RunState, Test
+from ddenv.runfile.state import AHEAD, BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, ISOLATE, Round, RunState, Test
 from ddenv.runfile.store import ROBOT, Event, Motions, RunFile
 from ddenv.runfile.supports import stack_with
 
@@ -79,7 +79,6 @@ class Journal:
         self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         self._broke: dict[tuple[Keep, int, bool], int] = {}
-        self._rested_on: set[int] = set()
         self.known = KnownTests()
         self._steps_back = 0
         self._again: tuple[tuple[str, ...], ...] = ()
@@ -136,7 +135,7 @@ class Journal:
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
         # Fresh runs that only ran ahead of time would make it depend on the number of workers.
-        named = (test for test in self.state.tests if test.phase not in (*FRESH, ISOLATE) or test.id in self._rested_on)
+        named = (test for test in self.state.tests if test.phase not in (*FRESH, ISOLATE) or self._rests_on(test))
         tests = [test for test in named if self.keep_of_test(test.id) == self.whole]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
@@ -179,7 +178,11 @@ class Journal:
     @property
     def rested_on(self) -> tuple[int, ...]:
         """The tests that decisions rest on, without those that only ran ahead of time."""
-        return tuple(sorted(self._rested_on))
+        tests, began = self.state.tests, self.state.baseline is not None
+        return tuple(test.id for test in tests if self._rests_on(test) or (began and test.phase == "baseline"))
+
+    def _rests_on(self, test: Test) -> bool:
+        return bool(self.state.rests_on >> test.id & 1)
 
     def keep_of_test(self, test: int) -> Keep:
         """The models in a test's world."""
@@ -198,7 +201,9 @@ class Journal:
 
     def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
         state = self.state
-        known = tuple(test.id for test in state.tests if test.phase in ("round", "hand") and test.is_finished)
+        # What only ran ahead of time would make it depend on the number of workers.
+        of_search = (test for test in state.tests if test.phase in ("round", AHEAD, "hand"))
+        known = tuple(test.id for test in of_search if test.is_finished and self._rests_on(test))
         return Leg(
             first_round,
             n_partitions,
@@ -213,7 +218,9 @@ class Journal:
 
     def is_full(self, phase: str) -> bool:
         """Whether tests of this phase run to the end even if the robot is stuck for good."""
-        return phase not in ("round", "hand", "audit") or not self.state.scenario["reduction"].get("early_stop", False)
+        return phase not in ("round", AHEAD, "hand", "audit") or not self.state.scenario["reduction"].get(
+            "early_stop", False
+        )
 
     def start_test(self, asked: Asked, audits: int | None = None) -> int:
         """Writes that a test starts, although the test `audits` implies it; returns its id. Raises as `Asked.place`."""
@@ -291,13 +298,6 @@ class Journal:
         if not data["same"]:
             self.known = KnownTests()
 
-    def _rests(self, data: dict[str, Any]) -> None:
-        """Decisions rest on these tests, whatever the number of workers."""
-        self._rested_on.update(data.get("tests", ()))
-
-    def _baseline_finished(self, _: dict[str, Any]) -> None:
-        self._rested_on.update(test.id for test in self.state.tests if test.phase == "baseline")
-
     def _slices_refuted(self, _: dict[str, Any]) -> None:
         """What was implied is wanted again."""
         tests = self.state.tests
@@ -305,7 +305,6 @@ class Journal:
 
     def _rate_lost(self, data: dict[str, Any]) -> None:
         """What has lost the rate, and all parts of it, are not taken again."""
-        self._rested_on.update(data.get("tests", ()))
         elements = self.state.elements
         self._steps_back += 1
         self._again = tuple(tuple(elements[model] for model in group) for group in data["again"])
@@ -376,10 +375,6 @@ class Journal:
 _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "engine_started": Journal._engine_started,
     "compared": Journal._compared,
-    "baseline_finished": Journal._baseline_finished,
-    "candidate_judged": Journal._rests,
-    "trial_judged": Journal._rests,
-    "certificate_finished": Journal._rests,
     "rate_lost": Journal._rate_lost,
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,

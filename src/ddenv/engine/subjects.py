@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.state import FRESH, ISOLATE, Round, RunState, Test
+from ddenv.runfile.state import AHEAD, FRESH, ISOLATE, Round, RunState, Test
 from ddenv.runfile.supports import stack_with
 
 Keep = frozenset[str]
@@ -38,6 +38,8 @@ class Asked:
             place |= {"removal": self.candidate, "node": 0}
         if self.phase in ("certify", "audit"):
             place |= _node(state, self.keep)
+        if self.phase == AHEAD:
+            place |= _part(state, self.keep)
         if self.phase == "hand":
             place["trial"] = self.trial
         # All candidates meet the same noise.
@@ -61,6 +63,14 @@ def _node(state: RunState, keep: Keep) -> dict[str, int]:
     return {"node": state.node, "without": state.elements.index(gone)}
 
 
+def _part(state: RunState, keep: Keep) -> dict[str, Any]:
+    """How an event names the models of a test ahead of its round: what is left out of the environment, or what stays."""
+    number = {name: index for index, name in enumerate(state.elements)}
+    gone = [number[name] for name in state.environment if name not in keep]
+    stays = 0 < len(keep) < len(gone)
+    return {"node": state.node, "stays": stays, "part": sorted(number[name] for name in keep) if stays else gone}
+
+
 class Keeps:
     """The models of tests that have just started, as sets. Runs of one candidate share one: of thousands of models, a set takes a
     while to be made.
@@ -82,6 +92,8 @@ class Keeps:
             return self._set(state.elements).difference(state.removals[test.removal - 1].models)
         if test.phase == "hand":
             return frozenset(state.trials[(test.trial or 0) - 1].models)
+        if test.phase == AHEAD:
+            return frozenset(() if test.tried is None else test.tried.models)
         return self.of_candidate(state, test.candidate or 0)
 
     def of_candidate(self, state: RunState, candidate: int) -> Keep:

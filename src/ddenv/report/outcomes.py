@@ -22,7 +22,7 @@ from ddenv.page.blocks import (
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runfile.state import AHEAD, BROKEN, RunState
 from ddenv.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.words import count, failed_in
 
@@ -62,6 +62,7 @@ MEANING = {
 PHASES = (
     ("baseline", "whole world"),
     ("round", "in rounds"),
+    (AHEAD, "ahead of their rounds"),
     ("hand", "by hand"),
     ("audit", "audits of slices"),
     ("certify", "fresh runs"),
@@ -142,11 +143,13 @@ def _tests(state: RunState) -> list[Block]:
     head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
     table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
     slices = _slices(state)
-    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"]:
+    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"] and not state.ahead:
         return [table, *slices]
     words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates whose first test did not show f."
     if state.cut_tests:
         words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
+    if state.ahead:
+        words += f" {thousands(state.ahead)} were made ahead of time by idle workers, and no verdict rests on them."
     if lost := state.tally["lost"]:
         words += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
     return [table, say(words), *slices]

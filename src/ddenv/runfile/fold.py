@@ -9,6 +9,7 @@ from typing import Any
 from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.runfile import (
+    fold_ahead,
     fold_baseline,
     fold_certificates,
     fold_decisions,
@@ -40,7 +41,7 @@ def apply(state: RunState, event: Event) -> RunState:
     if handler is None:
         raise UserError(f"damaged run file: event {event.id} is of an unknown kind {event.kind[:40]!a}")
     try:
-        changes = handler(state, event.data, event.time)
+        changes = fold_ahead.counted(state, event.kind, event.data, handler(state, event.data, event.time))
         if (command := event.data.get("command")) is not None:
             changes["last_command"] = max(state.last_command, int(command))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
@@ -99,6 +100,7 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
         removal=fold_isolation.removal_of(state, data),
         audits=data.get("audits"),
         node=data.get("node", state.node),
+        tried=fold_ahead.tried(state, data),
     )
     # Raises IndexError if there is none.
     here(state, test.node)

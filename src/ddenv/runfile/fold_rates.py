@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ddenv.runfile.events import Changes
-from ddenv.runfile.state import BROKEN, FRESH, Node, RunState, Test
+from ddenv.runfile.state import AHEAD, BROKEN, FRESH, Node, RunState, Test
 
 
 def noted(state: RunState, test: Test) -> Changes:
@@ -36,7 +36,8 @@ def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
 
 
 def _made_for(test: Test) -> tuple[object, ...]:
-    return test.phase, test.round, test.candidate, test.trial, test.removal, test.node, test.without
+    alone = test.id if test.phase == AHEAD else None
+    return test.phase, test.round, test.candidate, test.trial, test.removal, test.node, test.without, alone
 
 
 def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:

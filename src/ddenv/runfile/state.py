@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import islice, takewhile
+from itertools import islice
 from typing import Any
 
 from ddenv.resting import Supports
@@ -27,6 +27,8 @@ _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 FRESH = ("certify", "confirm")
 # The phase of runs of the whole world without the models of a removal: all are full.
 ISOLATE = "isolate"
+# The phase of tests that idle workers make of candidates whose round may come.
+AHEAD = "ahead"
 # The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
 FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
@@ -56,6 +58,8 @@ class RunState:
     `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
     `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world.
+    Of the tests that idle workers made ahead of time, `ahead` ones are not needed so far: no decision rests on them. `rests_on` has
+    the bits 1 << id of the others.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -100,6 +104,8 @@ class RunState:
     supports: Supports = ()
     ties: tuple[tuple[str, str], ...] | None = None
     implied: int = 0
+    ahead: int = 0
+    rests_on: int = 0
     audits: int = 0
     refuted: tuple[int, int] | None = None
     notes: tuple[tuple[str, str], ...] = ()
@@ -204,9 +210,8 @@ class RunState:
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
-        # Tries of the user may run between them.
-        last = takewhile(lambda test: test.phase in (*FRESH, "hand", ISOLATE), reversed(self.tests))
-        return tuple(test for test in last if test.phase in FRESH)[::-1]
+        first = self.certificates[-1].first_run if self.certificates else 0
+        return tuple(test for test in self.tests if test.phase in FRESH and test.run >= first)
 
     @property
     def running_tests(self) -> tuple[Test, ...]:
@@ -342,12 +347,13 @@ class Test:
     """One run of the robot.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
-    "hand" (for the user's trial number `trial`), "audit" (of the slice in `node`) or "certify": a run with a fresh seed of the
-    environment of `node`, or of that without the model `without`; or "isolate": a run of the whole world after removal number
-    `removal`. In other phases `node` was the current one. `run` is i in seed = base + i; above 0 in a round it is a re-run
-    (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it
-    ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot
-    sensed or touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good.
+    "hand" (for the user's trial number `trial`), "audit" (of the slice in `node`), "ahead" (of a round that may come: of `tried`)
+    or "certify": a run with a fresh seed of the environment of `node`, or of that without the model `without`; or "isolate": a
+    run of the whole world after removal number `removal`. In other phases `node` was the current one. `run` is i in
+    seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is
+    x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and
+    `first_touched` are the models that the robot sensed or touched, with the simulated time of the first time, s. `cut`: ended
+    early, because the robot was stuck for good.
     `took_part` are the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that
     test implies it; `audits`: it was, although that test implies it.
     `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.

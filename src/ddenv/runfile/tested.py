@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ddenv.amounts import first_of
 from ddenv.runfile.atlas import without_removal
 from ddenv.runfile.position import Moment
-from ddenv.runfile.state import FRESH, Candidate, RunState, Test, Trial
+from ddenv.runfile.state import AHEAD, FRESH, Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import stack_with
 
 OF_TESTS = ("test_started", "test_finished", "test_lost", "implied")
@@ -29,6 +29,8 @@ def purpose(state: RunState, test: Test) -> Purpose:
         return Purpose(f"{where}{row.label}", row.models)
     if test.phase == "round":
         return Purpose(f"round {test.round}", None)
+    if test.phase == AHEAD:
+        return Purpose("ahead of its round", None if test.tried is None else test.tried.models)
     if test.phase == "audit":
         return Purpose("an audit of the slice", state.nodes[test.node].environment)
     if test.removal is not None:
