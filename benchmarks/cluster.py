@@ -2,16 +2,17 @@
 
 python benchmarks/cluster.py [--models 200] [--workers 1,8,64,512]
 
-Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the engine itself
-takes is real, and shown.
+Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the engine itself takes is real, and
+shown. The last row is what any number of workers could reach without a look ahead: all tests of a round at once, one round after
+the other, and then all of a certificate at once.
 """
 
 from __future__ import annotations
 
 import argparse
 import heapq
+import math
 import random
-import sys
 import tempfile
 import threading
 import time
@@ -51,6 +52,11 @@ def world(folder: Path, models: int) -> Path:
     return path
 
 
+def duration(keep: frozenset[str], seed: int) -> float:
+    """How long a test takes, simulated s."""
+    return random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST_TEST)
+
+
 class Simulated:
     """Stands for a pool: the test that ends first ends, and the clock is set to that."""
 
@@ -68,7 +74,7 @@ class Simulated:
         return len(self.running)
 
     def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
-        takes = random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST_TEST)
+        takes = duration(keep, seed)
         self.made, self.busy_for = self.made + 1, self.busy_for + takes
         heapq.heappush(self.running, (self.clock + takes, test, self.needed <= keep, seed))
 
@@ -90,8 +96,24 @@ class Simulated:
         return []
 
 
-def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int]:
-    """A reduction with so many workers: its pool, the real s that it took, and how many models are left."""
+def without_a_look_ahead(journal: Journal) -> float:
+    """The simulated s that the run would have taken if all tests of each round had been made at once."""
+    stages: dict[object, list[int]] = {
+        "baseline": [test.id for test in journal.state.tests if test.phase == "baseline"]
+    }
+    for event in journal.file.events():
+        if event.kind in ("candidate_judged", "certificate_finished"):
+            stages.setdefault((event.kind, event.data.get("round"), event.data.get("leg")), []).extend(
+                event.data["tests"]
+            )
+    made = {test.id: duration(journal.keep_of_test(test.id), test.seed) for test in journal.state.tests}
+    return sum(max(map(made.__getitem__, tests)) for tests in stages.values() if tests)
+
+
+def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int, float, int]:
+    """A reduction with so many workers: its pool, the real s that it took, how many models are left, how long it would take without
+    a look ahead (simulated s), and how many tests nobody needed.
+    """
     path = folder / f"{models}-{workers}.ddenv"
     create_run(scenario_for_world(world(folder, models), (0, 0, 0.2, 0), (100, 0)), path)
     chosen = random.Random(1).sample(range(models), NEEDED)
@@ -103,7 +125,8 @@ def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, i
         _begin(journal, workers, None)
         control = Control(journal, threading.Event(), time.time())
         Driver(scenario, parsed, journal, Bench(journal, pool, control), control).reduce()
-        return pool, time.perf_counter() - began, len(journal.state.environment)
+        state, real = journal.state, time.perf_counter() - began
+        return pool, real, len(state.environment), without_a_look_ahead(journal), state.ahead
 
 
 def main() -> None:
@@ -111,25 +134,26 @@ def main() -> None:
     parser.add_argument("--models", type=int, default=200)
     parser.add_argument("--workers", default="1,8,64,512")
     options = parser.parse_args()
-    print("| workers | tests | more than with one | simulated h | times as fast | busy | engine, ms a test |")
+    print("| workers | tests | for nothing | simulated h | times as fast | busy | engine, ms a test |")
     print("|---|---|---|---|---|---|---|")
-    first: Simulated | None = None
+    first, bound = math.nan, math.nan
     with tempfile.TemporaryDirectory() as folder:
         for workers in map(int, options.workers.split(",")):
-            pool, real, left = reduce(Path(folder), options.models, workers)
+            pool, real, left, stages, vain = reduce(Path(folder), options.models, workers)
             assert left == NEEDED, left
-            first = first or pool
+            if math.isnan(first):
+                first, bound = pool.clock, stages
             row = (
                 f"{workers}",
                 f"{pool.made}",
-                f"{pool.made / first.made - 1:.0%}",
+                f"{vain}",
                 f"{pool.clock / 3600:.2f}",
-                f"{first.clock / pool.clock:.1f}",
+                f"{first / pool.clock:.1f}",
                 f"{pool.busy_for / (pool.clock * workers):.0%}",
                 f"{1000 * real / pool.made:.0f}",
             )
-            print(f"| {' | '.join(row)} |")
-            sys.stdout.flush()
+            print(f"| {' | '.join(row)} |", flush=True)
+    print(f"| any, no look ahead | | | {bound / 3600:.2f} | {first / bound:.1f} | | |")
 
 
 if __name__ == "__main__":

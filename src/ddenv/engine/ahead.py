@@ -31,12 +31,15 @@ Test = tuple[Keep, int]
 
 @dataclass(frozen=True)
 class Now:
-    """The current round, of which the first `judged` candidates have a verdict, and the winners of the rounds before it."""
+    """The current round, of which the first `judged` candidates have a verdict, and the winners of the rounds before it. Tests
+    `beyond` it may be made.
+    """
 
     path: Path
     number: int
     round: Round
     judged: int
+    beyond: bool = True
 
 
 @dataclass(order=True)
@@ -94,6 +97,7 @@ class Ahead:
         self._fresh: tuple[int, dict[Test, float]] = -1, {}
         # The last event after which nothing more was worth a worker.
         self._vain = -1
+        self._goes_on = False
 
     def judged(self, round: Round, index: int, similar: bool) -> None:
         """A candidate has its verdict."""
@@ -104,7 +108,7 @@ class Ahead:
         if self._vain == self._journal.state.revision:
             return []
         found, numbers, until = _Found(most, is_started), count(), time.monotonic() + LONGEST
-        here = self._rounds.at(now.path, now.round)
+        here, self._goes_on = self._rounds.at(now.path, now.round), now.beyond and self._may_go_on
         branches = [_Branch(-1.0, next(numbers), lambda: here, now.judged, {})]
         if self._goes_on:
             self._add_fresh(found, COMES_TO_CERTIFICATE, only=self._journal.whole)
@@ -123,7 +127,7 @@ class Ahead:
         return best
 
     @property
-    def _goes_on(self) -> bool:
+    def _may_go_on(self) -> bool:
         """Whether later rounds are looked at: not where each reduction waits for the user, nor where tests are counted."""
         state = self._journal.state
         return state.budget is None and state.accept_mode == "automatic"

@@ -23,15 +23,16 @@ from ddenv.runfile.state import BROKEN, FRESH_RUNS
 
 # After this many steps back what is left stays as it is, and is not called minimal.
 MOST_STEPS_BACK = 14
-# With so many workers, what is likely to be wanted is looked at again after each test; with more, as much more rarely.
+# Up to so many workers take the next runs of each claim. With more, plays find what is likely to be wanted, as much more rarely.
 WORKERS_A_LOOK = 8
 CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
 
 
 @dataclass
 class _Look:
-    """How likely fresh runs were to be wanted when so many `tests` had ended."""
+    """The claims as they are known now, and how likely fresh runs were to be wanted when so many `tests` had ended."""
 
+    claims: list[tuple[str | None, Claim]] = field(default_factory=list)
     tests: int = -1
     chances: dict[tuple[Keep, int], float] = field(default_factory=dict)
 
@@ -87,11 +88,11 @@ class Certifier:
             at_least=at_least,
         )
 
-    def _claims(self) -> list[tuple[str | None, Claim]]:
+    def _claims(self, ahead: int = 1) -> list[tuple[str | None, Claim]]:
         """What is known so far: of what is left, then of each model; up to a claim that ends the certificate."""
         claims: list[tuple[str | None, Claim]] = []
         for name in (None, *self.free):
-            claims.append((name, self._settle(self._procedure(name, self._certificate))))
+            claims.append((name, self._settle(self._procedure(name, self._certificate), ahead)))
             if self._ends(name, claims[-1][1].verdict):
                 break
         return claims
@@ -125,8 +126,14 @@ class Certifier:
         begin = [partial(self._procedure, name, now) for name in names]
         rates = {whole: now.rate, self._left: now.rate}
         without = {journal.without(name) for name in names if name is not None} - rates.keys()
-        spared = {keep: not_needed(now.rate, *self._counts(keep, now)) for keep in without}
-        chances = certificate_ahead(begin, lambda i, verdict: self._ends(names[i], verdict), shown, rates, spared)
+        counts = {keep: self._counts(keep, now) for keep in (self._left, *without)}
+        spared = {keep: not_needed(now.rate, *counts[keep]) for keep in without}
+        most, known = 4 * journal.state.jobs, sum(map(sum, counts.values()))
+
+        def ends(number: int, verdict: Verdict) -> bool:
+            return self._ends(names[number], verdict)
+
+        chances = certificate_ahead(begin, ends, shown, rates, spared, most, known)
         return {(keep, now.first_run + run): chance for (keep, run), chance in chances.items()}
 
     def _counts(self, keep: Keep, now: Certificate) -> tuple[int, int]:
@@ -143,11 +150,17 @@ class Certifier:
 
     def _likely(self, most: int, is_started: Callable[[Asked], bool]) -> list[Asked]:
         """As `Bench.work` wants it. What is sure to be wanted needs no play."""
-        undecided = [claim for claim in self._claims() if not claim[1].verdict]
-        due = [asked for keep, run, _ in self._wanted_by(undecided[:1]) if not is_started(asked := _asked(keep, run))]
-        if len(due) >= most:
-            return due[:most]
-        look, made, shown = self._look, self.journal.state.tests_done, self.journal.shown
+        state = self.journal.state
+        due: dict[Asked, None] = {}
+        for ahead in (1, state.jobs) if state.jobs <= WORKERS_A_LOOK else (1,):
+            claims = self._look.claims if ahead == 1 else self._claims(ahead)
+            undecided = [claim for claim in claims if not claim[1].verdict]
+            # With many workers only the first claim is sure to be made.
+            sure = undecided if state.jobs <= WORKERS_A_LOOK else undecided[:1]
+            due |= {one: None for keep, run, _ in self._wanted_by(sure) if not is_started(one := _asked(keep, run))}
+            if len(due) >= most or ahead > 1:
+                return list(islice(due, most))
+        look, made, shown = self._look, state.tests_done, self.journal.shown
 
         def found() -> list[Asked]:
             likely = (_asked(*test) for test in sorted(look.chances, key=lambda test: -look.chances[test]))
@@ -155,7 +168,7 @@ class Certifier:
             return list(islice(new, most))
 
         # A look takes some ms, and one test more changes little where there are many.
-        soon = look.tests >= 0 and made - look.tests <= self.journal.state.jobs // WORKERS_A_LOOK
+        soon = look.tests >= 0 and made - look.tests <= state.jobs // WORKERS_A_LOOK
         if soon and (known := found()):
             return known
         if made != look.tests:
@@ -163,7 +176,8 @@ class Certifier:
         return found()
 
     def _wanted(self) -> Wanted:
-        return self._wanted_by(self._claims())
+        self._look.claims = self._claims()
+        return self._wanted_by(self._look.claims)
 
     def _wanted_by(self, claims: Iterable[tuple[str | None, Claim]]) -> Wanted:
         wanted = dict.fromkeys(test for _, claim in claims for test in self._in_order(claim))

@@ -107,6 +107,10 @@ class Control:
         """Whether idle workers may run ahead: not while the user steps."""
         return self._credit is None
 
+    def ends_with_round(self) -> bool:
+        """Whether the user steps, so that nothing of later rounds is made."""
+        return self._pause_after_round
+
     def started(self) -> None:
         """A test was started."""
         if self._credit is not None:

@@ -306,7 +306,8 @@ class Driver:
             return [(self._keep(round.candidates[index]), run, index) for index, run in now.wanted]
 
         def likely(most: int, is_started: Callable[[Asked], bool]) -> list[Asked]:
-            return self._ahead.likely(Now(self._path, number, round, self._judged), most, is_started)
+            beyond = not self._control.ends_with_round()
+            return self._ahead.likely(Now(self._path, number, round, self._judged, beyond), most, is_started)
 
         self._bench.work("round", number, wanted, forecast, likely)
         return self._standing(round).winner

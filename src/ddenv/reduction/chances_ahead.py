@@ -19,7 +19,8 @@ MOST_RUNS, LEAST = 12, 0.01
 BEFORE = {"partition": (0.5, 1.5), "complement": (1.0, 1.0), "one": (0.3, 1.7)}
 # How likely a model of a certificate is not needed after all.
 NOT_NEEDED = 0.1
-PLAYS = 12
+# How often a certificate is played: less often where many runs are known, since each play passes through them.
+PLAYS, FEWEST_PLAYS, RUNS = 12, 3, 500
 
 
 class Experience:
@@ -95,16 +96,20 @@ def certificate_ahead(
     shown: Callable[[Subject, int], Shown],
     rates: Mapping[Subject, float],
     without: Mapping[Subject, float],
+    most: int,
+    known: int = 0,
 ) -> dict[tuple[Subject, int], float]:
     """How likely each run of a certificate that is not finished is to be wanted, by (subject, run).
 
     `claims` begin each claim anew, in their order; after claim number i with a verdict it is over if `ends(i, verdict)`. It is
-    played `PLAYS` times, with the finished runs as they are. A subject shows f at its rate; those `without` a model show it at the
-    highest of these with a probability of their own, as if the model were not needed, and otherwise hardly ever.
+    played up to `PLAYS` times, with the finished runs as they are. A subject shows f at its rate; those `without` a model show it
+    at the highest of these with a probability of their own, as if the model were not needed, and otherwise hardly ever. A play
+    ends after `most` runs; there are fewer plays the more runs are `known`.
     """
     wanted: Counter[tuple[Subject, int]] = Counter()
     usual = max(rates.values(), default=HIGHEST_RATE)
-    for play in range(PLAYS):
+    plays = min(PLAYS, max(FEWEST_PLAYS, RUNS // (1 + known)))
+    for play in range(plays):
         random = Random(play)
         needed = {one: usual if random.random() < chance else SPURIOUS for one, chance in without.items()}
         drawn: dict[tuple[Subject, int], bool] = {}
@@ -120,6 +125,8 @@ def certificate_ahead(
             if known is not None:
                 return known
             if (subject, run) not in drawn:
+                if len(drawn) >= most:
+                    return None
                 drawn[subject, run] = random.random() < rate[subject]
             return drawn[subject, run]
 
@@ -127,7 +134,7 @@ def certificate_ahead(
             if ends(number, settle(begin(), result).verdict):
                 break
         wanted.update(drawn.keys())
-    return {test: count / PLAYS for test, count in wanted.items()}
+    return {test: count / plays for test, count in wanted.items()}
 
 
 def not_needed(rate: float, shown: int, missed: int) -> float:
