@@ -25,10 +25,8 @@ UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
 # The phases of full runs of what is left. Files of format 4 have "confirm", with the seeds that the search had used.
 FRESH = ("certify", "confirm")
-# The phase of runs of the whole world without the models of a removal: all are full.
-ISOLATE = "isolate"
-# The phase of tests that idle workers make of candidates whose round may come.
-AHEAD = "ahead"
+# The phase of runs of the whole world without the models of a removal: all are full; and of candidates whose round may come.
+ISOLATE, AHEAD = "isolate", "ahead"
 # The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
 FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
@@ -57,9 +55,8 @@ class RunState:
     where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
     `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
-    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world.
-    Of the tests that idle workers made ahead of time, `ahead` ones are not needed so far: no decision rests on them. `rests_on` has
-    the bits 1 << id of the others.
+    `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world. `ahead` tests
+    were made ahead of time and are not needed so far; decisions rest on those with the bits 1 << id of `rests_on`.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -217,8 +214,9 @@ class RunState:
     def running_tests(self) -> tuple[Test, ...]:
         """The running tests, in the order they were started."""
         # They are among the last ones, so the search starts from the end.
-        latest = (test for test in reversed(self.tests) if test.outcome == "running")
-        return tuple(islice(latest, self.tally["running"]))[::-1]
+        return tuple(
+            islice((test for test in reversed(self.tests) if test.outcome == "running"), self.tally["running"])
+        )[::-1]
 
     def outcomes(self) -> dict[str, int]:
         """Finished tests by outcome, in the order of `OUTCOMES`."""
