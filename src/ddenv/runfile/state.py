@@ -235,10 +235,7 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round of the algorithm. `partitions` are in the order they are tried; `winner` is a candidate's index or None.
-
-    `missed` counts the parts without which f did not show.
-    """
+    """One round: `partitions` in the order they are tried, `winner`'s index or None, and without how many parts f was `missed`."""
 
     number: int
     n_partitions: int
