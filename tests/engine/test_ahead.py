@@ -55,7 +55,7 @@ def decided(path):
     return found, journal.state
 
 
-@pytest.mark.parametrize("method", slow(pytest.mark.fuzz, METHODS, but=METHODS[:2]), ids=str)
+@pytest.mark.parametrize("method", slow(pytest.mark.fuzz, METHODS, but=[METHODS[1], METHODS[6]]), ids=str)
 @given(
     salt=st.integers(0, 99),
     needed=st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(frozenset),
