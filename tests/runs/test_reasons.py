@@ -8,7 +8,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.reasons import APART, GOAL, F, Parting, parted, parting_sentence, reasons, sentence
+from ddenv.runs.reasons import APART, GOAL, End, F, Parting, parted, parting_sentence, reasons, sentence
 from tests.workbench import fake_moments, fake_run
 
 
@@ -36,6 +36,14 @@ def test_the_sentence_begins_with_what_happens_most_often(found):
     assert first.startswith("Without crate_00 the robot reaches its goal after ")
     assert "(9 of 11 fresh runs, 52 % to 95 %); it tips over elsewhere, near (" in first
     assert second.endswith("; it still fails as in f in 1.")
+
+
+def test_a_robot_that_ends_lower_than_in_f_is_not_said_to_end_in_the_same_place(found):
+    stuck = End("stuck", 4, 30.0, (1.0, 2.0), -1.94)
+    one = replace(found[1][0], runs=4, ends=(stuck,))
+    words = "gets stuck elsewhere, near (1.00, 2.00) m"
+    assert f"{words}, 1.9 m lower than in f (4 of 4" in sentence(one)
+    assert f"{words} (4 of 4" in sentence(replace(one, ends=(replace(stuck, above=0.1),)))
 
 
 def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):

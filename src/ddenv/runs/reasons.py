@@ -27,6 +27,8 @@ DOES = {
     "lost": "is lost",
     "out of time": "runs out of time",
 }
+# A robot that ends so much lower or higher than in f, m, stands on something else.
+LEVEL = 0.25
 # Two runs have visibly parted when the robots are this far from each other, m.
 APART = 0.1
 
@@ -35,13 +37,15 @@ APART = 0.1
 class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
-    `kind` is `F`, `GOAL`, or the `failure` of a run that ended otherwise.
+    They ended so far `above` f's end, m (median; negative: below it). `kind` is `F`, `GOAL`, or the `failure` of a run that ended
+    otherwise.
     """
 
     kind: str
     number: int
     seconds: float
     place: tuple[float, float]
+    above: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +108,7 @@ def _reason(
     file: RunFile, state: RunState, certificate: Certificate, name: str, tests: Sequence[Test], left: dict[int, Test]
 ) -> Reason:
     mine = [test for test in tests if test.without == name]
-    ends = _ends(mine)
+    ends = _ends(mine, math.nan if state.f_position is None else state.f_position[2])
     gone = tuple(stack_with(state, state.nodes[certificate.node].environment, name))
     pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == ends[0].kind != F)
     pair = next(pairs, None)
@@ -118,20 +122,22 @@ def _kind(test: Test) -> str:
     return test.outcome if test.outcome in (F, GOAL) else test.failure
 
 
-def _ends(tests: Sequence[Test]) -> tuple[End, ...]:
+def _ends(tests: Sequence[Test], height: float) -> tuple[End, ...]:
+    """The ends of tests, where f's end is at `height`, m."""
     kinds: dict[str, list[Test]] = {}
     for test in tests:
         kinds.setdefault(_kind(test), []).append(test)
     ends = [
-        End(kind, len(them), median(test.simulated_seconds for test in them), _middle(them))
+        End(kind, len(them), median(test.simulated_seconds for test in them), *_middle(them, height))
         for kind, them in kinds.items()
     ]
     return tuple(sorted(ends, key=lambda end: -end.number))
 
 
-def _middle(tests: Sequence[Test]) -> tuple[float, float]:
-    places = [test.end_pose[:2] for test in tests if test.end_pose is not None] or [(math.nan, math.nan)]
-    return median(place[0] for place in places), median(place[1] for place in places)
+def _middle(tests: Sequence[Test], height: float) -> tuple[tuple[float, float], float]:
+    places = [test.end_pose for test in tests if test.end_pose is not None] or [(math.nan, math.nan, math.nan)]
+    x, y, z = (median(place[axis] for place in places) for axis in range(3))
+    return (x, y), 0.0 if math.isnan(z - height) else z - height
 
 
 def _parting(file: RunFile, with_it: Test, without: Test, gone: Sequence[str]) -> Parting:
@@ -175,7 +181,10 @@ def _does(end: End) -> str:
         return f"reaches its goal after {end.seconds:.0f} s"
     if end.kind == F:
         return "still fails as in f"
-    return f"{DOES.get(end.kind, 'fails')} elsewhere, near {_point(end.place)}"
+    level = (
+        "" if abs(end.above) < LEVEL else f", {abs(end.above):.1f} m {'higher' if end.above > 0 else 'lower'} than in f"
+    )
+    return f"{DOES.get(end.kind, 'fails')} elsewhere, near {_point(end.place)}{level}"
 
 
 def _point(place: tuple[float, float]) -> str:
