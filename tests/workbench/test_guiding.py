@@ -235,10 +235,10 @@ async def test_the_footer_offers_what_can_be_done_now(run, make, shown):
     make(run).hold()
     async with Attached(run, (200, 60)) as session:
         footer = {key.words for key in session.screen.query_one(KeyFooter).entries}
-        assert footer - {"pins", "history", "settings", "export", "help", "quit", *MORE} == shown
+        assert footer - {"pins", "history", "settings", "export", "why", "help", "quit", *MORE} == shown
 
 
-MORE = {"signs", "facts", "rounds", "find", "layers", "copy", "scene", "runs"}
+MORE = {"signs", "facts", "play", "rounds", "find", "layers", "copy", "scene", "runs"}
 
 
 async def test_a_key_that_is_not_possible_is_so_everywhere_and_says_why(run):
