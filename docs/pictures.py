@@ -22,7 +22,6 @@ from ddenv.runfile.store import RunFile
 from ddenv.scene.camera import View, set_up
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server
-from ddenv.scene.shot import PAUSE, SPEED
 from ddenv.scene.stage import Stage
 
 DOCS = Path(__file__).resolve().parent
@@ -35,9 +34,14 @@ CAMERAS = {
     "friction": ((2.0, -0.4, 0.2), 6.5, -60.0, 34.0),
 }
 LEGEND = ("way of this test", "left out of this test")
-READY = "typeof viewer !== 'undefined' && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 20"
+READY = (
+    "typeof play !== 'undefined' && play && viewer.num_messages_received > 30 && viewer.renderer.info.render.calls > 20"
+)
 # Hides Meshcat's own controls, and the entries of the legend that are not in the picture.
 TIDY = """
+    run(false);
+    go(length());
+    document.getElementById('play').hidden = true;
     document.querySelectorAll('.dg').forEach((box) => box.style.display = 'none');
     document.querySelectorAll('#legend span').forEach((one) => {
       if (%s.includes(one.textContent)) one.style.display = 'none';
@@ -54,15 +58,13 @@ def main() -> None:
 
 async def picture(run: RunFile) -> None:
     """Writes the picture of one run."""
-    scenario = fold(run.events()).scenario
-    name, timeout = scenario["name"], scenario["failure"]["timeout"]
+    name = fold(run.events()).scenario["name"]
     server = Server()
     stage = Stage(server.send)
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
+    server.play, server.pairs, server.drawings = player.play, player.pairs, player.drawings
     player.tick(0.0)
-    # A replay stands still at its end.
-    player.tick(timeout / SPEED + PAUSE / 2)
     set_up(stage, view(*CAMERAS[name]))
     url = server.listen(0)
     with chromium(SIZE) as port:

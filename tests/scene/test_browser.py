@@ -152,6 +152,57 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
     assert near(picture, (235, 40, 35)) > 100, "the failure's red"
 
 
+def place_of(path: str) -> str:
+    return f"viewer.scene_tree.find(['world', {path}]).object.position.x"
+
+
+@pytest.mark.browser
+@pytest.mark.witness
+async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(writer, start_scene):
+    writer.baseline()
+    writer.round()
+    writer.reduce()
+    url = start_scene(writer.path).stdout.readline().strip()
+    with chromium((900, 600)) as port:
+        page = await Page.open(port)
+        await page.heed()
+        await page.do("Page.navigate", url=url)
+        await shows(page, "typeof play !== 'undefined' && play !== null && play.test === 2")
+        # It plays by itself: the robot moves.
+        await shows(page, place_of("'robot'") + " > 0.1")
+        await page.value("document.getElementById('toggle').click()")
+        assert await page.value("going") is False
+        slide = "(at) => { const one = document.getElementById('time'); one.value = at; one.dispatchEvent(new Event('input')); }"
+        await page.value(f"({slide})(4)")
+        assert await page.value(place_of("'robot'")) == pytest.approx(1.55, abs=0.01)
+        assert await page.value(place_of("'models', '003 board'")) == pytest.approx(0.25 - 1, abs=0.01)
+        await page.value("document.getElementById('on').click()")
+        assert await page.value("document.getElementById('clock').value") == "4.1 s of 8.0 s"
+        await page.value("document.dispatchEvent(new KeyboardEvent('keydown', {key: ',', bubbles: true}))")
+        assert await page.value("document.getElementById('time').getAttribute('aria-valuetext')") == "4.0 s of 8.0 s"
+        # Two runs at once, and where they part.
+        await page.value("chosen = true; load(2, {ghost: 1, equal: 0, apart: 2.5})")
+        await shows(page, "ghost !== null && time === 0")
+        await page.value("document.getElementById('parting').click()")
+        assert await page.value("time") == 2.5
+        ghost, robot = await page.value(place_of("'ghost'")), await page.value(place_of("'robot'"))
+        assert (ghost, robot) == pytest.approx((2.5 / 8 * 3.0, 2.5 / 8 * 3.1), abs=0.01)
+        assert await page.value(place_of("'parting'")) == pytest.approx(ghost)
+        await page.value("document.getElementById('follow').click()")
+        assert await page.value("home().x") == pytest.approx(-robot)
+        await page.value("document.getElementById('removed').click()")
+        assert await page.value("node('removed').visible") is False
+        # A test that is not there is told in words.
+        await page.value("load(77)")
+        await shows(page, "document.getElementById('trouble').textContent.includes('test 77 has not ended')")
+        assert await page.value("forbidden") == []
+        unnamed = "[...document.querySelectorAll('#play button, #play input, #play select')]"
+        unnamed += (
+            ".filter((one) => !one.textContent.trim() && !one.getAttribute('aria-label') && !one.labels?.length).length"
+        )
+        assert await page.value(unnamed) == 0
+
+
 async def forbidden_of(url: str, ready: str) -> list[str]:
     """What the policy of a page forbids until it is `ready`."""
     with chromium((900, 600)) as port:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Live
-from ddenv.scene.shot import HOLD, PAUSE, SPEED, live_pose, replay_time, shot, shot_of
+from ddenv.scene.shot import HOLD, live_pose, shot, shot_of
 
 
 def live(test: int, slot: int = 0) -> Live:
@@ -68,7 +66,7 @@ def test_a_chosen_row_is_shown_by_its_test_or_else_by_its_models(writer):
     writer.start_test(3, candidate=1, run=1)
     writer.finish_test(3, "pass")
     assert (chosen().kind, chosen().test) == ("replay", 2)
-    assert chosen().title == "part B · test 2 · similar · replay at 4×"
+    assert chosen().title == "part B · test 2 · similar"
 
 
 def test_a_try_has_its_own_models(writer):
@@ -155,18 +153,6 @@ def test_between_two_tests_the_last_one_stays_for_a_while(writer):
 def test_rows_of_unknown_and_finished_tests_are_ignored(writer):
     writer.baseline()
     assert shot(state_of(writer), [live(1), live(7), live(0), live(-1)]).kind == "replay"
-
-
-@given(st.floats(0, 1e6), st.floats(0.0, 200))
-def test_replay_time_stays_within_the_run(elapsed, length):
-    assert 0 <= replay_time(elapsed, length) <= length
-
-
-def test_a_replay_pauses_at_its_end_and_begins_again():
-    length = 20.0
-    assert replay_time(1.0, length) == pytest.approx(SPEED)
-    assert replay_time(length / SPEED + PAUSE / 2, length) == length
-    assert replay_time(length / SPEED + PAUSE + 1.0, length) == pytest.approx(SPEED)
 
 
 def test_live_pose():

@@ -112,11 +112,34 @@ async def test_a_browser_gets_the_scene_and_its_words(writer, start_scene):
         return sum(isinstance(message, bytes) and words in message for message in found)
 
     def drawn_and_moving(found):
-        return captions(found) and mention(found, b"set_object") > 10 and mention(found, b"/world/robot") > 5
+        return captions(found) and mention(found, b"set_object") > 10 and mention(found, b"/world/robot") > 2
 
     words = captions(await messages(url_of(start_scene(writer.path)), drawn_and_moving))[-1]
     assert (words["name"], words["models"]) == ("small", "4 of 4 models")
-    assert words["title"] == "the failure f · test 1 · similar · replay at 4×"
+    assert (words["title"], words["kind"], words["test"]) == ("the failure f · test 1 · similar", "replay", 1)
+
+
+def test_a_page_may_ask_for_finished_tests_and_for_nothing_else(writer, start_scene):
+    writer.baseline()
+    url = url_of(start_scene(writer.path))
+    with urlopen(url + "playback.js") as answer:
+        assert b"requestAnimationFrame" in answer.read()
+    with urlopen(url + "play/1") as answer:
+        assert len(json.load(answer)["robot"]) == 81
+    with urlopen(url + "pairs") as answer:
+        assert json.load(answer) == {"tests": 1, "pairs": []}
+    with urlopen(url + "way/1") as answer:
+        drawn = answer.read()
+        assert int.from_bytes(drawn[:4], "big") == len(drawn) - 4
+    for path in ("play/2", "play/0", "play/999999999", "still/7", "ghost-way/7"):
+        with pytest.raises(HTTPError) as refused:
+            urlopen(url + path)
+        assert refused.value.code == 404
+        assert refused.value.read().count(b"\n") == 0
+    for path in ("play/-1", "play/1/2", "play/x", "play/1000000000"):
+        with pytest.raises(HTTPError) as refused:
+            urlopen(url + path)
+        assert refused.value.code == 403
 
 
 @pytest.mark.programs

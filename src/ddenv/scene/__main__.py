@@ -58,6 +58,7 @@ async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
     stage = Stage(server.send)
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
+    server.play, server.pairs, server.drawings = player.play, player.pairs, player.drawings
     player.tick(time.monotonic())
     print(server.listen(port), flush=True)
     if pointed:

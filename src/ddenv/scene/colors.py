@@ -27,6 +27,8 @@ FAILURE: Color = (0.86, 0.12, 0.12, 1.0)
 EVIDENCE: Color = (0.86, 0.22, 0.18, 1.0)
 TRAIL: Color = (0.98, 0.70, 0.05, 1.0)
 REMOVED: Color = (0.45, 0.50, 0.56, 1.0)
+GHOST: Color = (0.06, 0.48, 0.46, 0.45)
+GHOST_TRAIL: Color = (0.06, 0.48, 0.46, 1.0)
 LEFT_OUT: Color = (0.55, 0.25, 0.75, 1.0)
 SKY = ((0.66, 0.77, 0.88), (0.93, 0.95, 0.97))  # top, bottom
 
@@ -46,6 +48,12 @@ def varied(color: Color, number: int) -> Color:
     factor = 0.92 + 0.16 * math.modf(number * 0.6180339887)[0]
     red, green, blue = (min(1.0, part * factor) for part in color[:3])
     return red, green, blue, color[3]
+
+
+def of_bytes(color: tuple[int, int, int]) -> Color:
+    """An opaque colour from red, green and blue in 0..255."""
+    red, green, blue = (part / 255 for part in color)
+    return red, green, blue, 1.0
 
 
 def hexadecimal(color: Color) -> int:

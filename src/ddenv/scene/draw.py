@@ -3,103 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from meshcat.geometry import (
-    LineBasicMaterial,
-    LineSegments,
-    Mesh,
-    MeshLambertMaterial,
-    PointsGeometry,
-    TriangularMeshGeometry,
-)
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
+from ddenv.scene.crowd import MOST_SINGLE, Crowd
 from ddenv.scene.mesh import Surface
+from ddenv.scene.painted import Painted, edges_of, lines, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
-from ddenv.world.model import Collision, Link, Model, Plane, Visual, World, is_ground
+from ddenv.world.model import Model, Plane, World, is_ground
 from ddenv.world.pose import Pose, Vector
 
 WORLD: Path = ("world",)
 MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
 ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
+# The robot of a second run, its path, and where the two runs part.
+GHOST, GHOST_TRAIL, PARTING = (*WORLD, "ghost"), (*WORLD, "ghost-trail"), (*WORLD, "parting")
+PARTS: Path = (*WORLD, "parts")
 # Points in one piece of a growing trail: only the last piece is sent again.
 PIECE = 24
 GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
 STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
 LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
-
-
-@dataclass(frozen=True)
-class Painted:
-    """A surface of one transparency; `tints` (N, 3) are the colours of its vertices."""
-
-    surface: Surface
-    tints: np.ndarray
-    alpha: float
-
-    def thing(self) -> Mesh:
-        geometry = TriangularMeshGeometry(self.surface.vertices, self.surface.faces, color=self.tints)
-        # Only the outside is drawn: two-sided faces would cast shadows on themselves.
-        return Mesh(geometry, MeshLambertMaterial(vertexColors=True, side=0, opacity=self.alpha))
-
-
-def paint(model: Model) -> list[Painted]:
-    """All visuals of a model, in the frame of its poses. A link without visuals shows its collisions."""
-    groups: dict[float, list[tuple[Surface, Color]]] = {}
-    default = colors.default_color(model)
-    shown = [(item.shape, item.pose, _color(item) or default) for link in model.links for item in _shown(link)]
-    vary = len(shown) > 20
-    for number, (shape, pose, color) in enumerate(shown):
-        if not isinstance(shape, Plane):
-            color = colors.varied(color, number) if vary else color
-            groups.setdefault(color[3], []).append((mesh.of_shape(shape).at(pose), color))
-    return [_painted(parts, alpha) for alpha, parts in groups.items() if alpha > 0]
-
-
-def _shown(link: Link) -> tuple[Visual, ...] | tuple[Collision, ...]:
-    return link.visuals or link.collisions
-
-
-def _color(item: Visual | Collision) -> Color | None:
-    return item.color if isinstance(item, Visual) else None
-
-
-def _painted(parts: list[tuple[Surface, Color]], alpha: float) -> Painted:
-    tints = np.concatenate([np.tile(color[:3], (len(part.vertices), 1)) for part, color in parts])
-    return Painted(mesh.merge([part for part, _ in parts]), tints, alpha)
-
-
-def plain(shape: Surface, color: Color, *, glow: float = 0.0, offset: int = 0) -> Mesh:
-    """An object of one colour. `glow` 0..1 is its own light; with `offset` above 0, others in the same plane are drawn over it."""
-    options: dict[str, Any] = {}
-    if glow:
-        red, green, blue, _ = color
-        options["emissive"] = colors.hexadecimal((glow * red, glow * green, glow * blue, 1.0))
-    if offset:
-        options |= {"polygonOffset": True, "polygonOffsetFactor": offset, "polygonOffsetUnits": offset}
-    material = MeshLambertMaterial(color=colors.hexadecimal(color), opacity=color[3], side=0, **options)
-    return Mesh(TriangularMeshGeometry(shape.vertices, shape.faces), material)
-
-
-def lines(ends: np.ndarray, color: Color) -> LineSegments:
-    """Line segments between pairs of `ends` (2 N, 3)."""
-    material = LineBasicMaterial(color=colors.hexadecimal(color), opacity=color[3])
-    return LineSegments(PointsGeometry(np.asarray(ends, dtype=np.float32).T), material)
-
-
-def outline(model: Model, shape: Surface) -> np.ndarray:
-    """Ends (24, 3) of the 12 edges of the box around `shape` in the axes of the model; world frame."""
-    own = shape.at(model.pose.inverse()).vertices
-    low, high = own.min(axis=0), own.max(axis=0)
-    corners = np.array([[(high if bit >> axis & 1 else low)[axis] for axis in range(3)] for bit in range(8)])
-    pairs = [(a, a | 1 << axis) for axis in range(3) for a in range(8) if not a >> axis & 1]
-    return Surface(corners[np.array(pairs).ravel()], shape.faces).at(model.pose).vertices
 
 
 def safe_name(number: int, name: str) -> str:
@@ -116,15 +44,18 @@ def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
 
 
 class Scenery:
-    """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements."""
+    """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements.
+
+    In a large world those that never move are drawn together (`Crowd`), anew for each environment.
+    """
 
     def __init__(self, stage: Stage, world: World, robot: Model, elements: Iterable[str]) -> None:
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
         self._keys: dict[str, str] = {}
-        self._moved: set[str] = set()
         self._pieces = 0
         elements = frozenset(elements)
+        self._crowd = Crowd(MODELS, LEFT_OUT, REMOVED) if len(elements) > MOST_SINGLE else None
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
         ]
@@ -132,6 +63,7 @@ class Scenery:
         self.ground = _ground(world)
         self._draw_ground()
         self._lowest = self._draw_robot(robot)
+        self._boxes = {each.name: _box_of(surface) for each, surface in zip(world.models, surfaces, strict=True)}
 
     def height(self, x: float, y: float) -> float:
         """Height of the highest surface at (x, y), m."""
@@ -140,24 +72,58 @@ class Scenery:
         return max(heights, default=0.0)
 
     def show(self, shot: Shot) -> None:
-        """Shows the environment of `shot`, all models at their initial poses."""
+        """Shows the environment of `shot`."""
         for name, key in self._keys.items():
             self._stage.show((*MODELS, key), name in shot.models)
-            self._stage.show((*LEFT_OUT, key), name in shot.left_out)
-            self._stage.show((*REMOVED, key), name in shot.removed)
-        for name in self._moved:
-            self._stage.move((*MODELS, self._keys[name]), Pose())
-        self._moved.clear()
+            if self._crowd is None:
+                self._stage.show((*LEFT_OUT, key), name in shot.left_out)
+                self._stage.show((*REMOVED, key), name in shot.removed)
+        for path, thing in self._crowd.objects(shot) if self._crowd is not None else ():
+            if thing is None:
+                self._stage.delete(path)
+            else:
+                self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
 
     def place_robot(self, pose: Pose) -> None:
         """Puts the robot's first link at `pose`."""
         self._stage.move(ROBOT, pose, newest_only=True)
 
-    def place_model(self, name: str, pose: Pose) -> None:
-        """Puts the first link of a moving model at `pose`."""
-        if name in self._keys:
-            self._moved.add(name)
-            self._stage.move((*MODELS, self._keys[name]), pose @ self._first[name].inverse(), newest_only=True)
+    def key(self, name: str) -> str | None:
+        """What the browser calls an element; None for what is no element."""
+        return self._keys.get(name)
+
+    def moved(self, name: str, pose: Pose) -> Pose:
+        """How far a moving model is from its start once its first link is at `pose`."""
+        return pose @ self._first[name].inverse()
+
+    def way(self, samples: np.ndarray, ghost: bool) -> bytes:
+        """The message that draws the robot's path in a whole run, for one browser."""
+        tube = mesh.tube(path_on_ground(samples, self._lowest), LINE)
+        color = colors.GHOST_TRAIL if ghost else colors.TRAIL
+        thing = plain(tube, color, glow=0.4) if len(tube.faces) else None
+        return self._stage.drawn(GHOST_TRAIL if ghost else TRAIL, thing)
+
+    def still(self, shot: Shot) -> list[bytes]:
+        """The messages that show the environment of `shot` in one browser, but for elements that have a name there (`key`)."""
+        objects = () if self._crowd is None else self._crowd.objects(shot)
+        return [self._stage.drawn(path, thing) for path, thing in objects]
+
+    def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[tuple[str, str, float, float, float]]:
+        """Draws edges around the models of each partition: its letter, its colour, its models. Returns where letters belong.
+
+        Each letter has its colour (as in CSS) and the top of a model, x, y, z in m.
+        """
+        self._stage.delete(PARTS)
+        places = []
+        for letter, color, names in groups:
+            boxes = [box for name in names if (box := self._boxes.get(name)) is not None]
+            if boxes:
+                edges = np.concatenate([edges_of(low, high) for low, high in boxes])
+                self._stage.draw((*PARTS, letter), lines(edges, color), shadow=False)
+            for low, high in boxes:
+                x, y = ((low + high) / 2)[:2]
+                places.append((letter, f"#{colors.hexadecimal(color):06x}", float(x), float(y), float(high[2])))
+        return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
         """Draws the robot's path in the run that shows f."""
@@ -183,17 +149,22 @@ class Scenery:
             self._stage.draw(at, plain(tube, color, glow=0.4), shadow=False)
 
     def _draw_model(self, number: int, model: Model, element: bool) -> Surface:
-        key = safe_name(number, model.name)
         painted = paint(model)
+        shape = mesh.merge([item.surface for item in painted])
+        edges = outline(model, shape) if element and len(shape.vertices) else None
+        alone = self._crowd is None or not element or not model.static
+        if self._crowd is not None and element:
+            self._crowd.add(model.name, [] if alone else painted, edges)
+        if not alone:
+            return shape
+        key = safe_name(number, model.name)
         for part, item in enumerate(painted):
             self._stage.draw((*MODELS, key, str(part)), item.thing(), shadow=item.alpha == 1)
-        shape = mesh.merge([item.surface for item in painted])
         if element:
             self._keys[model.name] = key
-            if len(shape.vertices):
-                edges = outline(model, shape)
-                self._stage.draw((*LEFT_OUT, key), lines(edges, colors.LEFT_OUT), shadow=False)
-                self._stage.draw((*REMOVED, key), lines(edges, colors.REMOVED), shadow=False)
+        if edges is not None and self._crowd is None:
+            self._stage.draw((*LEFT_OUT, key), lines(edges, colors.LEFT_OUT), shadow=False)
+            self._stage.draw((*REMOVED, key), lines(edges, colors.REMOVED), shadow=False)
         return shape
 
     def _draw_ground(self) -> None:
@@ -215,7 +186,15 @@ class Scenery:
             item = Painted(item.surface.at(to_first), item.tints, item.alpha)
             lowest = min(lowest, float(item.surface.vertices[:, 2].min()))
             self._stage.draw((*ROBOT, str(part)), item.thing())
+            ghost = plain(item.surface, colors.GHOST, glow=0.2)
+            self._stage.draw((*GHOST, str(part)), ghost, shadow=False)
+        self._stage.show(GHOST, False)
         return lowest
+
+
+def _box_of(surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
+    """The corners of the box around a surface along the world's axes, m; None for an empty one."""
+    return (surface.vertices.min(axis=0), surface.vertices.max(axis=0)) if len(surface.vertices) else None
 
 
 def _ground(world: World) -> Pose | None:

@@ -3,32 +3,38 @@
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from ddenv.errors import UserError
+from ddenv.map.paint import HUES
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
-from ddenv.runfile.state import RunState
-from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runfile.state import RunState, partition_letter
+from ddenv.runfile.store import COLUMNS, Live, RunFile
 from ddenv.runs.creation import read_parts
 from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
-from ddenv.scene.draw import Scenery, circle, flag, mark
-from ddenv.scene.shot import Shot, live_pose, replay_time, shot, shot_of
+from ddenv.scene.draw import PARTING, Scenery, circle, flag, mark
+from ddenv.scene.played import pairs_of, play_of, rows_of
+from ddenv.scene.shot import Shot, live_pose, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
-from ddenv.world.motion import pose_at
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Goal, Spawn
 
 READ_EVERY = 0.1  # time between reads of the run file, s
 LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
+MOST_LETTERS = 200  # of partitions
 
 
 class Player:
-    """Shows one run on a stage. `say(name=..., title=..., models=..., time=...)` receives the caption of the picture."""
+    """Shows one run on a stage; a running test moves here, finished ones are played by the browser (`play`).
+
+    `say(name=..., title=..., models=..., time=..., kind=..., test=..., parts=...)` receives the caption of the picture.
+    """
 
     def __init__(self, run: RunFile, stage: Stage, say: Callable[..., None]) -> None:
         self._run, self._stage, self._say = run, stage, say
@@ -41,10 +47,11 @@ class Player:
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
         self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
         self._shot: Shot | None = None
-        self._began = self._read_at = self._looked_at = self._ran_at = -math.inf
+        self._read_at = self._looked_at = self._ran_at = -math.inf
         self._engine = False
         self._live: list[Live] = []
-        self._motions: dict[str, np.ndarray] = {}
+        self._parts: tuple[tuple[str, ...], ...] = ()
+        self._letters: list[Any] = []
         self._trail: list[tuple[float, ...]] = []
         self._evidence: int | None = None
         self._set_scene(scenario.robot.spawn, scenario.goal)
@@ -55,6 +62,8 @@ class Player:
         set_up(self._stage, view(start, end))
         circle(self._stage, "start", start, 0.6, colors.START)
         flag(self._stage, "goal", end, goal.tolerance, colors.GOAL)
+        mark(self._stage, PARTING[-1], (0.0, 0.0, 0.0), 0.25, colors.GHOST_TRAIL)
+        self._stage.show(PARTING, False)
         self._scenery.place_robot(self._start)
 
     @property
@@ -67,12 +76,36 @@ class Player:
         self._wanted, self._read_at = wanted, -math.inf
         self._position.go(wanted.at)
 
+    def play(self, test: int) -> dict[str, Any]:
+        """A finished test for a browser. Raises UserError."""
+        return play_of(self._run, self._position, self._shot_of(test), self._scenery)
+
+    def pairs(self) -> dict[str, Any]:
+        """What a browser may choose: how many tests there are, and pairs of them that show why the robot fails."""
+        return {"tests": len(self._state.tests), "pairs": pairs_of(self._run, self._state)}
+
+    def drawings(self, what: str, test: int) -> list[bytes]:
+        """The messages that draw for one browser what is `still` in a finished test, or the `way` or `ghost-way` of its robot.
+
+        Raises UserError.
+        """
+        if what == "still":
+            return self._scenery.still(self._shot_of(test))
+        return [self._scenery.way(rows_of(self._run.trajectory(test)), what == "ghost-way")]
+
+    def _shot_of(self, test: int) -> Shot:
+        """A finished test as it was made: in the environment of that moment. Raises UserError."""
+        start, state = self._position.start_of(test), self._state
+        if start is None or test > len(state.tests) or not state.tests[test - 1].is_finished:
+            raise UserError(f"{self._run.path}: test {test} has not ended")
+        return shot_of_test(start.after, state.tests[test - 1])
+
     def tick(self, now: float) -> None:
         """Updates the stage to `now`, s of a monotonic clock. Raises UserError for a damaged run file."""
         if now - self._read_at >= READ_EVERY:
             self._read_at = now
             self._read(now)
-        self._move(now)
+        self._move()
 
     def _read(self, now: float) -> None:
         if now - self._looked_at >= LOOK_FOR_ENGINE:
@@ -87,46 +120,28 @@ class Player:
             self._ran_at = now
         if self._state.evidence_test != self._evidence:
             self._show_evidence()
+        self._show_parts()
         if following != self._shot:
-            self._cut(following, now)
+            self._cut(following)
 
     def _usual(self, now: float) -> Shot:
         return shot(self._state, self._live, self._shot, now - self._ran_at)
 
-    def _cut(self, following: Shot, now: float) -> None:
+    def _cut(self, following: Shot) -> None:
         before, self._shot = self._shot, following
         self._scenery.show(following)
         self._caption(following, "")
         if before is not None and (before.kind, before.test) == (following.kind, following.test):
             return
-        self._began, self._motions, self._trail = now, {}, []
-        if following.kind == "replay" and following.test is not None:
-            self._motions = {name: _rows(samples) for name, samples in self._run.motions(following.test).items()}
-        robot = self._motions.get(ROBOT)
-        # The path of the evidence is drawn anyway.
-        hidden = robot is None or following.test == self._state.evidence_test
-        self._scenery.trail(np.zeros((0, COLUMNS)) if robot is None or hidden else robot)
-        if following.kind == "start" or (following.kind == "replay" and robot is None):
+        self._trail = []
+        self._scenery.trail(np.zeros((0, COLUMNS)))
+        if following.kind != "live":
             self._scenery.place_robot(self._start)
 
-    def _move(self, now: float) -> None:
+    def _move(self) -> None:
         shot = self._shot
-        if shot is None or shot.kind == "start":
+        if shot is None or shot.kind != "live":
             return
-        if shot.kind == "live":
-            self._follow_live(shot)
-            return
-        robot = self._motions.get(ROBOT)
-        if robot is None or not len(robot):
-            return
-        time = replay_time(now - self._began, float(robot[-1, 0]))
-        self._scenery.place_robot(pose_at(robot, time))
-        for name, samples in self._motions.items():
-            if name != ROBOT and len(samples):
-                self._scenery.place_model(name, pose_at(samples, time))
-        self._caption(shot, self._clock(time))
-
-    def _follow_live(self, shot: Shot) -> None:
         row = next((row for row in self._live if row.test == shot.test), None)
         if row is None or (self._trail and row.time <= self._trail[-1][0]):
             return
@@ -138,7 +153,23 @@ class Player:
 
     def _caption(self, shot: Shot, time: str) -> None:
         models = f"{len(shot.models)} of {len(self._elements)} models"
-        self._say(name=self._name, title=shot.title, models=models, time=time)
+        here = {"kind": shot.kind, "test": shot.test, "parts": self._letters, "limit": self._timeout}
+        self._say(name=self._name, title=shot.title, models=models, time=time, **here)
+
+    def _show_parts(self) -> None:
+        """Marks the partitions of the round that goes on, in the colours and with the letters of the map."""
+        round = None if self._state.ended else self._state.round
+        parts = () if round is None or round.done else round.partitions
+        if parts == self._parts:
+            return
+        self._parts = parts
+        groups = [
+            (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names)
+            for number, names in enumerate(parts)
+        ]
+        self._letters = self._scenery.parts(groups)[:MOST_LETTERS]
+        if self._shot is not None:
+            self._caption(self._shot, "")
 
     def _clock(self, time: float) -> str:
         return f"{time:.1f} s of {self._timeout:g} s"
@@ -146,10 +177,6 @@ class Player:
     def _show_evidence(self) -> None:
         self._evidence = self._state.evidence_test
         samples = None if self._evidence is None else self._run.motion(self._evidence)
-        self._scenery.evidence(None if samples is None else _rows(samples))
+        self._scenery.evidence(None if samples is None else rows_of(samples))
         if self._state.f_position is not None:
             mark(self._stage, "failure", self._state.f_position, self._epsilon, colors.FAILURE)
-
-
-def _rows(samples: array[float]) -> np.ndarray:
-    return np.asarray(samples, dtype=float).reshape(-1, COLUMNS)

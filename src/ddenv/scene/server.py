@@ -53,12 +53,18 @@ class Server:
         self.viewers: set[_Feed] = set()
         self.welcome: Callable[[], list[bytes]] = list
         self.caption = ""
+        # What a browser may ask for: finished tests by number, pairs of them, and the messages that draw a part of one.
+        self.play: Callable[[int], dict[str, Any]] = _nothing
+        self.pairs: Callable[[], dict[str, Any]] = dict
+        self.drawings: Callable[[str, int], list[bytes]] = lambda *_: []
         # A new one for each scene: whoever takes the port later hears an old page ask for it again.
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
         routes: list[Any] = [
             (f"/{self._token}/feed", _Feed, {"server": self}),
             (f"/{self._token}/", _Page, {"page": _PAGE.read_text()}),
             (rf"/{self._token}/(main\.min\.js)", tornado.web.StaticFileHandler, {"path": str(_VIEWER)}),
+            (rf"/{self._token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
+            (rf"/{self._token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
         ]
         application = tornado.web.Application(
             routes,
@@ -92,7 +98,7 @@ class Server:
         for viewer in tuple(self.viewers):
             viewer.pass_on(message, newest_only)
 
-    def say(self, **words: str) -> None:
+    def say(self, **words: Any) -> None:
         """Changes the caption over the picture."""
         caption = json.dumps(words)
         if caption != self.caption:
@@ -117,6 +123,35 @@ class _Page(tornado.web.RequestHandler):
         scripts = f"{_POLICY['script-src']} {of_scripts(self._page)}"
         self.set_header("Content-Security-Policy", policy(_POLICY | {"script-src": scripts}))
         self.finish(self._page)
+
+
+def _nothing(_: int) -> dict[str, Any]:
+    raise UserError("nothing to play")
+
+
+class _Asked(tornado.web.RequestHandler):
+    """Answers what a page asks for; reading is all that it can do."""
+
+    def initialize(self, server: Server) -> None:
+        self._server = server
+
+    def get(self, what: str, number: str | None) -> None:
+        self.set_header("Cache-Control", "no-store")
+        test = int(number or 0)
+        try:
+            if what == "pairs":
+                self.finish(self._server.pairs())
+            elif what == "play":
+                self.finish(self._server.play(test))
+            else:
+                self.set_header("Content-Type", "application/octet-stream")
+                # Each message after its length in 4 bytes.
+                drawings = self._server.drawings(what, test)
+                self.finish(b"".join(len(one).to_bytes(4, "big") + one for one in drawings))
+        except UserError as error:
+            self.set_status(404)
+            self.set_header("Content-Type", "text/plain; charset=utf-8")
+            self.finish(str(error))
 
 
 class _Stranger(tornado.web.RequestHandler):

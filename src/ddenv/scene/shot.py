@@ -1,4 +1,4 @@
-"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, and the time of a replay."""
+"""What the scene shows: pure functions from the run's state and running tests to a `Shot`, with their titles."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from ddenv.runfile.tested import Purpose, purpose
 from ddenv.world.motion import pose_of
 from ddenv.world.pose import Pose
 
-SPEED = 4.0  # of a replay, relative to real time
-PAUSE = 2.0  # at the end of a replay, s
 HOLD = 3.0  # how long a finished test stays on screen until the next one starts, s
 
 
@@ -45,6 +43,11 @@ def shot(state: RunState, live: Sequence[Live], previous: Shot | None = None, id
     test = _to_replay(state)
     if test is None:
         return _shot(state, "start", None, frozenset(state.environment), "the robot at its start")
+    return _of_test(state, "replay", test)
+
+
+def shot_of_test(state: RunState, test: Test) -> Shot:
+    """What to show of a finished test, which began in `state`."""
     return _of_test(state, "replay", test)
 
 
@@ -85,19 +88,13 @@ def _of_test(state: RunState, kind: str, test: Test, made: Purpose | None = None
     words = [name, f"test {test.id}"]
     if test.phase == "round" and test.run > 0:
         words.append(f"re-run {test.run}")
-    words += ["runs now"] if kind == "live" else [test.outcome, f"replay at {SPEED:g}×"]
+    words.append("runs now" if kind == "live" else test.outcome)
     return _shot(state, kind, test.id, models, " · ".join(words))
 
 
 def _shot(state: RunState, kind: str, test: int | None, models: frozenset[str], title: str) -> Shot:
     kept = frozenset(state.environment)
     return Shot(kind, test, models, kept - models, frozenset(state.elements) - kept - models, title)
-
-
-def replay_time(elapsed: float, length: float) -> float:
-    """The simulated time to show, s, `elapsed` s after the replay of a run of `length` s started; it repeats forever."""
-    length = max(0.0, length)
-    return min(length, elapsed % (length / SPEED + PAUSE) * SPEED)
 
 
 def live_pose(row: Live) -> Pose:

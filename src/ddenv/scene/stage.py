@@ -60,6 +60,12 @@ class Stage:
         if below:
             self._send(umsgpack.packb({"type": "delete", "path": _text(path)}), False)
 
+    def drawn(self, path: Path, thing: Object | None) -> bytes:
+        """The message that draws `thing` at `path`, or None deletes what is there, for one browser alone: it is not kept."""
+        if thing is None:
+            return bytes(umsgpack.packb({"type": "delete", "path": _text(path)}))
+        return bytes(umsgpack.packb({"type": "set_object", "object": thing.lower(), "path": _text(path)}))
+
     def messages(self) -> list[bytes]:
         """The messages that a new browser needs, objects before their properties."""
         return [message for (_, kind), message in sorted(self._kept.items(), key=lambda item: item[0][1] != "object")]
