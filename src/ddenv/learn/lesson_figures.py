@@ -169,7 +169,8 @@ def check(text: str) -> None:
         other, bare = _parts(name)
         about = _ABOUT_CLAIM.fullmatch(bare) or _OF_SET.fullmatch(name)
         if bare not in (OF_RUN if other else names()) and not about:
-            raise UserError(f"unknown figure '{{{name}}}'{nearest(name, names())}; known are {', '.join(names())}")
+            meant = nearest(name, names()) or f"; known are {', '.join(names())}"
+            raise UserError(f"unknown figure '{{{name}}}'{meant}")
     bare = _FIGURE.sub("", text)
     for term in TERMS:
         bare = bare.replace(term, "")
