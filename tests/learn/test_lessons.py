@@ -94,6 +94,15 @@ def test_every_wrong_answer_says_what_is_wrong_with_it(number):
         walk.go_on()
 
 
+def test_the_place_of_an_answer_does_not_give_it_away():
+    places = [
+        [step.question.right for step in opened(number).lesson.steps if step.question is not None] for number in NUMBERS
+    ]
+    for each in (*places, [place for lesson in places for place in lesson]):
+        assert max(map(each.count, each)) <= len(each) / 2 + 1, places
+        assert len(set(each)) >= 3, places
+
+
 def test_answers_are_kept_and_count_once():
     walk = course(0)
     walk.score = Score()

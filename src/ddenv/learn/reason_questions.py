@@ -51,7 +51,9 @@ def _capital(words: str) -> str:
 
 def _of_f(gone: str, options: Settings) -> tuple[Answer, ...]:
     goes = f"f shows without {gone}: they can go."
-    if options.accept_rate != "first":
+    if options.iterations and options.accept_rate == "first":
+        goes = f"f showed without {gone}. Here the first run with f decides, so they go."
+    elif options.accept_rate != "first":
         goes = f"f can show without {gone}. Whether it shows often enough, more runs will say."
     return (
         Answer("Everything that f needs is still there.", True, goes),

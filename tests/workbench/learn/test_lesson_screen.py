@@ -134,7 +134,7 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
         await pilot.pause()
         assert not pilot.app._notifications
         # Lines of a remark after its first stand below its words.
-        remark = next(line for line in text(pilot).splitlines() if line.startswith("b ✓"))
+        remark = next(line for line in text(pilot).splitlines() if line[1:4] == " ✓ " and line[0] in "abc")
         after = text(pilot).splitlines()[text(pilot).splitlines().index(remark) + 1]
         assert after.startswith("    ") and len(remark) <= 76
 
