@@ -18,6 +18,7 @@ from textual.widgets import Static
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
 from ddenv.workbench.background import call_if_open
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup import form
@@ -201,6 +202,9 @@ class PlacePicker(Static):
             what = "start"
         self.picked_next = what
         self._map.picking = bool(what)
+        for footer in self.screen.query(KeyFooter) if self.is_attached else ():
+            # Here enter picks a place, and nothing else.
+            footer.say("map.pick", "set here" if what else "")
         self._show_words()
 
     def take(self, x: float, y: float) -> None:
