@@ -143,7 +143,8 @@ def main() -> None:
 
 
 async def make_all() -> None:
-    run = new_run("ditch")
+    # What took part would leave five models, and no round with much to see.
+    run = new_run("ditch", slice=False)
     start_engine(run, 1, accept_mode="ask")
     async with opened(run) as pilot:
         await begin(pilot, run)
@@ -495,9 +496,10 @@ def state(pilot: Pilot[int]) -> RunState:
     return run_screen(pilot).snapshot.state
 
 
-def new_run(scenario: str) -> Path:
-    run = HOME / "runs" / f"{scenario}-1.ddenv"
-    create_run(load_scenario(find_scenario(scenario)), run)
+def new_run(name: str, **reduction: bool) -> Path:
+    run = HOME / "runs" / f"{name}-1.ddenv"
+    scenario = load_scenario(find_scenario(name))
+    create_run(scenario.model_copy(update={"reduction": scenario.reduction.model_copy(update=reduction)}), run)
     return run
 
 
