@@ -142,14 +142,15 @@ def _tests(state: RunState) -> list[Block]:
     )
     head = ("outcome", "tests", "share", *(words for _, words in phases), "which means")
     table = Table(head, rows, frozenset(range(1, 3 + len(phases))))
-    slices = _slices(state)
-    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"] and not state.ahead:
+    # Before the end of the run, anything may still come to be needed.
+    slices, ahead = _slices(state), state.ahead if state.status == "finished" else 0
+    if not state.deflake_runs and not state.cut_tests and not state.tally["lost"] and not ahead:
         return [table, *slices]
     words = f"{thousands(state.deflake_runs)} of the tests were re-runs of candidates whose first test did not show f."
     if state.cut_tests:
         words += f" {thousands(state.cut_tests)} were ended early, when the robot was stuck for good."
-    if state.ahead:
-        words += f" {thousands(state.ahead)} were made ahead of time by idle workers, and no verdict rests on them."
+    if ahead:
+        words += f" {thousands(ahead)} were made ahead of time by idle workers, and no verdict rests on them."
     if lost := state.tally["lost"]:
         words += f" {count(lost, 'more test')} did not end, and {'counts' if lost == 1 else 'count'} for nothing."
     return [table, say(words), *slices]

@@ -223,8 +223,8 @@ def tests_said(state: RunState) -> tuple[str, ...]:
     total = state.tests_done
     said = count(total, "test") if state.budget is None else f"{state.made} of {count(state.budget, 'test')}"
     said += f", {state.implied} implied" if state.implied else ""
-    # One worker makes only what is wanted.
-    said += f", {state.ahead} ahead" if state.ahead and state.jobs > 1 else ""
+    # Before its end, anything may still come to be needed.
+    said += f", {state.ahead} ahead for nothing" if state.ahead and state.status == "finished" else ""
     parts = " ".join(f"{counts[name]} {name}" for name in OUTCOME_ORDER if counts.get(name))
     return (f"{said}: {parts}" if parts else said, f"{said}: {counts['similar']} similar", said, "")
 
