@@ -1,5 +1,6 @@
 """Whatever values a stored run has, it opens in every viewer, or says in a line that it is damaged."""
 
+import json
 import os
 import shutil
 from contextlib import suppress
@@ -85,6 +86,10 @@ def test_the_scene_is_drawn_or_says_what_is_damaged(hostile, batch):
                 for now in (0.0, 0.5, 2.0, 9.0):
                     player.tick(now)
                 assert sent, seed
+                assert json.dumps(player.pairs(), allow_nan=False)
+                for test in range(1, 4):
+                    with suppress(UserError):
+                        assert json.dumps(player.play(test), allow_nan=False) and player.drawings("way", test), seed
         except UserError as error:
             assert "\n" not in str(error)
         except Exception as error:

@@ -104,7 +104,9 @@ class Writer:
 
 
 @pytest.fixture
-def writer(tmp_path) -> Writer:
+def writer(tmp_path, monkeypatch) -> Writer:
+    # The scene remembers its address there.
+    monkeypatch.setenv("DDENV_HOME", str(tmp_path / "home"))
     return Writer(tmp_path / "a.ddenv", tmp_path)
 
 

@@ -146,6 +146,12 @@ async def test_the_picture_shows_robot_goal_and_failure(writer, start_scene):
         process.terminate()
         process.wait(PATIENCE)
         await shows(page, "document.getElementById('lost').style.display === 'block'")
+        # The page comes back to a scene that is started again.
+        assert start_scene(writer.path).stdout.readline().strip() == url
+        await shows(
+            page,
+            "document.getElementById('lost').style.display !== 'block' && typeof play !== 'undefined' && play !== null",
+        )
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 200
     assert near(picture, (240, 190, 20)) > 100, "the robot's yellow"
     assert near(picture, (20, 180, 75)) > 100, "the goal's green"

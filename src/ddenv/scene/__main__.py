@@ -17,6 +17,7 @@ from typing import NoReturn
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.wanted import read
+from ddenv.scene.address import last_address, remember
 from ddenv.scene.player import Player
 from ddenv.scene.server import Server
 from ddenv.scene.stage import Stage
@@ -54,13 +55,16 @@ async def _serve(run: RunFile, port: int, parent: int, pointed: bool) -> None:
     loop = asyncio.get_running_loop()
     for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         loop.add_signal_handler(name, ended.set)
-    server = Server()
+    before, token = last_address(run.path)
+    server = Server(token)
     stage = Stage(server.send)
     server.welcome = stage.messages
     player = Player(run, stage, server.say)
     server.play, server.pairs, server.drawings = player.play, player.pairs, player.drawings
+    url = server.listen(port, before)
+    remember(run.path, server.port, token)
     player.tick(time.monotonic())
-    print(server.listen(port), flush=True)
+    print(url, flush=True)
     if pointed:
         os.set_blocking(sys.stdin.fileno(), False)
         loop.add_reader(sys.stdin.fileno(), _point, player, loop)

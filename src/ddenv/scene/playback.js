@@ -243,8 +243,19 @@ viewer.connection.onmessage = (message) => {
 };
 viewer.connection.onclose = () => {
   place("lost").style.display = "block";
-  setInterval(() => fetch(location.href).then((answer) => answer.ok && location.reload(), () => {}), 2000);
+  setInterval(() => isBack().then((back) => back && location.reload(), () => {}), 2000);
 };
+
+// Whether our scene is back: whoever took its port meanwhile must not hear the token, see address.py.
+async function isBack() {
+  const bytes = (text) => new TextEncoder().encode(text), token = location.pathname.split("/")[1];
+  const hex = (buffer) => [...new Uint8Array(buffer)].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  const challenge = hex(crypto.getRandomValues(new Uint8Array(16)));
+  const answer = await fetch(`/alive/${hex(await crypto.subtle.digest("SHA-256", bytes(token)))}/${challenge}`);
+  const key = await crypto.subtle.importKey("raw", bytes(token), { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
+  const proof = hex(await crypto.subtle.sign("HMAC", key, bytes(`${challenge} ${said.port}`)));
+  return answer.ok && (await answer.text()) === proof;
+}
 
 place("play").addEventListener("submit", (event) => event.preventDefault());
 place("toggle").addEventListener("click", () => run(!going));

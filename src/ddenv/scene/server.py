@@ -25,13 +25,13 @@ import tornado.websocket
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
 from ddenv.runs.programs import FIRST_PORT
+from ddenv.scene.address import TOKEN_BYTES, name_of, proof
 
 LOOPBACK = "127.0.0.1"
 TRIES = 1000
 _LOCAL_NAMES = ("localhost", LOOPBACK, "::1")
 _VIEWER = Path(meshcat.viewer_assets_path()) / "dist"
 _PAGE = Path(__file__).with_name("page.html")
-TOKEN_BYTES = 16
 # Meshcat's control panel brings its own styles.
 _POLICY = {
     "script-src": "'self'",
@@ -49,7 +49,7 @@ _CROWDED = 100
 class Server:
     """Sends the scene to all browsers. `welcome()` returns the messages that a new browser needs first."""
 
-    def __init__(self) -> None:
+    def __init__(self, token: str = "") -> None:
         self.viewers: set[_Feed] = set()
         self.welcome: Callable[[], list[bytes]] = list
         self.caption = ""
@@ -57,8 +57,8 @@ class Server:
         self.play: Callable[[int], dict[str, Any]] = _nothing
         self.pairs: Callable[[], dict[str, Any]] = dict
         self.drawings: Callable[[str, int], list[bytes]] = lambda *_: []
-        # A new one for each scene: whoever takes the port later hears an old page ask for it again.
-        self._token = secrets.token_urlsafe(TOKEN_BYTES)
+        self._token = token or secrets.token_urlsafe(TOKEN_BYTES)
+        self.port = 0
         routes: list[Any] = [
             (f"/{self._token}/feed", _Feed, {"server": self}),
             (f"/{self._token}/", _Page, {"page": _PAGE.read_text()}),
@@ -66,6 +66,7 @@ class Server:
             (rf"/{self._token}/(playback\.js)", tornado.web.StaticFileHandler, {"path": str(_PAGE.parent)}),
             (rf"/{self._token}/(pairs|play|still|way|ghost-way)(?:/(\d{{1,9}}))?", _Asked, {"server": self}),
         ]
+        routes.append((rf"/alive/{name_of(self._token)}/([0-9a-f]{{32}})", _Alive, {"server": self}))
         application = tornado.web.Application(
             routes,
             default_handler_class=_Stranger,
@@ -78,16 +79,25 @@ class Server:
         for name in ("tornado.general", "tornado.access"):
             logging.getLogger(name).setLevel(logging.ERROR)
 
-    def listen(self, port: int) -> str:
-        """Starts on `port`, or for 0 on the first free one from `FIRST_PORT` up; returns the URL. Raises UserError."""
+    def proof(self, challenge: str) -> str:
+        """That this is the scene of its token; see `address.py`."""
+        return proof(self._token, challenge, self.port)
+
+    def listen(self, port: int, before: int = 0) -> str:
+        """Starts on `port`, or for 0 on `before` or else the first free one from `FIRST_PORT` up; returns the URL.
+
+        Raises UserError.
+        """
         if not 0 <= port <= 65535:
             raise UserError(f"--port: {port} is not a port; use 1 to 65535, or 0 for a free one")
-        for number in [port] if port else range(FIRST_PORT, FIRST_PORT + TRIES):
+        free = [*([before] if before else []), *range(FIRST_PORT, FIRST_PORT + TRIES)]
+        for number in [port] if port else free:
             try:
                 sockets = tornado.netutil.bind_sockets(number, LOOPBACK)
             except OSError:
                 continue
             self._http.add_sockets(sockets)
+            self.port = number
             return f"http://{LOOPBACK}:{number}/{self._token}/"
         if port:
             raise UserError(f"--port: port {port} is in use or not allowed; use 0 for a free one")
@@ -100,7 +110,7 @@ class Server:
 
     def say(self, **words: Any) -> None:
         """Changes the caption over the picture."""
-        caption = json.dumps(words)
+        caption = json.dumps(words | {"port": self.port})
         if caption != self.caption:
             self.caption = caption
             for viewer in tuple(self.viewers):
@@ -123,6 +133,17 @@ class _Page(tornado.web.RequestHandler):
         scripts = f"{_POLICY['script-src']} {of_scripts(self._page)}"
         self.set_header("Content-Security-Policy", policy(_POLICY | {"script-src": scripts}))
         self.finish(self._page)
+
+
+class _Alive(tornado.web.RequestHandler):
+    """Proves to a page whose scene was gone that this is its scene."""
+
+    def initialize(self, server: Server) -> None:
+        self._server = server
+
+    def get(self, challenge: str) -> None:
+        self.set_header("Cache-Control", "no-store")
+        self.finish(self._server.proof(challenge))
 
 
 def _nothing(_: int) -> dict[str, Any]:
