@@ -2,26 +2,32 @@
 
     python benchmarks/sleeping.py [--boards N] [--seconds S]
     python benchmarks/sleeping.py --compare SCENARIO [--runs N] [--seconds S]
+    python benchmarks/sleeping.py --compare piles [--runs N] [--seconds S]
     python benchmarks/sleeping.py --compare WORLD --spawn X,Y,Z,YAW --goal X,Y [--runs N] [--seconds S]
 
 Each world has N boards (2 kg, 0.9 m long): every tenth lies across the robot's path, the others are piled up in threes beside it,
 two with a third across them. The first run in a world also rehearses how each pile settles alone; later runs reuse that.
 
 With `--compare` the whole world runs twice with each seed, until the robot is stuck for good: prints ends and costs
-with and without sleep.
+with and without sleep. `piles` are small random worlds (`small_worlds.py`), another one for each seed.
 """
 
 import argparse
 import math
 import time
 from collections import Counter
+from collections.abc import Iterable, Iterator
+from itertools import count, repeat
 from pathlib import Path
+
+from small_worlds import small_scenario, small_world
 
 from ddenv.rates import wilson_interval
 from ddenv.robot.drake.template import Template
 from ddenv.runs.scenarios import load_parts, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import World
+from ddenv.world.pose import Vector
 from ddenv.world.read import parse_world, read_model
 from ddenv.world.scenario import Scenario
 
@@ -42,8 +48,13 @@ def main() -> None:
     parser.add_argument("--goal", default="5,0", help="x, y m; with a world file")
     parser.add_argument("--runs", type=int, default=20)
     arguments = parser.parse_args()
+    if arguments.compare == "piles":
+        compare(piles(arguments.seconds), arguments.runs)
+        return
     if arguments.compare:
-        compare(compared(arguments), arguments.runs)
+        scenario = compared(arguments)
+        world, robot = load_parts(scenario)
+        compare(repeat((Template(world, robot, scenario), scenario)), arguments.runs)
         return
     print("| boards | first run, s a simulated s | later runs, s a simulated s | without sleeping | faster |")
     print("|---|---|---|---|---|")
@@ -79,27 +90,31 @@ def compared(arguments: argparse.Namespace) -> Scenario:
     return with_options(scenario, timeout=arguments.seconds)
 
 
-def compare(scenario: Scenario, runs: int) -> None:
-    world, robot = load_parts(scenario)
-    template = Template(world, robot, scenario)
-    everything = frozenset(world.elements())
-    cost, ends = {True: 0.0, False: 0.0}, []
-    for seed in range(runs):
-        pair = []
+def piles(seconds: float) -> Iterator[tuple[Template, Scenario]]:
+    husky = read_model(SDF / "robots" / "husky.sdf")
+    for number in count():
+        scenario = with_options(small_scenario(number), timeout=seconds)
+        yield Template(small_world("piles", number), husky, scenario), scenario
+
+
+def compare(templates: Iterable[tuple[Template, Scenario]], runs: int) -> None:
+    """Compares `runs` runs, each in the next of `templates`."""
+    cost, ends, other = {True: 0.0, False: 0.0}, [], 0
+    for seed, (template, scenario) in zip(range(runs), templates, strict=False):
+        pair: list[tuple[str, Vector]] = []
         for sleeping in (True, False):
             template._sleeping = sleeping
             began = time.process_time()
-            result = template.run(everything, seed, full=False)
+            result = template.run(template.names, seed, full=False)
             cost[sleeping] += (time.process_time() - began) / result.simulated_seconds
             pair.append((result.failure or result.outcome, result.end_position))
         ends.append(pair)
+        other += pair[0][0] != pair[1][0] or math.dist(pair[0][1], pair[1][1]) > scenario.failure.epsilon
         print(seed, *(f"{kind} at {x:.2f} {y:.2f} {z:.2f}" for kind, (x, y, z) in pair), sep="   ", flush=True)
     for number, label in enumerate(("asleep", "awake")):
         kinds = Counter(pair[number][0] for pair in ends)
         print(label, *(f"{kind}: {share(count, runs)}" for kind, count in kinds.most_common()), sep="   ")
-    epsilon = scenario.failure.epsilon
-    other = sum(one[0] != two[0] or math.dist(one[1], two[1]) > epsilon for one, two in ends)
-    print(f"end otherwise, or more than {epsilon} m apart: {share(other, runs)}")
+    print(f"end otherwise, or more than epsilon apart: {share(other, runs)}")
     print(f"CPU s a simulated s: {cost[True] / runs:.3f} asleep, {cost[False] / runs:.3f} awake")
 
 
