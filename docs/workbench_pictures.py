@@ -42,8 +42,8 @@ from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"
 MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
-# Maximum time for anything, s; after this much of its run the robot is worth a picture, simulated s.
-PATIENCE, UNDER_WAY = 120.0, 14.0
+# Maximum time for anything, a certificate included, s; after this much of its run the robot is worth a picture, simulated s.
+PATIENCE, UNDER_WAY = 600.0, 14.0
 HOME = Path(tempfile.gettempdir()) / "you"
 # Models that are on no machine, by place.
 MISSING = "".join(
