@@ -20,13 +20,14 @@ def state_file(name: str) -> Path:
 
 
 def write_state(name: str, content: object) -> None:
-    """Remembers `content` as JSON, if it can be written."""
+    """Remembers `content` as JSON, for this user alone, if it can be written."""
     from ddenv.world.files.access import write_file
 
     place = state_file(name)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         write_file(place, json.dumps(content).encode())
+        place.chmod(0o600)
     except (OSError, UserError, ValueError):
         return
 

@@ -9,6 +9,7 @@ from textual.widgets import OptionList, Static
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.runfile.store import RunFile
+from ddenv.runs.remembered import state_file
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane
@@ -56,6 +57,7 @@ async def test_a_lesson_from_start_to_end(size):
         row = pilot.app.screen.query_one(OptionList).get_option_at_index(0).prompt
         assert "done" in str(row)
     assert all_scores()["what-delta-debugging-is"].done
+    assert state_file("lessons.json").stat().st_mode & 0o077 == 0, "nobody else reads a student's answers"
 
 
 async def test_enter_shows_the_rest_of_a_long_text_first():
