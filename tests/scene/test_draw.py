@@ -135,6 +135,9 @@ def test_a_finished_test_is_played_by_the_browser(writer, screen):
     for message in (*player.drawings("way", 1), *player.drawings("ghost-way", 2), *player.drawings("still", 1)):
         screen.take(message)
     assert len(screen.things) == before + 2
+    # The path of the evidence is there already.
+    screen.take(*player.drawings("way", 2))
+    assert len(screen.things) == before + 1
 
 
 def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen):

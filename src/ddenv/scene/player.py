@@ -91,7 +91,10 @@ class Player:
         """
         if what == "still":
             return self._scenery.still(self._shot_of(test))
-        return [self._scenery.way(rows_of(self._run.trajectory(test)), what == "ghost-way")]
+        rows = rows_of(self._run.trajectory(test))
+        # The path of the evidence is drawn anyway.
+        hidden = what == "way" and test == self._evidence
+        return [self._scenery.way(rows[:0] if hidden else rows, what == "ghost-way")]
 
     def _shot_of(self, test: int) -> Shot:
         """A finished test as it was made: in the environment of that moment. Raises UserError."""
