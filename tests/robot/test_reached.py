@@ -48,12 +48,6 @@ def flat(world_of, add, husky, scenario_of) -> Callable[..., Variants]:
     return make
 
 
-def pair(name: str, x: float, y: float) -> Model:
-    """Two cubes that may collide with each other."""
-    cubes = (link_of(f"at {z}", Box((0.3, 0.3, 0.3)), Pose((x + z / 8, y, z)), 1.0) for z in (0.15, 0.5))
-    return model_of(name, *cubes, self_collide=True)
-
-
 def names(*models: Model) -> frozenset[str]:
     return frozenset(model.name for model in models)
 
@@ -128,9 +122,10 @@ def test_what_lies_beside_what_is_pushed_sleeps_on(flat):
 
 
 def test_nothing_is_claimed_where_it_is_unknown(flat):
-    own = flat(cube("other", 2, 3, 0.15), controller={"use": "ddenv.robot.navigation.navigate:Straight"})
-    assert own.run(frozenset({"other"}), 1).took_part is None
-    assert own.ties(frozenset({"other"})) is None
+    assert flat(cube("own", 2, 3, 0.15, self_collide=True)).run(frozenset({"own"}), 1).took_part is None
+    assert flat(cube("own", 2, 3, 0.15, self_collide=True)).ties(frozenset({"own"})) is None
+    own = {"controller": {"use": "ddenv.robot.navigation.navigate:Straight"}}
+    assert flat(cube("other", 2, 3, 0.15), **own).run(frozenset({"other"}), 1).took_part is None
 
 
 # Near the robot's path or not.
@@ -142,7 +137,6 @@ KINDS = {
     "pile": lambda name, x, y: [cube(f"{name}_low", x, y, 0.15), cube(f"{name}_high", x + 0.1, y, 0.46)],
     "shelf": lambda name, x, y: [still(name, x, y, (0.4, 0.4, 0.4)), cube(f"{name}_cube", x, y, 0.55)],
     "ball": lambda name, x, y: [model_of(f"{name}_ball", link_of("link", Sphere(0.2), Pose((x, y, 0.8)), 1.0))],
-    "own": lambda name, x, y: [pair(name, x, y)],
 }
 WORLDS = st.lists(st.tuples(st.sampled_from(sorted(KINDS)), PLACES), min_size=3, max_size=8)
 
