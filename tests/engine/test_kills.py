@@ -69,7 +69,7 @@ def workers(engine: int) -> list[int]:
     return found
 
 
-def tests_begun(run: Path) -> int:
+def how_many_began(run: Path) -> int:
     """How many tests ever began in a run."""
     with RunFile(run) as file:
         return sum(event.kind == "test_started" for event in file.events())
@@ -77,13 +77,13 @@ def tests_begun(run: Path) -> int:
 
 def lives(run: Path, dice: random.Random, most: int) -> int:
     """One engine's life on a run: a worker is killed, and then the engine. Returns how many kills there were, at most `most`."""
-    before = tests_begun(run)
+    before = how_many_began(run)
     engine = start_engine(run, 2, anyway="yes")
     kills, began, early = 0, math.inf, dice.randrange(ONE_IN) == 0
     moments = sorted(dice.uniform(0.0, EARLY if early else LIFE) for _ in range(min(2, most)))
     while engine.poll() is None and kills < len(moments):
         time.sleep(PERIOD)
-        if began == math.inf and (workers(engine.pid) if early else tests_begun(run) > before):
+        if began == math.inf and (workers(engine.pid) if early else how_many_began(run) > before):
             began = time.monotonic()
         if time.monotonic() - began < moments[kills]:
             continue
