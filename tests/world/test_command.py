@@ -37,7 +37,7 @@ def test_a_program_on_the_path_is_found(words):
     [
         (
             "./run.sh {wrld}",
-            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{seed\} and \{log\}",
+            r"unknown placeholder \{wrld\} \(did you mean world\?\); use \{world\}, \{scenario\}, \{seed\} and \{log\}",
         ),
         ("./run.sh ${HOME}", r"unknown placeholder \{HOME\}"),
         ("./run.sh 'a", "no closing quotation"),

@@ -35,7 +35,7 @@ MOST_CHECKS = 6
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20
 # Tests looked for at a time, for each worker: those that run are among them.
-AHEAD = 2
+AHEAD_PER_JOB = 2
 CHANGED = "a decision of the user, or a slice that was wrong, ended the isolation; resume the run to go on from there"
 VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
 # A model that is put back, None for none, with the world that shows what that does, and what fresh runs say so far.
@@ -189,7 +189,7 @@ class Isolator:
             return self._whole - round.candidates[index].models
 
         rule = Passing(self._now.wanted, self._now.rather_than)
-        enough = AHEAD * max(1, self.journal.state.jobs)
+        enough = AHEAD_PER_JOB * max(1, self.journal.state.jobs)
         judged = winner = 0
 
         def wanted() -> Wanted:

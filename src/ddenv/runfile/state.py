@@ -386,7 +386,7 @@ class Test:
     @property
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
-        return self.phase == "round" and self.run > 0 and self.is_finished
+        return self.phase in ("round", AHEAD) and self.run > 0 and self.is_finished
 
 
 def partition_letter(index: int) -> str:
