@@ -49,7 +49,8 @@ def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single mo
     if not removals:
         return f"nothing is left that can be removed: {rate(left)}{but}"
     most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
-    return f"no {one} can be removed: {rate(left)}; without any one of these {len(removals)} at most {rate(most)}{but}"
+    without = f"any one of these {len(removals)} at most" if len(removals) > 1 else removals[0].without
+    return f"no {one} can be removed: {rate(left)}; without {without} {rate(most)}{but}"
 
 
 def _stayed(pinned: int) -> str:

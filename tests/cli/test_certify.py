@@ -1,9 +1,12 @@
 """`ddenv certify`, and the result of a run as lines and as JSON."""
 
+from dataclasses import replace
+
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.runfile.fold import fold
+from ddenv.runs.folder import runs_folder
 from tests.command import in_process
 from tests.workbench import fake_moments, fake_run
 
@@ -33,6 +36,17 @@ def test_a_result_is_told_with_its_runs_and_what_they_mean(run):
     assert "minimal environment: 2 of 11 models" in lines
     assert "what is left: f in 23 of 23 fresh runs (86 % to 100 %): keeps 80 % of the whole world's rate" in lines
     assert "without crate_01: f in 1 of 12 fresh runs (1 % to 35 %): needed" in lines
+
+
+def test_a_result_with_a_certificate_says_what_can_be_done_with_it(run, home):
+    state = fold(fake_moments.finished(run).file.events())
+    elsewhere = summary_lines(state, run.path)[-1]
+    assert elsewhere.startswith(f"next: 'ddenv open {run.path}' shows it")
+    assert summary_lines(state, runs_folder() / "crates-1.ddenv")[-1] == (
+        "next: 'ddenv open crates-1' shows it, 'ddenv why crates-1' says why it fails, "
+        "'ddenv export crates-1 --bundle crates-1.zip' packs it for others"
+    )
+    assert not any(line.startswith("next:") for line in summary_lines(replace(state, status="stopped"), run.path))
 
 
 def test_what_is_not_shown_is_not_called_minimal(run):

@@ -1,6 +1,7 @@
 """The run file: what is in it stays, and what is no run file is told."""
 
 import sqlite3
+import zipfile
 from array import array
 
 import pytest
@@ -106,6 +107,11 @@ def test_files_that_are_no_run_files(tmp_path):
         database.execute("CREATE TABLE t (x)")
     with pytest.raises(UserError, match="is not a ddenv run file"):
         RunFile(other)
+    packed = tmp_path / "handed.zip"
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.writestr("handed/run.ddenv", "hello")
+    with pytest.raises(UserError, match="is a ZIP file; unpack it first"):
+        RunFile(packed)
 
 
 def test_a_newer_file_is_refused(path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from ddenv.errors import printable
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN, Node, RunState
+from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.took_part import simulated
 
@@ -120,13 +122,26 @@ def summary_lines(state: RunState, path: Path) -> list[str]:
     said = [
         f"{what}: {after} of {count(before, 'model')} ({percent(1 - after / before).replace(' ', '')} smaller): {names}",
         *_certificate_lines(state),
-        f"{state.tests_done} tests ({tests}; {state.deflake_runs} re-runs{more}) in {count(state.rounds_done, 'round')}, "
+        f"{state.tests_done} tests ({tests}; {count(state.deflake_runs, 're-run')}{more}) in {count(state.rounds_done, 'round')}, "
         f"{state.working_seconds:.0f} s",
         *([known] if (known := smaller_known(state)) else []),
         *broken(state),
         f"run file: {path}",
+        *_next(state, path),
     ]
     return [printable(line) for line in said]
+
+
+def _next(state: RunState, path: Path) -> list[str]:
+    """What can be done with a result that fresh runs speak of."""
+    if state.status != "finished" or current(state) is None:
+        return []
+    run = path.stem if find_run(path.stem) == path else shlex.quote(str(path))
+    bundle = shlex.quote(f"{path.stem}.zip")
+    return [
+        f"next: 'ddenv open {run}' shows it, 'ddenv why {run}' says why it fails, "
+        f"'ddenv export {run} --bundle {bundle}' packs it for others"
+    ]
 
 
 def _certificate_lines(state: RunState) -> list[str]:

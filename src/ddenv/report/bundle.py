@@ -168,7 +168,8 @@ def _issue(record: Record, needs: list[str]) -> Iterator[str]:
     yield "It runs what is left with fresh seeds until they decide. Its exit codes are those that `git bisect run` reads:"
     yield "1 if it fails as it did, 0 if it does not, 125 if that cannot be said. `--folder FOLDER` has a controller of your own."
     yield ""
-    yield f"`{WORLD}` is the world that is left, `{SCENARIO}` runs the robot in it, `{REPORT}` says how it was found."
+    yield f"`{REPORT}` opens in a browser and says why it fails and how that was found; `ddenv open {RUN}` shows the run itself."
+    yield f"`{WORLD}` is the world that is left; `ddenv test {SCENARIO}` runs the robot in it once."
     if needs:
         names = ", ".join(f"`{_code(uri)}`" for uri in needs[:MOST_NAMES])
         yield f"Other programs also need the files that `{WORLD}` names: {names}."

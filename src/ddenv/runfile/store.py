@@ -150,6 +150,12 @@ class RunFile:
         except sqlite3.OperationalError as error:
             raise UserError(f"{path}: cannot be read: {error}") from None
         except sqlite3.Error as error:
+            from zipfile import is_zipfile
+
+            if is_zipfile(path):
+                raise UserError(
+                    f"{path}: is a ZIP file; unpack it first and name the run in it, FOLDER/run.ddenv"
+                ) from None
             raise UserError(f"{path}: is not a ddenv run file ({error})") from None
         if application != APPLICATION_ID:
             raise UserError(f"{path}: is not a ddenv run file")
