@@ -77,6 +77,17 @@ def test_nothing_is_replaced_and_nothing_is_written_where_a_certificate_lacks(ru
     assert not (tmp_path / name).exists()
 
 
+def test_without_this_ddenv_nothing_is_said_of_the_failure(run, tmp_path):
+    write_bundle(run, tmp_path / "handed")
+    (tmp_path / "ddenv").mkdir()
+    (tmp_path / "ddenv" / "__init__.py").touch()
+    program = [sys.executable, "handed/repro.py"]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (125, "")
+    assert "repro.py: needs ddenv" in done.stderr
+    assert "pip install ddenv" not in (tmp_path / "handed" / "ISSUE.md").read_text()
+
+
 @pytest.mark.examples
 def test_git_bisect_finds_the_change_that_made_the_robot_fail(tmp_path, home):
     """In a repository with the user's own simulator; the change is seen by the run that failed after it."""

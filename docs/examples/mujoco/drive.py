@@ -2,7 +2,7 @@
 """The robot of a scenario in MuJoCo, with the sensors, the pose estimate and the controller that it has in Drake.
 
 drive.py SCENARIO SEED prints the pose log. Exit codes: 0 goal reached, 1 time is up or it fell, 2 this cannot be simulated.
-drive.py SCENARIO prints world and robot as MJCF. Needs `pip install ddenv mujoco`.
+drive.py SCENARIO prints world and robot as MJCF. Needs ddenv and `pip install mujoco`.
 """
 
 from __future__ import annotations

@@ -31,9 +31,10 @@ RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
     "repro.py",
 )
 MOST_NAMES = 20
+NEEDS = f"needs ddenv {__version__}, installed from its clone with pip install . (the ddenv on PyPI is another program)"
 PROGRAM = f'''"""Exits with 1 where the robot fails as it did, with 0 where it does not, with 125 where that cannot be said.
 
-Needs `pip install ddenv`. In a repository: git bisect run python repro.py --folder .
+Needs ddenv, installed from its clone. In a repository: git bisect run python repro.py --folder .
 """
 
 import subprocess
@@ -41,6 +42,10 @@ import sys
 from pathlib import Path
 
 run = Path(__file__).resolve().with_name("{RUN}")
+# Without it Python itself exits with 1, and PyPI has another program of that name.
+if subprocess.call([sys.executable, "-c", "import ddenv.cli.reproduce_command"], stderr=subprocess.DEVNULL):
+    print("repro.py: {NEEDS}", file=sys.stderr)
+    sys.exit(125)
 code = subprocess.call([sys.executable, "-m", "ddenv", "reproduce", str(run), "--trust", *sys.argv[1:]])
 sys.exit(125 if code == 2 else code)
 '''
@@ -162,9 +167,9 @@ def _issue(record: Record, needs: list[str]) -> Iterator[str]:
     yield ""
     yield "## Reproduce"
     yield ""
-    yield f"    pip install ddenv=={__version__}"
     yield f"    python {AGAIN}"
     yield ""
+    yield f"It {NEEDS}."
     yield "It runs what is left with fresh seeds until they decide. Its exit codes are those that `git bisect run` reads:"
     yield "1 if it fails as it did, 0 if it does not, 125 if that cannot be said. `--folder FOLDER` has a controller of your own."
     yield ""
