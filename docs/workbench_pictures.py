@@ -43,7 +43,7 @@ from ddenv.world.load import SDF, find_scenario, load_scenario
 SCREENS = Path(__file__).resolve().parent / "screens"
 MIDDLE, SMALL, LARGE, TINY = (120, 36), (80, 24), (200, 60), (40, 10)
 # Maximum time for anything, a certificate included, s; after this much of its run the robot is worth a picture, simulated s.
-PATIENCE, UNDER_WAY = 600.0, 14.0
+PATIENCE, UNDER_WAY = 600.0, 6.0
 HOME = Path(tempfile.gettempdir()) / "you"
 # Models that are on no machine, by place.
 MISSING = "".join(
@@ -437,10 +437,10 @@ async def until(pilot: Pilot[int], is_so: Callable[[], bool]) -> None:
     await pilot.pause(0.2)
 
 
-async def take(pilot: Pilot[int], name: str, *, at_once: bool = False) -> None:
+async def take(pilot: Pilot[int], name: str, *, settled_after: float = 0.6) -> None:
     # Words that fade after a while would hide what is below them.
     pilot.app.clear_notifications()
-    await pilot.pause(0.0 if at_once else 0.6)
+    await pilot.pause(settled_after)
     shown = type(pilot.app.screen).__name__
     if shown != PICTURES[name].screen:
         raise RuntimeError(f"{name}: {shown} is shown in place of {PICTURES[name].screen}")
@@ -456,7 +456,8 @@ async def take_live(pilot: Pilot[int], name: str, guiding: Pilot[int]) -> None:
         await accept_if_waiting(guiding)
         await pilot.pause(0.02)
         if is_under_way(pilot):
-            await take(pilot, name, at_once=True)
+            # The panes of a screen follow its state one after the other.
+            await take(pilot, name, settled_after=0.2)
             if is_under_way(pilot):
                 return
     raise TimeoutError(name)

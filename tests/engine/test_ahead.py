@@ -63,7 +63,7 @@ def decided(path):
     rate=st.sampled_from([1.0, 0.9]),
     seed=st.integers(0, 9),
 )
-@examples(0.2)
+@examples(0.1)
 def test_any_number_of_workers_comes_to_the_same_verdicts(salt, needed, fewer, rate, seed, method):
     oracle = at_rates(salt, (needed, rate), (needed - {min(needed)}, fewer))
     with tempfile.TemporaryDirectory() as folder:
