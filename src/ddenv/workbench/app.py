@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
-from weakref import WeakSet
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -17,7 +16,6 @@ from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
-from textual.dom import DOMNode
 from textual.notifications import SeverityLevel
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
@@ -137,8 +135,6 @@ class Workbench(App[int]):
         self.theme = config.theme or DARK.name
         self._own_keys, self._notifies = config.keys, config.notify
         self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
-        # Screens that have come to the top before.
-        self._shown: WeakSet[DOMNode] = WeakSet()
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
             from ddenv.workbench.run.observed import Observed
@@ -174,14 +170,6 @@ class Workbench(App[int]):
         nodes = self.screen.ancestors_with_self if self.focused is None else self.focused.ancestors_with_self
         bound = (each for node in nodes for each in node._bindings.key_to_bindings.get(key, ()))
         return any(each.action not in TABS[key] for each in bound)
-
-    def update_styles(self, node: DOMNode, animate: bool = True) -> None:
-        """As every app; but a screen that opens has just got all its styles, and Textual would make them once more."""
-        opens = isinstance(node, Screen) and not animate and node not in self._shown
-        if opens:
-            self._shown.add(node)
-        else:
-            super().update_styles(node, animate)
 
     def on_mount(self) -> None:
         # After ctrl+z and fg the terminal is blank, and only changes would be drawn.
