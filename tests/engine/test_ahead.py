@@ -9,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine.journal import Journal
+from ddenv.reduction.round import make_round
+from ddenv.reduction.rounds_ahead import Place
 from ddenv.runfile.state import AHEAD, BROKEN, FRESH
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import FakePool, drive, new_run
@@ -141,3 +143,24 @@ def test_nothing_beyond_the_round_is_made_where_tests_are_counted(tmp_path):
     path = new_run(tmp_path, budget=500)
     state = drive(path, FakePool(needs("wall", "beam"), 16))
     assert {test.phase for test in state.tests} == {"baseline", "round", "certify"}
+
+
+@pytest.mark.parametrize("workers", [2, 4])
+def test_the_next_test_of_the_search_never_waits_for_those_of_later_rounds(tmp_path, workers):
+    path = sliced_run(tmp_path, accept_rate="first", iterations=25)
+    drive(path, FakePool(needs(MODELS[0], MODELS[3]), workers))
+    with RunFile(path) as file:
+        begun = [event.data for event in file.events() if event.kind == "test_started"]
+    # Nobody looks so far ahead in the runs of one candidate.
+    first = [(one["phase"], one["candidate"], one["run"]) for one in begun]
+    late = first.index(("round", 0, 12))
+    assert late - first.index(("round", 0, 11)) <= 2 * workers
+
+
+def test_candidates_that_are_judged_are_forgotten(tmp_path):
+    """The models of 10,000 candidates of 10,000 models each would take gigabytes."""
+    models = [str(number) for number in range(20)]
+    round = make_round(20, tuple(models), [((name,), 0.0) for name in models])
+    place = Place((), round, keeps={index: frozenset() for index in range(40)}, after=dict.fromkeys([None, *range(40)]))
+    place.judged(30)
+    assert list(place.keeps) == list(range(29, 40)) and list(place.after) == [None, *range(29, 40)]

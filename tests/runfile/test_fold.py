@@ -102,6 +102,12 @@ def test_a_verdict_copies_a_small_part_of_the_candidates():
     assert [one.index for one in after.round.candidates.changed_since(before.round.candidates)] == [1234]
 
 
+def test_a_verdict_by_a_test_that_cannot_be_takes_no_memory():
+    before = state_after(round_event([[0], [1]]))
+    judged = {"candidate": 0, "verdict": "dissimilar", "known": 0}
+    assert with_event(before, "candidate_judged", tests=[10**14], **judged).rests_on == 0
+
+
 @pytest.mark.parametrize(
     "changed",
     [

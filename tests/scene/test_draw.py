@@ -151,7 +151,7 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen):
     assert [letter for letter, *_ in words["parts"]] == ["A", "A", "B", "B"]
     assert {color for _, color, *_ in words["parts"]} == {"#56b4e9", "#f0a028"}
     assert words["parts"][1][2:] == pytest.approx((3, 0, 0.1))
-    assert {path for path in screen.things if path.startswith("/world/parts")} == {"/world/parts/A", "/world/parts/B"}
+    assert {path for path in screen.things if path.startswith("/world/parts")} == {"/world/parts/0", "/world/parts/1"}
     writer.reduce()
     player.tick(30)
     assert words["parts"] == [] and not any(path.startswith("/world/parts") for path in screen.things)
@@ -173,6 +173,9 @@ def test_a_large_world_is_a_few_objects(screen):
     for message in scenery.still(Shot("start", None, half, frozenset(), frozenset(), "")):
         screen.take(message)
     assert "/world/models/still" in screen.things and "/world/left-out/all" not in screen.things
+    hues = ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))
+    places = scenery.parts((str(number), hues[number % 3], [f"m{number}"]) for number in range(400))
+    assert len(places) == 400 and sum(path.startswith("/world/parts") for path in screen.things) == 3
 
 
 def _boxed(number):

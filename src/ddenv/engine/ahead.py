@@ -17,6 +17,7 @@ from ddenv.engine.subjects import Asked, Keep
 from ddenv.reduction.chances_ahead import MOST_RUNS, Experience, runs_ahead
 from ddenv.reduction.round import Round
 from ddenv.reduction.rounds_ahead import Path, Place, RoundsAhead
+from ddenv.reduction.verdict import Shown
 from ddenv.runfile.state import AHEAD
 
 # A test that is wanted with a lower probability is not made: its worker would miss better ones.
@@ -109,6 +110,7 @@ class Ahead:
             return []
         found, numbers, until = _Found(most, is_started), count(), time.monotonic() + LONGEST
         here, self._goes_on = self._rounds.at(now.path, now.round), now.beyond and self._may_go_on
+        here.judged(now.judged)
         branches = [_Branch(-1.0, next(numbers), lambda: here, now.judged, {})]
         if self._goes_on:
             self._add_fresh(found, COMES_TO_CERTIFICATE, only=self._journal.whole)
@@ -154,13 +156,8 @@ class Ahead:
         if keep in self._journal.refused:
             yield _Branch(-reach, 0, lambda: place, index + 1, missed)
             return
-        chance, shown, misses = (
-            self._experience.chance(round.candidates[index]),
-            self._journal.shown,
-            missed.get(keep, 0),
-        )
-        results = (shown(keep, run) for run in range(MOST_RUNS))
-        known = tuple(False if one is None and run < misses else one for run, one in enumerate(results))
+        chance = self._experience.chance(round.candidates[index])
+        known = self._known(keep, missed.get(keep, 0))
         runs = runs_ahead(rule, self._journal.rule.rate or 1.0, chance, known)
         for run, reached in runs.reached:
             asked = Asked(AHEAD, keep, run) if number is None else Asked("round", keep, run, number, index)
@@ -168,6 +165,14 @@ class Ahead:
         yield _Branch(-reach * (1.0 - runs.similar), 0, lambda: place, index + 1, missed)
         if self._goes_on:
             yield _Branch(-reach * runs.similar, 0, lambda: self._rounds.after(place, index), 0, missed)
+
+    def _known(self, keep: Keep, misses: int) -> tuple[Shown, ...]:
+        """What runs of a candidate showed, up to some that are not made; the first of them, `misses`, will not have shown f."""
+        known: list[Shown] = []
+        while known.count(None) < MOST_RUNS:
+            one = self._journal.shown(keep, len(known))
+            known.append(False if one is None and len(known) < misses else one)
+        return tuple(known)
 
     def _keep(self, place: Place, index: int) -> Keep:
         if index not in place.keeps:

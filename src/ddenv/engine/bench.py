@@ -122,12 +122,16 @@ class Bench:
         free = self._pool.idle if speculates else int(self._pool.busy == 0)
         if not free or not self._control.may_start():
             return []
-        if likely is not None and speculates and self._journal.state.jobs > 1:
-            found = likely(free, self._is_started)
-            if found or self._pool.busy:
-                return found
         asked = (Asked(phase, keep, run, round, candidate) for keep, run, candidate in tests)
-        return list(islice((one for one in asked if not self._is_started(one)), free))
+        if likely is None or not speculates or self._journal.state.jobs <= 1:
+            return list(islice((one for one in asked if not self._is_started(one)), free))
+        first = next(asked)
+        if self._is_started(first):
+            return likely(free, self._is_started)
+        # Without it nothing goes on, and whoever looks ahead may not have come to it.
+        this = first.keep, first.run
+        others = likely(free - 1, lambda one: (one.keep, one.run) == this or self._is_started(one)) if free > 1 else []
+        return [first, *others]
 
     def _is_started(self, asked: Asked) -> bool:
         return (asked.keep, asked.run, self._journal.is_full(asked.phase)) in self._started

@@ -13,7 +13,7 @@ from ddenv.reduction.certificate import Procedure, Subject, Verdict, settle
 from ddenv.reduction.round import Candidate
 from ddenv.reduction.verdict import Shown
 
-# So many runs of a candidate are looked at. Runs that are reached with a lower probability than this are not.
+# So many runs of a candidate are looked at that are not made, and none that is reached with a lower probability than this.
 MOST_RUNS, LEAST = 12, 0.01
 # Before any candidate of a kind is judged: how many were similar, and dissimilar. What leaves out one model is mostly the last try.
 BEFORE = {"partition": (0.5, 1.5), "complement": (1.0, 1.0), "one": (0.3, 1.7)}

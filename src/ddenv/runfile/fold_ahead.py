@@ -30,8 +30,8 @@ def counted(before: RunState, kind: str, data: Data, changes: Changes) -> Change
         return changes
     rests_on, ahead = before.rests_on, before.ahead
     for number in tests:
-        bit = 1 << whole(number)
-        if rests_on & bit or not 0 < number <= len(before.tests):
+        # Of a damaged file, a number may be too large for a bit.
+        if not 0 < whole(number) <= len(before.tests) or rests_on & (bit := 1 << number):
             continue
         test = before.tests[number - 1]
         rests_on |= bit

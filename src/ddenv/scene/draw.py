@@ -114,15 +114,15 @@ class Scenery:
         Each letter has its colour (as in CSS) and the top of a model, x, y, z in m.
         """
         self._stage.delete(PARTS)
-        places = []
+        places, edges = [], dict[Color, list[np.ndarray]]()
         for letter, color, names in groups:
-            boxes = [box for name in names if (box := self._boxes.get(name)) is not None]
-            if boxes:
-                edges = np.concatenate([edges_of(low, high) for low, high in boxes])
-                self._stage.draw((*PARTS, letter), lines(edges, color), shadow=False)
-            for low, high in boxes:
+            for low, high in [box for name in names if (box := self._boxes.get(name)) is not None]:
+                edges.setdefault(color, []).append(edges_of(low, high))
                 x, y = ((low + high) / 2)[:2]
                 places.append((letter, f"#{colors.hexadecimal(color):06x}", float(x), float(y), float(high[2])))
+        # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
+        for number, (color, ends) in enumerate(edges.items()):
+            self._stage.draw((*PARTS, str(number)), lines(np.concatenate(ends), color), shadow=False)
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
