@@ -7,6 +7,7 @@ from ddenv.runs import clusters
 from ddenv.runs.creation import create_run
 from ddenv.runs.scenarios import with_options
 from ddenv.runs.trust import check_trusted, trust_cluster
+from ddenv.version import how_to_install
 from ddenv.world.load import load_scenario
 from tests.command import in_process
 from tests.conftest import DATA
@@ -36,7 +37,7 @@ def test_without_dask_a_line_says_what_to_install(monkeypatch, capsys, home):
     monkeypatch.setattr(clusters, "find_spec", lambda name: None)
     said = in_process(monkeypatch, capsys, "run", DATA / "wall.yaml", "--cluster", "tcp://head:8786")
     assert said.returncode == 2
-    assert said.stderr.splitlines()[-1].endswith("Dask is not installed here: pip install 'ddenv[cluster]'")
+    assert said.stderr.splitlines()[-1].endswith(f"Dask is not installed here: {how_to_install('cluster')}")
 
 
 def test_a_cluster_that_a_run_names_is_asked_only_if_the_user_trusts_it(home):

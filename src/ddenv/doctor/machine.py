@@ -20,11 +20,11 @@ from ddenv import processor
 from ddenv.amounts import count
 from ddenv.doctor.finding import Finding
 from ddenv.runs.folder import SUFFIX, runs_folder
-from ddenv.version import __version__
+from ddenv.version import __version__, how_to_install
 
 # By the names that packages are installed as, with the module that shows that they are there.
 NEEDED = {"drake": "pydrake", "textual": "textual", "numpy": "numpy", "scipy": "scipy", "scikit-learn": "sklearn"}
-OPTIONAL = {"textual-serve": ("textual_serve", "only 'ddenv serve' needs it: pip install 'ddenv[serve]'")}
+OPTIONAL = {"textual-serve": ("textual_serve", f"only 'ddenv serve' needs it: {how_to_install('serve')}")}
 SMALLEST = (80, 24)
 # Less free space or memory than this is worth a line, bytes.
 LITTLE_SPACE, LITTLE_MEMORY = 500_000_000, 1_500_000_000

@@ -18,7 +18,7 @@ from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
 from ddenv.runs.export import export_world
 from ddenv.runs.reasons import sentence
-from ddenv.version import __version__
+from ddenv.version import __version__, how_to_install
 from ddenv.words import count
 from ddenv.world.files.access import write_file
 
@@ -31,7 +31,7 @@ RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
     "repro.py",
 )
 MOST_NAMES = 20
-NEEDS = f"needs ddenv {__version__}, installed from its clone with pip install . (the ddenv on PyPI is another program)"
+NEEDS = f"needs ddenv {__version__}: {how_to_install()}"
 PROGRAM = f'''"""Exits with 1 where the robot fails as it did, with 0 where it does not, with 125 where that cannot be said.
 
 Needs ddenv, installed from its clone. In a repository: git bisect run python repro.py --folder .

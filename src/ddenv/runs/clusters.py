@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.version import how_to_install
 from ddenv.world.scenario import Scenario
 
 HERE = "here"
@@ -25,7 +26,7 @@ def check_cluster(cluster: str) -> None:
             f"scheduler file that is there, found '{cluster}'"
         )
     if find_spec("distributed") is None:
-        raise UserError("options: reduction.cluster: Dask is not installed here: pip install 'ddenv[cluster]'")
+        raise UserError(f"options: reduction.cluster: Dask is not installed here: {how_to_install('cluster')}")
 
 
 def made_here(scenario: Scenario) -> Scenario:

@@ -16,6 +16,7 @@ from typing import Any
 
 from ddenv.errors import UserError
 from ddenv.page.policy import of_scripts, policy
+from ddenv.version import how_to_install
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 16
@@ -34,7 +35,7 @@ def serve(port: int, run: str | None = None, font_size: int = FONT_SIZE) -> None
     try:
         from textual_serve.server import Server
     except ModuleNotFoundError:
-        raise UserError("serving needs another package: pip install 'ddenv[serve]'") from None
+        raise UserError(f"serving needs another package: {how_to_install('serve')}") from None
     words = [sys.executable, "-m", "ddenv"]
     if run is not None:
         from ddenv.runs.folder import find_run
