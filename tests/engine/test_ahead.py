@@ -5,7 +5,7 @@ from pathlib import Path
 from zlib import crc32
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ddenv.engine.journal import Journal
@@ -32,7 +32,7 @@ WORKERS = (2, 8, 64)
 
 
 def decided(path):
-    """All that a run decided, with the tests that it rests on, as (models, run)."""
+    """All that a run decided, with the tests that it rests on, as (models, run), and those known as its last search begins."""
     found = []
     with RunFile(path) as file:
         journal = Journal(file)
@@ -54,6 +54,10 @@ def decided(path):
             (journal.keep_of_test(one.id), one.run) for one in journal.state.finished_tests if one.outcome not in BROKEN
         ]
     assert len(made) == len(set(made)), "a test was made twice"
+    leg = journal.begin_leg()
+    found.append(
+        ("leg", [(sorted(journal.keep_of_test(test)), journal.state.tests[test - 1].run) for test in leg.tests])
+    )
     return found, journal.state
 
 
@@ -65,6 +69,8 @@ def decided(path):
     rate=st.sampled_from([1.0, 0.9]),
     seed=st.integers(0, 9),
 )
+# A search that begins again after rounds that were made ahead of time.
+@example(salt=0, needed=frozenset(MODELS[2:4]), fewer=0.2, rate=1.0, seed=3)
 @examples(0.1)
 def test_any_number_of_workers_comes_to_the_same_verdicts(salt, needed, fewer, rate, seed, method):
     oracle = at_rates(salt, (needed, rate), (needed - {min(needed)}, fewer))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import OUTCOMES, RunState
 from ddenv.runfile.store import Event
 
@@ -162,6 +163,37 @@ def test_full_runs_of_what_is_left_are_told_apart():
     assert state.confirming
     assert [(test.id, test.without) for test in state.confirm_tests] == [(2, None), (3, "box 4")]
     assert state.deflake_runs == 0
+
+
+@given(steps=st.lists(st.sampled_from(["round", "certify", "certificate"]), max_size=12), early=st.integers(0, 2))
+def test_the_tests_of_the_last_certificate_are_found_whenever_they_were_made(steps, early):
+    """Some are made before it starts."""
+    state, first, made = state_after(), 0, 0
+    for step in [*steps, "certify"]:
+        if step == "certificate":
+            made, first = made + 1, 100 * (made + 1)
+            terms = {"run": first, "keep_rate": 0.8, "rate": 0.9, "error": 0.05, "at_least": 10}
+            state = with_event(state, "certificate_started", certificate=made, **terms)
+        else:
+            run = first + 50 * early if step == "certify" else 0
+            where = {"round": None, "candidate": None, "run": run, "seed": run}
+            state = with_event(state, "test_started", test=len(state.tests) + 1, phase=step, **where)
+    assert state.confirm_tests == tuple(one for one in state.tests if one.phase == "certify" and one.run >= first)
+
+
+def test_the_tests_of_a_certificate_are_found_without_a_look_at_all_others():
+    state = state_after(
+        *(started(test) for test in range(1, 5)), ("test_started", {**started(5)[1], "phase": "certify"})
+    )
+    looked = []
+
+    class Looked(PersistentTuple):
+        def __getitem__(self, index):
+            looked.append(index)
+            return state.tests[index]
+
+    assert [test.id for test in state.changed(tests=Looked.of(())).confirm_tests] == [5]
+    assert looked == [4]
 
 
 def test_an_outcome_that_nobody_knows_is_told():

@@ -1,5 +1,7 @@
 """The nearest world that passes, in words and beside the world that fails: each number is that of the runs."""
 
+import sqlite3
+
 import pytest
 
 from ddenv.errors import UserError
@@ -46,6 +48,18 @@ def test_two_runs_with_one_seed_stand_side_by_side_from_where_they_part(run):
     assert all(each.apart == pytest.approx(1.0) for each in later)
     assert found.sentences.startswith("The nearest world")
     assert f"With seed {one.seed} the two runs differ after {one.equal:.1f} s" in found.sentences
+
+
+def test_where_trajectories_are_damaged_the_rest_is_said(run):
+    fake_moments.isolated(run)
+    with sqlite3.connect(run.path) as database:
+        database.execute("UPDATE motion SET samples = x'00'")
+    database.close()
+    found = read(run.path)[1]
+    assert (found.gone, found.shown, found.parting) == (("crate_00",), True, None)
+    assert found.sentences.startswith("The nearest world that passes lacks 1 model")
+    assert "Where the ways part is not known: " in found.sentences
+    assert found.lacks in found.sentences
 
 
 def test_before_it_has_ended_nothing_is_claimed(run):

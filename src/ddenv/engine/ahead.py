@@ -169,9 +169,11 @@ class Ahead:
     def _known(self, keep: Keep, misses: int) -> tuple[Shown, ...]:
         """What runs of a candidate showed, up to some that are not made; the first of them, `misses`, will not have shown f."""
         known: list[Shown] = []
-        while known.count(None) < MOST_RUNS:
+        open_ones = 0
+        while open_ones < MOST_RUNS:
             one = self._journal.shown(keep, len(known))
             known.append(False if one is None and len(known) < misses else one)
+            open_ones += known[-1] is None
         return tuple(known)
 
     def _keep(self, place: Place, index: int) -> Keep:

@@ -79,6 +79,8 @@ class Journal:
         self._fineness: dict[int, int] = {}
         self._seen: set[tuple[str, int | None, int | None]] = set()
         self._broke: dict[tuple[Keep, int, bool], int] = {}
+        # In the order of verdicts: that of tests, and which of them are made, depend on the number of workers.
+        self._behind_verdicts: dict[int, None] = {}
         self.known = KnownTests()
         self._steps_back = 0
         self._again: tuple[tuple[str, ...], ...] = ()
@@ -201,9 +203,7 @@ class Journal:
 
     def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
         state = self.state
-        # What only ran ahead of time would make it depend on the number of workers.
-        of_search = (test for test in state.tests if test.phase in ("round", AHEAD, "hand"))
-        known = tuple(test.id for test in of_search if test.is_finished and self._rests_on(test))
+        known = tuple(test for test in self._behind_verdicts if state.tests[test - 1].is_finished)
         return Leg(
             first_round,
             n_partitions,
@@ -326,6 +326,9 @@ class Journal:
         if data["decision"] == "reject":
             self._refuse(self._sets.of_candidate(self.state, candidate), "rejected", round)
 
+    def _verdict_on(self, data: dict[str, Any]) -> None:
+        self._behind_verdicts |= dict.fromkeys(data["tests"])
+
     def _vetoed(self, data: dict[str, Any]) -> None:
         self._refuse(self._sets.of_candidate(self.state, data["candidate"]), data["verdict"], data.get("round"))
 
@@ -376,6 +379,8 @@ _FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
     "engine_started": Journal._engine_started,
     "compared": Journal._compared,
     "rate_lost": Journal._rate_lost,
+    "candidate_judged": Journal._verdict_on,
+    "trial_judged": Journal._verdict_on,
     "round_started": Journal._round_started,
     "reduced": Journal._arrived,
     "adopted": Journal._arrived,

@@ -65,7 +65,7 @@ def read_run(path: Path) -> Record:
         same = state.evidence_test == first
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = _reasons(file, state, troubles)
-        passing = _nearest(file, state, troubles)
+        passing = nearest(file, state)
         partings: list[Parting | None] = [*(each.parting for each in why), passing.parting if passing else None]
         compared = [test for one in partings if one for test in (one.with_test, one.without_test)]
         ways = {test: file.trajectory(test) for test in compared}
@@ -126,14 +126,6 @@ def _reasons(file: RunFile, state: RunState, troubles: list[str]) -> tuple[Reaso
     except UserError as error:
         troubles.append(str(error))
         return ()
-
-
-def _nearest(file: RunFile, state: RunState, troubles: list[str]) -> Nearest | None:
-    try:
-        return nearest(file, state)
-    except UserError as error:
-        troubles.append(str(error))
-        return None
 
 
 def _path(file: RunFile, test: int | None, troubles: list[str]) -> array[float] | None:

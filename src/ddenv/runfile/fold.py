@@ -106,8 +106,8 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
     here(state, test.node)
     if test.id != len(state.tests) + 1:
         raise ValueError(test.id)
-    state = state.changed(audits=state.audits + (test.audits is not None))
-    changes = {"audits": state.audits, "tests": state.tests.added(test), **counts(state, None, test)}
+    more = {"audits": state.audits + (test.audits is not None), **fold_certificates.with_fresh(state, test)}
+    changes = {"tests": state.tests.added(test), **counts(state, None, test), **more}
     if test.trial is not None:
         return changes | {"trials": _with_test_of_trial(state, test)}
     if round is None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from ddenv.runfile.events import Changes, Data, chance, names, one_of, whole
 from ddenv.runfile.fold_decisions import arrived, here, listed, origin, searched_anew
+from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Claim, Point
-from ddenv.runfile.state import OUTCOMES, RunState
+from ddenv.runfile.state import FRESH, OUTCOMES, RunState, Test
 
 
 def certificate_started(state: RunState, data: Data, _: float) -> Changes:
@@ -23,7 +24,20 @@ def certificate_started(state: RunState, data: Data, _: float) -> Changes:
     )
     if one.number != len(state.certificates) + 1 or not one.error or one.first_run < 0 or one.at_least < 0:
         raise ValueError(one.number)
-    return {"confirming": True, "certificates": (*state.certificates, one)}
+    now = state.changed(certificates=(*state.certificates, one))
+    # Some may have been made ahead of time.
+    fresh = PersistentTuple.of(test for test in state.fresh if _is_of_last(now, state.tests[test - 1]))
+    return {"confirming": True, "certificates": now.certificates, "fresh": fresh}
+
+
+def with_fresh(state: RunState, test: Test) -> Changes:
+    """A test starts that may be one of a certificate."""
+    return {"fresh": state.fresh.added(test.id)} if _is_of_last(state, test) else {}
+
+
+def _is_of_last(state: RunState, test: Test) -> bool:
+    """Whether it is a test of the last certificate, or of the first one that may come."""
+    return test.phase in FRESH and (not state.certificates or test.run >= state.certificates[-1].first_run)
 
 
 def certificate_finished(state: RunState, data: Data, _: float) -> Changes:

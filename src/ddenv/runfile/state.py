@@ -44,9 +44,9 @@ class RunState:
     stopped    the engine was stopped and can be resumed
     failed     the engine could not continue: `reason` says why
 
-    `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`.
-    `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the number of the current one; the
-    run came to it when `came_at` tests were finished.
+    `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`;
+    `fresh` are the ids of its tests. `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the
+    number of the current one; the run came to it when `came_at` tests were finished.
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
@@ -95,6 +95,7 @@ class RunState:
     decisions: tuple[Decision, ...] = ()
     failures: tuple[int, ...] = ()
     certificates: tuple[Certificate, ...] = ()
+    fresh: PersistentTuple[int] = field(default_factory=PersistentTuple)
     isolations: tuple[Isolation, ...] = ()
     removals: PersistentTuple[Removal] = field(default_factory=PersistentTuple)
     lower_bound: int = 0
@@ -207,8 +208,7 @@ class RunState:
     @property
     def confirm_tests(self) -> tuple[Test, ...]:
         """The tests of the last certificate, in the order they were started."""
-        first = self.certificates[-1].first_run if self.certificates else 0
-        return tuple(test for test in self.tests if test.phase in FRESH and test.run >= first)
+        return tuple(self.tests[test - 1] for test in self.fresh)
 
     @property
     def running_tests(self) -> tuple[Test, ...]:

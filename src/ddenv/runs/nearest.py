@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.removals import Isolation
 from ddenv.runfile.state import FRESH, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
-from ddenv.runs.reasons import GOAL, F, Parting, parted, where_they_part
+from ddenv.runs.reasons import GOAL, F, Parting, parted, parting_unknown, where_they_part
 
 # Instants at which the two runs are compared, from where they part to the end of the shorter one.
 INSTANTS = 8
@@ -38,7 +38,8 @@ class Nearest:
 
     `words` say what fresh runs show of it, in one sentence. `shown`: they show that it passes, and that it does not with any one of
     `gone` put back. `parting` compares a run of the whole world, `with_test`, with one without `gone`; None where no pair of runs
-    with one seed shows it. `first` of `gone` took part first there. `instants` are side by side from where the runs part.
+    with one seed shows it; `lacks` says why, if the run file does not have what it takes. `first` of `gone` took part first there.
+    `instants` are side by side from where the runs part.
     """
 
     gone: tuple[str, ...]
@@ -47,18 +48,19 @@ class Nearest:
     parting: Parting | None = None
     first: str = ""
     instants: tuple[Instant, ...] = ()
+    lacks: str = ""
 
     @property
     def sentences(self) -> str:
         """All of it in a few sentences."""
         said = f"{self.words[:1].upper()}{self.words[1:]}."
-        return (
-            said if self.parting is None else f"{said} {where_they_part(self.parting)}{_met(self.parting, self.first)}"
-        )
+        if self.parting is None:
+            return f"{said} {parting_unknown(self.lacks)}".rstrip()
+        return f"{said} {where_they_part(self.parting)}{_met(self.parting, self.first)}"
 
 
 def nearest(file: RunFile, state: RunState) -> Nearest | None:
-    """What the last isolation found; None if there was none, or if it did not end. Raises UserError for damaged trajectories."""
+    """What the last isolation found; None if there was none, or if it did not end."""
     one = state.isolated
     if one is None:
         return None
@@ -70,7 +72,10 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
     if pair is None:
         return Nearest(gone, words, shown)
     failing, passing = pair
-    first, second = file.trajectory(failing.id), file.trajectory(passing.id)
+    try:
+        first, second = file.trajectory(failing.id), file.trajectory(passing.id)
+    except UserError as error:
+        return Nearest(gone, words, shown, lacks=str(error))
     equal, apart, place = parted(first, second)
     touched = {model: at for model, at in failing.first_touched if model in gone}
     met = touched or {model: at for model, at in failing.first_sensed if model in gone}

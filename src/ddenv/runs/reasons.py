@@ -196,7 +196,7 @@ def parting_sentence(reason: Reason) -> str:
     """Where the ways with and without the models part, in one or two sentences; "" if no pair of runs shows it."""
     one = reason.parting
     if one is None:
-        return f"Where the ways part is not known: {reason.lacks}." if reason.lacks else ""
+        return parting_unknown(reason.lacks)
     it = "it" if len(reason.gone) == 1 else "one of them"
     met = (
         ""
@@ -204,6 +204,11 @@ def parting_sentence(reason: Reason) -> str:
         else (f" With {it} there, the robot {'touches' if one.touched else 'senses'} {it} after {one.met:.1f} s.")
     )
     return f"{where_they_part(one)}{met}"
+
+
+def parting_unknown(lacks: str) -> str:
+    """That it is not known where two ways part, and why the run file `lacks` it; "" if it lacks nothing."""
+    return f"Where the ways part is not known: {lacks}." if lacks else ""
 
 
 def where_they_part(one: Parting) -> str:

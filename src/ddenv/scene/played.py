@@ -68,10 +68,9 @@ def pairs_of(run: RunFile, state: RunState) -> list[dict[str, Any]]:
     found: list[tuple[str, Parting]] = []
     with suppress(UserError):
         found += [(f"without {each.without}", each.parting) for each in reasons(run, state) if each.parting is not None]
-    with suppress(UserError):
-        near = nearest(run, state)
-        if near is not None and near.parting is not None:
-            found.append(("the nearest world that passes", near.parting))
+    near = nearest(run, state)
+    if near is not None and near.parting is not None:
+        found.append(("the nearest world that passes", near.parting))
     return [
         {
             "title": f"{words} (tests {one.with_test} and {one.without_test}, seed {one.seed})",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddenv.claims import current, is_nearest, meaning, of_passing, rate
-from ddenv.errors import UserError
+from ddenv.claims import current, meaning, rate
 from ddenv.runfile.events import Names
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
@@ -55,14 +54,7 @@ def entries(file: RunFile, state: RunState) -> tuple[tuple[Entry, ...], int]:
 
 
 def _nearest(file: RunFile, state: RunState) -> tuple[Entry, ...]:
-    one = state.isolated
-    if one is None:
-        return ()
-    try:
-        passing = nearest(file, state)
-    except UserError as error:
-        gone = () if one.found is None else state.removals[one.found - 1].models
-        return (_of_nearest(state, Nearest(gone, of_passing(state, one), is_nearest(one)), f"{error}."),)
+    passing = nearest(file, state)
     return () if passing is None else (_of_nearest(state, passing),)
 
 
@@ -84,14 +76,14 @@ def _of_model(state: RunState, number: int, reason: Reason, snapshot: Snapshot) 
     )
 
 
-def _of_nearest(state: RunState, one: Nearest, lacks: str = "") -> Entry:
-    """The whole world fails, and without `gone` it passes; `lacks` is what the run file does not have of its runs."""
+def _of_nearest(state: RunState, one: Nearest) -> Entry:
+    """The whole world fails, and without `gone` it passes."""
     rows = tuple(
         f"{each.seconds:6.1f} s   {_place(each.failing)}   {_place(each.passing)}   {each.apart:.2f} m"
         for each in one.instants
     )
     snapshot = snapshot_with(state, state.elements, (one.gone,) if one.gone else ())
-    return Entry(NEAREST, "A", one.gone, one.sentences, (lacks,), one.parting, ("fails", "passes"), snapshot, rows=rows)
+    return Entry(NEAREST, "A", one.gone, one.sentences, (), one.parting, ("fails", "passes"), snapshot, rows=rows)
 
 
 def _place(point: tuple[float, float]) -> str:
