@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.drive import find_drive
+from ddenv.world.drive import find_drive
 from ddenv.world.load import SDF, load_scenario, load_simulator
 from ddenv.world.model import (
     Box,

@@ -3,13 +3,14 @@
 import math
 import os
 import signal
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from ddenv.engine.pool import PREPARATION, Broken, Pool
-from ddenv.engine.worker import Run, Shared, answered
+from ddenv.engine.worker import MODELS_PERIOD, POSE, Run, Shared, answered
 from ddenv.errors import UserError
 from ddenv.runfile.store import COLUMNS
 from ddenv.runs.scenarios import load_parts
@@ -34,12 +35,30 @@ def test_a_run_that_starts_again_has_all_of_its_time():
     class Again:
         def run(self, keep, seed, progress, full):
             for time_s in (0.0, 1.0, 0.0, 1.0):
-                progress(time_s, (0.0,) * (COLUMNS - 1))
+                progress(time_s, (0.0,) * (COLUMNS - 1), {})
                 begun.append(shared.begun[0])
 
     shared = Shared([0.0] * COLUMNS, [0.0])
     answered(Run(EVERYTHING, 1, True, 60.0), Again(), shared, 0)
     assert 0.0 < begun[0] == begun[1] < begun[2] == begun[3]
+
+
+def test_models_that_moved_are_told_while_a_test_runs():
+    told = []
+    start, later = (1.0, 2.0, 0.1, 1.0, 0.0, 0.0, 0.0), (1.5, 2.0, 0.1, 1.0, 0.0, 0.0, 0.0)
+
+    class Pushing:
+        def run(self, keep, seed, progress, full):
+            for time_s, ball in ((0.0, start), (1.0, start), (2.0, later), (0.0, start)):
+                progress(time_s, start, {"ball": ball, "post": start})
+                told.append(shared.moved(1))
+                time.sleep(MODELS_PERIOD)
+
+    shared = Shared([0.0] * 2 * COLUMNS, [0.0] * 2, [math.nan] * 2 * 3 * POSE, ("ball", "gone", "post"))
+    answered(Run(EVERYTHING, 1, True, 60.0), Pushing(), shared, 1)
+    # A run that starts again has its models where they started, again.
+    assert told == [{}, {}, {"ball": later}, {}]
+    assert shared.moved(0) == {}
 
 
 @pytest.fixture

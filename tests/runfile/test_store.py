@@ -37,6 +37,9 @@ def test_documents_events_commands_and_motions_come_back(path):
         assert [(one.kind, one.data) for one in engine.commands()] == [("veto", {"round": 1, "candidate": 2})]
         engine.set_live([Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))])
         assert viewer.live() == [Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0))]
+        board = {"board": (3.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0)}
+        engine.set_live([Live(1, 7, 0.5, (1.0, 2.0, 0.2, 1.0, 0.0, 0.0, 0.0), board)])
+        assert viewer.live()[0].models == board
 
 
 def test_a_settled_run_is_one_file(path, tmp_path):

@@ -18,6 +18,7 @@ from ddenv.scene.painted import outline, paint
 from ddenv.scene.player import Player
 from ddenv.scene.shot import Shot, shot
 from ddenv.scene.stage import Stage
+from ddenv.scene.wheels import Wheels
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual, World
 from ddenv.world.pose import Pose
@@ -74,10 +75,11 @@ def test_a_link_without_visuals_shows_its_collisions():
 
 def test_the_ditch_is_few_and_small_messages(screen):
     world = read_world(SDF / "worlds" / "ditch.sdf")
-    Scenery(Stage(screen.take), world, ROBOT, world.elements())
+    Scenery(Stage(screen.take), world, Wheels(ROBOT), world.elements())
     models = [path for path in screen.things if path.startswith("/world/models/")]
     assert len(models) == 43
-    assert len(screen.things) < 3 * 43 + 10
+    wheels = 2 * 4
+    assert len(screen.things) < 3 * 43 + 10 + wheels
 
 
 def test_names_are_safe_in_paths_and_pages():
@@ -99,7 +101,7 @@ def test_a_change_of_environment_only_shows_and_hides(writer, screen, small_worl
     stage = Stage(screen.take)
     writer.baseline()
     state = fold(writer.run.events())
-    scenery = Scenery(stage, small_world, ROBOT, state.elements)
+    scenery = Scenery(stage, small_world, Wheels(ROBOT), state.elements)
     scenery.show(shot(state, []))
     assert len(screen.shown("models")) == 4
     assert not screen.shown("removed") | screen.shown("left-out")
@@ -160,7 +162,7 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen):
 def test_a_large_world_is_a_few_objects(screen):
     still = [Model(f"m{number}", Pose((number, 0, 0)), True, (_boxed(number),), (), (), 1) for number in range(400)]
     world = World(ROOT, "large", b"", (0, 0, -9.8), tuple(still))
-    scenery = Scenery(Stage(screen.take), world, ROBOT, world.elements())
+    scenery = Scenery(Stage(screen.take), world, Wheels(ROBOT), world.elements())
     half = frozenset(f"m{number}" for number in range(200))
     scenery.show(Shot("start", None, half, frozenset(), frozenset(world.elements()) - half, ""))
     assert len(screen.things) < 20
@@ -184,13 +186,13 @@ def _boxed(number):
 
 
 def test_heights_of_surfaces(screen, small_world):
-    scenery = Scenery(Stage(screen.take), small_world, ROBOT, small_world.elements())
+    scenery = Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
     assert scenery.height(6, 0) == pytest.approx(0.5)
     assert scenery.height(-5, 0) == 0
 
 
 def test_trail_sends_only_its_last_piece_again(screen, small_world):
-    scenery = Scenery(Stage(screen.take), small_world, ROBOT, small_world.elements())
+    scenery = Scenery(Stage(screen.take), small_world, Wheels(ROBOT), small_world.elements())
     rows = np.zeros((100, 8))
     rows[:, 1], rows[:, 4] = np.arange(100) * 0.1, 1.0
     scenery.trail(rows[:80])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import os
 import re
 import signal
@@ -16,7 +17,9 @@ from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
+import umsgpack
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
@@ -76,6 +79,14 @@ def captions(found: Told) -> list[dict[str, str]]:
 def titled(title: str) -> Callable[[Told], bool]:
     """Whether the last caption has a title that begins so."""
     return lambda found: any(words["title"].startswith(title) for words in captions(found)[-1:])
+
+
+def matrix_of(found: Told, path: str) -> np.ndarray:
+    """Where a browser has put what is at a path: the last transform, 4 x 4."""
+    handlers = {code: lambda ext: ext for code in range(0x11, 0x19)}
+    commands = [umsgpack.unpackb(one, ext_handlers=handlers) for one in found if isinstance(one, bytes)]
+    matrices = [one["matrix"] for one in commands if one["type"] == "set_transform" and one["path"] == path]
+    return np.array(matrices[-1]).reshape(4, 4).T if matrices else np.eye(4)
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's /proc/net/tcp")
@@ -154,6 +165,13 @@ async def test_a_running_test_is_followed(writer, start_scene):
         url = url_of(start_scene(writer.path))
         words = captions(await messages(url, titled("round 1 · part B · test 2 · runs now")))[-1]
         assert words["time"] == "1.5 s of 45 s"
+        # The board is pushed 0.5 m, and the robot drives 0.3 m, so far as its wheels roll.
+        board = {"board": (1.5, -1.5, 0.1, 1.0, 0.0, 0.0, 0.0)}
+        writer.run.set_live([Live(0, 2, 1.8, (1.3, 0.0, 0.13, 1.0, 0.0, 0.0, 0.0), board)])
+        found = await messages(url, lambda told: matrix_of(told, "/world/models/003 board")[0, 3])
+        assert matrix_of(found, "/world/models/003 board")[:3, 3] == pytest.approx([0.5, 0.0, 0.0])
+        wheel = matrix_of(found, "/world/robot/wheel 0")
+        assert math.atan2(wheel[0, 2], wheel[0, 0]) == pytest.approx(0.3 / 0.1651)
         writer.run.set_live([])
         writer.finish_test(2, "similar")
     # The engine is gone without an event: the scene goes back to the failure.

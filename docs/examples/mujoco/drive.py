@@ -18,10 +18,10 @@ from ddenv.errors import UserError
 from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import ControllerFailed, controllers
-from ddenv.robot.drake.drive import find_drive
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.world.drive import find_drive
 from ddenv.world.extent import model_bounds
 from ddenv.world.load import load_scenario
 from ddenv.world.placement import spawn_pose

@@ -11,8 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from ddenv.robot.drake.articulation import is_fixed
-from ddenv.robot.drake.drive import Drive
+from ddenv.world.drive import Drive
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -26,6 +25,7 @@ from ddenv.world.model import (
     Plane,
     Sphere,
     World,
+    is_fixed,
 )
 from ddenv.world.pose import Pose
 

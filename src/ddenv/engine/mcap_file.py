@@ -61,7 +61,7 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
 
 
 def _progress(progress: Callable[[str, float], None], name: str) -> Progress:
-    return lambda seconds, _: progress(name, seconds)
+    return lambda seconds, *_: progress(name, seconds)
 
 
 def _chosen(file: RunFile) -> Iterator[tuple[str, int]]:

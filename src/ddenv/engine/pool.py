@@ -17,7 +17,7 @@ from typing import Any
 
 from ddenv.engine.memory_limit import memory_limit, too_large
 from ddenv.engine.wall_limit import GENEROUS
-from ddenv.engine.worker import Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
+from ddenv.engine.worker import POSE, Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
 from ddenv.engine.worker_process import WorkerProcess
 from ddenv.errors import UserError
 from ddenv.robot.deadline import Stopwatch
@@ -137,8 +137,10 @@ class Pool:
         """
         # The user's own simulator gets the environment unchanged.
         self._context = DrakeContext() if scenario.oracle is None else multiprocessing.get_context("spawn")
-        sizes = (("d", jobs * COLUMNS), ("d", jobs))
-        self._shared = Shared(*(self._context.RawArray(kind, size) for kind, size in sizes))
+        moving = tuple(model.name for model in world.models if not model.static)
+        sizes = (jobs * COLUMNS, jobs, jobs * POSE * len(moving))
+        progress, begun, models = (self._context.RawArray("d", size) for size in sizes)
+        self._shared = Shared(progress, begun, models, moving)
         if scenario.oracle is None:
             check_drake()
         parts = pickle.dumps((make, (scenario, world, robot)))
@@ -314,7 +316,7 @@ class Pool:
         for number, slot in enumerate(self._slots):
             values = self._shared.progress[number * COLUMNS : (number + 1) * COLUMNS]
             if slot.job is not None and slot.job.test is not None and all(map(math.isfinite, values)):
-                rows.append(Live(number, slot.job.test, values[0], tuple(values[1:])))
+                rows.append(Live(number, slot.job.test, values[0], tuple(values[1:]), self._shared.moved(number)))
         return rows
 
     def paces(self) -> list[Pace]:

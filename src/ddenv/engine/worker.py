@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -9,19 +10,22 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, Protocol, cast, runtime_checkable
 
 from ddenv.errors import UserError, printable
-from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.result import PoseRow, Progress, RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 
 NICENESS = 5
+POSE = COLUMNS - 1
+# Time between two looks at where the models of a running test are, s.
+MODELS_PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
 
@@ -74,10 +78,30 @@ class Shared:
     """Memory that a pool shares with its workers, with a part for each slot.
 
     `progress` has `COLUMNS` doubles a slot; `begun` one, when the robot began to move, s of `time.monotonic`, and 0 before that.
+    `models` has a pose for each of `names`, the models that can move; its x is NaN while the model is where it started.
     """
 
     progress: Any
     begun: Any
+    models: Any = None
+    names: tuple[str, ...] = ()
+
+    def moved(self, slot: int) -> dict[str, PoseRow]:
+        """Where the models of a slot's test are that are no longer where they started."""
+        poses = zip(*[iter(self._rows(slot))] * POSE, strict=True)
+        return {name: pose for name, pose in zip(self.names, poses, strict=True) if math.isfinite(pose[0])}
+
+    def move(self, slot: int, starts: Mapping[str, PoseRow], models: Mapping[str, PoseRow]) -> None:
+        """Puts the models of a slot's test there, from where they started."""
+        still = (math.nan,) * POSE
+        rows = [still if (pose := models.get(name, still)) == starts.get(name) else pose for name in self.names]
+        if rows:
+            begin = slot * POSE * len(rows)
+            self.models[begin : begin + POSE * len(rows)] = [value for row in rows for value in row]
+
+    def _rows(self, slot: int) -> list[float]:
+        size = POSE * len(self.names)
+        return list(self.models[slot * size : (slot + 1) * size]) if size else []
 
 
 @dataclass(frozen=True)
@@ -191,13 +215,19 @@ def answered(task: Task, simulator: Simulator | Exception, shared: Shared, slot:
 
 def _progress(shared: Shared, slot: int) -> Progress:
     """Writes how far a test is to the shared memory."""
-    start, begun = slot * COLUMNS, False
+    start, begun, due = slot * COLUMNS, False, 0.0
+    starts: Mapping[str, PoseRow] = {}
 
-    def report(time_s: float, pose: tuple[float, ...]) -> None:
-        nonlocal begun
+    def report(time_s: float, pose: PoseRow, models: Mapping[str, PoseRow]) -> None:
+        nonlocal begun, due, starts
+        now = time.monotonic()
         if not begun or time_s == 0.0:
             # What came before, such as rehearsals of piles, or a start in a plant that was too small, is not the test's own time.
-            shared.begun[slot], begun = time.monotonic(), True
+            shared.begun[slot], begun = now, True
+            starts, due = models, 0.0
+        if now >= due:
+            shared.move(slot, starts, models)
+            due = now + MODELS_PERIOD
         shared.progress[start : start + COLUMNS] = (time_s, *pose)
 
     return report

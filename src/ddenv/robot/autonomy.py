@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.drake.drive import Drive, footprint
 from ddenv.robot.protocol import Drives, Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
 from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
+from ddenv.world.drive import Drive, footprint
 from ddenv.world.model import Model
 from ddenv.world.scenario import Scenario, Sensors
 

@@ -17,23 +17,10 @@ from typing import Any, NamedTuple, Protocol
 
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
-
-
-class Twist(NamedTuple):
-    """Forward speed in m/s and turn rate in rad/s, positive to the left."""
-
-    speed: float
-    turn_rate: float
-
+from ddenv.world.drive import Twist as Twist
+from ddenv.world.drive import WheelSpeeds as WheelSpeeds
 
 STOP = Twist(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class WheelSpeeds:
-    """Angular speeds of the wheel joints by name, rad/s, positive forward. A wheel that is not named stands still."""
-
-    speeds: Mapping[str, float]
 
 
 class Reading(NamedTuple):

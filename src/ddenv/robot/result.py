@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,8 +13,8 @@ from ddenv.world.pose import Vector
 
 # x, y, z (m), qw, qx, qy, qz.
 PoseRow = tuple[float, float, float, float, float, float, float]
-# Called while a run goes on, with the simulated time (s) and the pose of the robot.
-Progress = Callable[[float, PoseRow], None]
+# Called while a run goes on, with the simulated time (s), the pose of the robot, and the poses of models that can move.
+Progress = Callable[[float, PoseRow, Mapping[str, PoseRow]], None]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.robot.drake.articulation import is_fixed
 from ddenv.robot.drake.shapes import solid_bounds
 from ddenv.robot.surroundings import chains, slide
 from ddenv.world.extent import Bounds
-from ddenv.world.model import Model
+from ddenv.world.model import Model, is_fixed
 from ddenv.world.pose import Pose
 
 ENDLESS = 1e9  # m; half of a box that holds the world

@@ -15,7 +15,6 @@ from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
-from ddenv.robot.drake.drive import Drive
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.region import Watch
 from ddenv.robot.drake.run_context import RunContext
@@ -26,6 +25,7 @@ from ddenv.robot.reached import Reached
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
+from ddenv.world.drive import Drive
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.
@@ -177,9 +177,10 @@ class Run:
 
     def _record(self, now: float, pose: PoseRow, progress: Progress | None) -> None:
         self._wall_clock.look()
-        self._recording.add(now, pose, {body.name: self._observer.pose(body) for body in self._parts.kept})
+        models = {body.name: self._observer.pose(body) for body in self._parts.kept}
+        self._recording.add(now, pose, models)
         if progress is not None:
-            progress(now, pose)
+            progress(now, pose, models)
 
 
 class Observer:

@@ -14,9 +14,9 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -61,12 +61,13 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """A running test: simulated `time`, s, and the robot's pose (x, y, z m, qw, qx, qy, qz)."""
+    """A running test: simulated `time`, s, the pose (x, y, z m, qw, qx, qy, qz) of the robot, and those of models that moved."""
 
     slot: int
     test: int
     time: float
     pose: tuple[float, ...]
+    models: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
 
 
 def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> None:
@@ -233,9 +234,9 @@ class RunFile:
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
             return [
-                Live(whole(slot), whole(test), number(at), vector(json.loads(pose), 7)) for slot, test, at, pose in rows
+                Live(whole(slot), whole(test), number(at), *_poses(json.loads(text))) for slot, test, at, text in rows
             ]
-        except (ValueError, TypeError, OverflowError, RecursionError):
+        except (ValueError, TypeError, OverflowError, RecursionError, KeyError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
     # The methods below are for the engine alone.
@@ -288,7 +289,7 @@ class RunFile:
 
     def set_live(self, running: list[Live]) -> None:
         """Replaces the table of running tests."""
-        rows = [(live.slot, live.test, live.time, json.dumps(live.pose)) for live in running]
+        rows = [(live.slot, live.test, live.time, json.dumps({ROBOT: live.pose, **live.models})) for live in running]
         # It only shows what is replaced soon.
         with suppress(NoRoom), self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
@@ -342,6 +343,12 @@ class RunFile:
                 self._db.execute("ROLLBACK")
             kind = NoRoom if error.sqlite_errorcode in _FULL else UserError
             raise kind(f"{self.path}: cannot be written: {error}; its content is intact") from None
+
+
+def _poses(stored: Any) -> tuple[tuple[float, ...], dict[str, tuple[float, ...]]]:
+    """The robot's pose, and those of models. A run that an older version left behind has the robot's alone."""
+    poses = {name: vector(pose, 7) for name, pose in (stored if isinstance(stored, dict) else {ROBOT: stored}).items()}
+    return poses.pop(ROBOT), poses
 
 
 def _identity(path: Path) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ddenv.scene.mesh import Surface
 from ddenv.scene.painted import Painted, edges_of, lines, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
+from ddenv.scene.wheels import Wheels
 from ddenv.world.model import Model, Plane, World, is_ground
 from ddenv.world.pose import Pose, Vector
 
@@ -49,10 +50,12 @@ class Scenery:
     In a large world those that never move are drawn together (`Crowd`), anew for each environment.
     """
 
-    def __init__(self, stage: Stage, world: World, robot: Model, elements: Iterable[str]) -> None:
+    def __init__(self, stage: Stage, world: World, wheels: Wheels, elements: Iterable[str]) -> None:
+        """`wheels` are those of the robot, which has its other parts, too."""
         self._stage = stage
         self._first = {model.name: model.links[0].pose for model in world.models}
         self._keys: dict[str, str] = {}
+        self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
         self._crowd = Crowd(MODELS, LEFT_OUT, REMOVED) if len(elements) > MOST_SINGLE else None
@@ -62,7 +65,8 @@ class Scenery:
         self.surface = mesh.merge(surfaces)
         self.ground = _ground(world)
         self._draw_ground()
-        self._lowest = self._draw_robot(robot)
+        self.wheels = wheels
+        self._lowest = self._draw_robot()
         self._boxes = {each.name: _box_of(surface) for each, surface in zip(world.models, surfaces, strict=True)}
 
     def height(self, x: float, y: float) -> float:
@@ -84,9 +88,19 @@ class Scenery:
             else:
                 self._stage.draw(path, thing, shadow=path[: len(MODELS)] == MODELS)
 
-    def place_robot(self, pose: Pose) -> None:
-        """Puts the robot's first link at `pose`."""
+    def place_robot(self, pose: Pose, turned: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Puts the robot's first link at `pose`, its left and right wheels `turned`, rad."""
         self._stage.move(ROBOT, pose, newest_only=True)
+        for wheel in self.wheels.all:
+            self._stage.move((*ROBOT, wheel.key), wheel.pose(turned), newest_only=True)
+
+    def place_models(self, poses: Mapping[str, Pose]) -> None:
+        """Puts the first links of these elements at their poses, and all others where they start."""
+        for name in self._placed - set(poses):
+            self._stage.move((*MODELS, self._keys[name]), Pose())
+        self._placed = frozenset(name for name in poses if name in self._keys)
+        for name in sorted(self._placed):
+            self._stage.move((*MODELS, self._keys[name]), self.moved(name, poses[name]), newest_only=True)
 
     def key(self, name: str) -> str | None:
         """What the browser calls an element; None for what is no element."""
@@ -179,15 +193,22 @@ class Scenery:
         grid = Surface(np.concatenate([across, across[:, [1, 0, 2]]]), mesh.EMPTY.faces).at(pose)
         self._stage.draw((*WORLD, "grid"), lines(grid.vertices, colors.GRID), shadow=False)
 
-    def _draw_robot(self, robot: Model) -> float:
-        to_first = robot.links[0].pose.inverse()
+    def _draw_robot(self) -> float:
+        body = self.wheels.body
+        to_first = body.links[0].pose.inverse()
+        pieces: list[tuple[Path, Pose, list[Painted]]]
+        pieces = [((), Pose(), [Painted(item.surface.at(to_first), item.tints, item.alpha) for item in paint(body)])]
+        pieces += [((wheel.key,), Pose(wheel.position), [wheel.painted]) for wheel in self.wheels.all]
         lowest = 0.0
-        for part, item in enumerate(paint(robot)):
-            item = Painted(item.surface.at(to_first), item.tints, item.alpha)
-            lowest = min(lowest, float(item.surface.vertices[:, 2].min()))
-            self._stage.draw((*ROBOT, str(part)), item.thing())
-            ghost = plain(item.surface, colors.GHOST, glow=0.2)
-            self._stage.draw((*GHOST, str(part)), ghost, shadow=False)
+        for place, pose, painted in pieces:
+            for part, item in enumerate(painted):
+                lowest = min(lowest, float(item.surface.at(pose).vertices[:, 2].min()))
+                self._stage.draw((*ROBOT, *place, str(part)), item.thing())
+                ghost = plain(item.surface, colors.GHOST, glow=0.2)
+                self._stage.draw((*GHOST, *place, str(part)), ghost, shadow=False)
+            if place:
+                self._stage.move((*ROBOT, *place), pose)
+                self._stage.move((*GHOST, *place), pose)
         self._stage.show(GHOST, False)
         return lowest
 

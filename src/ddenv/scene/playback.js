@@ -18,19 +18,34 @@ let play = null, ghost = null, pair = null; // the test, the second one, and whe
 let time = 0, going = true, rest = 0, before = 0, asked = 0;
 let center = null; // where the world is while the camera does not follow
 
-// A pose from rows t, x, y, z, qx, qy, qz, qw, put on an object.
-function put(object, rows, at) {
+// The rows before and after an instant, by number, and how far it is between them, 0..1.
+function between(rows, at) {
   let low = 0, high = rows.length - 1;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
     if (rows[middle][0] <= at) low = middle; else high = middle;
   }
-  const a = rows[low], b = rows[high], span = b[0] - a[0];
-  const part = span > 0 ? Math.min(1, Math.max(0, (at - a[0]) / span)) : 1;
+  const begin = rows[low][0], span = rows[high][0] - begin;
+  return [low, high, span > 0 ? Math.min(1, Math.max(0, (at - begin) / span)) : 1];
+}
+
+// A pose from rows t, x, y, z, qx, qy, qz, qw, put on an object.
+function put(object, rows, at) {
+  const [low, high, part] = between(rows, at), a = rows[low], b = rows[high];
   const side = a[4] * b[4] + a[5] * b[5] + a[6] * b[6] + a[7] * b[7] < 0 ? -1 : 1;
   const mix = (index, sign) => (1 - part) * a[index] + part * sign * b[index];
   object.position.set(mix(1, 1), mix(2, 1), mix(3, 1));
   object.quaternion.set(mix(4, side), mix(5, side), mix(6, side), mix(7, side)).normalize();
+}
+
+// A robot, and its wheels, which turn as its way makes them roll.
+function drive(name, run, at) {
+  put(node(name), run.robot, at);
+  const [low, high, part] = between(run.robot, at);
+  for (const { key, axis: [x, y, z], side } of run.wheels) {
+    const angle = (1 - part) * run.turned[low][side] + part * run.turned[high][side];
+    node(name, key).quaternion.setFromAxisAngle({ x, y, z }, angle);
+  }
 }
 
 const end = (run) => (run ? run.robot[run.robot.length - 1][0] : 0);
@@ -38,9 +53,9 @@ const length = () => Math.max(end(play), end(ghost));
 
 function draw() {
   if (play) {
-    put(node("robot"), play.robot, time);
+    drive("robot", play, time);
     for (const [key, rows] of Object.entries(play.moving)) put(node("models", key), rows, time);
-    if (ghost) put(node("ghost"), ghost.robot, time);
+    if (ghost) drive("ghost", ghost, time);
     place("time").value = time;
     const words = `${time.toFixed(1)} s of ${length().toFixed(1)} s`;
     if (place("clock").value !== words) {

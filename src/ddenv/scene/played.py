@@ -33,7 +33,8 @@ def play_of(run: RunFile, position: Position, shot: Shot, scenery: Scenery) -> d
     """The finished test of `shot`: what is there, how it moves, and what the run file `lacks` of it, in sentences.
 
     `robot` has rows t (s), x, y, z (m), qx, qy, qz, qw; so has each of `moving`, by the browser's names, from where the model
-    started. Raises UserError where the robot's way is missing or damaged.
+    started. `turned` has how far left and right wheels have turned at each row of the robot, rad, as its way makes them roll.
+    Raises UserError where the robot's way is missing or damaged.
     """
     one = played(run, position, shot.test or 0)
     if not one.rows:
@@ -49,6 +50,8 @@ def play_of(run: RunFile, position: Position, shot: Shot, scenery: Scenery) -> d
         "title": shot.title,
         "models": len(shot.models),
         "robot": [_row(row[0], pose_of(row[1:])) for row in one.robot],
+        "wheels": scenery.wheels.data(),
+        "turned": scenery.wheels.turned(one.robot).round(DIGITS).tolist(),
         "moving": moving,
         "there": {kind: [key for name in sorted(names) if (key := scenery.key(name))] for kind, names in sets.items()},
         "lacks": " ".join(one.lacks),

@@ -22,6 +22,8 @@ from ddenv.scene.draw import PARTING, Scenery, circle, flag, mark
 from ddenv.scene.played import pairs_of, play_of, rows_of
 from ddenv.scene.shot import Shot, live_pose, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
+from ddenv.scene.wheels import Wheels
+from ddenv.world.motion import pose_of
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Goal, Spawn
 
@@ -43,7 +45,8 @@ class Player:
         self._position = Position(run.events)
         self._wanted = Wanted()
         self._elements = world.elements(frozenset(scenario.protected))
-        self._scenery = Scenery(stage, world, robot, self._elements)
+        wheels = Wheels(robot, scenario.robot.wheels, scenario.controller.skid)
+        self._scenery = Scenery(stage, world, wheels, self._elements)
         self._start = spawn_pose(scenario.robot.spawn) @ robot.pose.inverse() @ robot.links[0].pose
         self._epsilon, self._timeout = scenario.failure.epsilon, scenario.failure.timeout
         self._shot: Shot | None = None
@@ -138,6 +141,7 @@ class Player:
             return
         self._trail = []
         self._scenery.trail(np.zeros((0, COLUMNS)))
+        self._scenery.place_models({})
         if following.kind != "live":
             self._scenery.place_robot(self._start)
 
@@ -149,9 +153,12 @@ class Player:
         if row is None or (self._trail and row.time <= self._trail[-1][0]):
             return
         pose = live_pose(row)
-        self._scenery.place_robot(pose)
         self._trail.append((row.time, *pose.position, *pose.quaternion))
-        self._scenery.trail(np.array(self._trail))
+        trail = np.array(self._trail)
+        left, right = self._scenery.wheels.turned(trail)[-1].tolist()
+        self._scenery.place_robot(pose, (left, right))
+        self._scenery.place_models({name: pose_of(values) for name, values in row.models.items()})
+        self._scenery.trail(trail)
         self._caption(shot, self._clock(row.time))
 
     def _caption(self, shot: Shot, time: str) -> None:

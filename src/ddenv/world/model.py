@@ -137,6 +137,16 @@ class Joint:
     axis2: Vector | None = None
 
 
+# A joint with less play than this (rad or m) counts as fixed.
+PLAY = 1e-4
+
+
+def is_fixed(joint: Joint) -> bool:
+    """Whether `joint` allows no motion."""
+    limited = joint.kind in ("revolute", "prismatic")
+    return joint.kind == "fixed" or (limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper)
+
+
 @dataclass(frozen=True, slots=True)
 class Model:
     """A model of the world, including the links and joints of its nested models (named `inner::link`).

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.drive import find_drive
 from ddenv.robot.drake.template import Template
+from ddenv.world.drive import find_drive
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of

@@ -97,15 +97,24 @@ def test_unknown_models_are_refused(world_of, husky, scenario_of):
 def test_progress_gets_every_row(world_of, husky, scenario_of):
     reported = []
     template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
-    result = template.run(NOTHING, 1, lambda time_s, pose: reported.append((time_s, *pose)))
+    result = template.run(NOTHING, 1, lambda time_s, pose, _: reported.append((time_s, *pose)))
     assert np.array(reported).tobytes() == result.trajectory.tobytes()
+
+
+def test_progress_gets_the_models_that_can_move(world_of, husky, scenario_of, box):
+    world = world_of(box("ball", "2 0 0.2 0 0 0", "0.4 0.4 0.4", mass=5.0), box("wall", "9 0 1 0 0 0", "1 1 2"))
+    places = []
+    template = Template(world, husky, scenario_of(failure={"timeout": 6.0}))
+    result = template.run(frozenset({"ball", "wall"}), 1, lambda *told: places.append(told[2]))
+    assert {name for models in places for name in models} == {"ball"}
+    assert np.array([models["ball"] for models in places]).tobytes() == result.motions["ball"][:, 1:].tobytes()
 
 
 def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):
     template = Template(world_of(), husky, scenario_of())
     before = template.run(NOTHING, seed=1)
 
-    def poison(time_s: float, _pose: tuple[float, ...]) -> None:
+    def poison(time_s: float, *_: object) -> None:
         if time_s > 0.45:
             state = template._context.plant_context.get_mutable_discrete_state_vector()
             state.SetFromVector(np.full(state.size(), np.nan))

@@ -87,7 +87,7 @@ def test_progress_is_reported_while_it_runs(simulator_of, tmp_path):
     """
     reported = []
 
-    def progress(time_s, pose):
+    def progress(time_s, pose, _):
         reported.append((time_s, pose[0]))
         (tmp_path / "seen").touch()
 

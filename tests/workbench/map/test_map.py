@@ -14,7 +14,8 @@ from textual.events import MouseScrollUp
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Trial
-from ddenv.runfile.store import Live
+from ddenv.runfile.store import Live, RunFile
+from ddenv.runs.creation import read_parts
 from ddenv.workbench.map import map_drawing
 from ddenv.workbench.map.place import LAYERS, Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
@@ -264,6 +265,26 @@ async def test_only_the_robot_is_drawn_again_when_only_it_moves(busy, monkeypatc
         moved = Live(first.slot, first.test, first.time + 0.1, (x + 0.3, y, *rest))
         world.show(replace(snapshot, live=(moved, second)), None)
         assert 1 <= len(regions) <= 2
+
+
+async def test_a_model_that_a_running_test_moves_moves_on_the_map(busy):
+    async with Shown(busy) as (_, world):
+        name, snapshot = "crate_00", world.snapshot
+        with RunFile(busy.path) as file:
+            crate = read_parts(file)[1].model(name)
+        place = replace(world.place, movable={name: crate})
+        world.set_place(place)
+        (first, *others), (x, y, z) = snapshot.live, crate.links[0].pose.position
+
+        def at(models):
+            world.show(replace(snapshot, live=(replace(first, models=models), *others)), None)
+            return world.picture.cells.get([each.name for each in place.prints].index(name)), text_of(world)
+
+        still = at({})
+        moved = at({name: (x + 3.0, y, z, 1.0, 0.0, 0.0, 0.0), "unknown": (0.0,) * 7})
+        assert moved[0][1] > still[0][1] and moved[1] != still[1]
+        # The next test begins, and it is back.
+        assert at({}) == still
 
 
 async def test_every_part_that_is_seen_has_a_letter_at_any_size(busy):

@@ -347,7 +347,13 @@ class ClusterPool:
     def live(self) -> list[Live]:
         """The running tests that have begun to move."""
         return [
-            Live(flight.slot, flight.asked.test, row["time"], tuple(row["pose"]))
+            Live(
+                flight.slot,
+                flight.asked.test,
+                row["time"],
+                tuple(row["pose"]),
+                {name: tuple(pose) for name, pose in row["models"].items()},
+            )
             for flight in list(self._flights.values())
             if flight.asked is not None and (row := self._progress.get(flight.asked.test)) is not None
         ]

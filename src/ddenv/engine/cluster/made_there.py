@@ -126,7 +126,7 @@ def _is_wanted(worker: Worker, key: Any) -> bool:
 
 def _report(worker: Worker, child: Pool, asked: Asked) -> None:
     for live, pace in zip(child.live(), child.paces(), strict=False):
-        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "real": pace.real}
+        row = {"test": live.test, "time": live.time, "pose": list(live.pose), "models": live.models, "real": pace.real}
         worker.log_event(asked.topic, row)
 
 

@@ -24,7 +24,7 @@ from pydrake.multibody.tree import (
 from pydrake.multibody.tree import Joint as DrakeJoint
 
 from ddenv.arrays import Floats
-from ddenv.world.model import Inertia, Joint, Link, Model
+from ddenv.world.model import Inertia, Joint, Link, Model, is_fixed
 from ddenv.world.pose import Pose
 
 
@@ -45,20 +45,12 @@ def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:
     return SpatialInertia.MakeFromCentralInertia(inertia.mass, place.translation(), central)
 
 
-# A joint with less play than this (rad or m) counts as fixed.
-PLAY = 1e-4
 # Drake's ball joint has roll, pitch and yaw, and locks (gimbal lock) where the child's x axis is parallel to the parent's z axis.
 # These joint axes, the same on both sides, are oblique to every axis of the world, so that no swing about one of those, like that
 # of something that hangs straight down, reaches the lock.
 BALL_AXES = np.array([[0.8, 0.0, -0.6], [0.36, 0.8, 0.48], [0.48, -0.6, 0.64]])
 
 Linked = dict[str, tuple[Link, RigidBody]]
-
-
-def is_fixed(joint: Joint) -> bool:
-    """Whether `joint` allows no motion."""
-    limited = joint.kind in ("revolute", "prismatic")
-    return joint.kind == "fixed" or (limited and joint.upper - joint.lower < PLAY and joint.lower <= 0 <= joint.upper)
 
 
 def anchored(model: Model) -> frozenset[str]:

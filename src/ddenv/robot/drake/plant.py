@@ -17,8 +17,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.robot.drake.articulation import add_joint, anchored, is_fixed, spatial_inertia, to_drake, transform
-from ddenv.robot.drake.drive import Drive
+from ddenv.robot.drake.articulation import add_joint, anchored, spatial_inertia, to_drake, transform
 from ddenv.robot.drake.shapes import (
     drake_shapes,
     resting_corners,
@@ -27,8 +26,9 @@ from ddenv.robot.drake.shapes import (
     wheel_friction,
     world_friction,
 )
+from ddenv.world.drive import Drive
 from ddenv.world.extent import Bounds
-from ddenv.world.model import Link, Model, World
+from ddenv.world.model import Link, Model, World, is_fixed
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Simulation
 

@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
 from ddenv.robot.drake.articulation import to_drake
-from ddenv.robot.drake.drive import Drive, turned_links
+from ddenv.world.drive import Drive, turned_links
 from ddenv.world.extent import Bounds, shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector

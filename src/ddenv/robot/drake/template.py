@@ -14,7 +14,6 @@ from ddenv.errors import UserError
 from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, controllers
-from ddenv.robot.drake.drive import Drive, find_drive
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
 from ddenv.robot.drake.run_context import RunContext
@@ -33,6 +32,7 @@ from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
 from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
+from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
@@ -138,8 +138,9 @@ class Template:
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with protected models and grounds, which are always kept.
 
-        `progress(time, pose)` gets the simulated time (s) and the pose of the robot (x, y, z in m, qw, qx, qy, qz) at each recorded
-        sample. A run that is not `full` is cut short as soon as the robot is stuck for good. `listener` hears the controller.
+        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
+        by name, of the models that can move, at each recorded sample. A run that is not `full` is cut short as soon as the robot is
+        stuck for good. `listener` hears the controller.
         Raises ValueError for unknown names, and LeftRegion if something comes near what is not in the plant.
         """
         unknown = keep - self._names

@@ -139,7 +139,7 @@ class PoseLog:
             return
         self._rows.append(row)
         if self._progress is not None:
-            self._progress(row[0], row[1:])
+            self._progress(row[0], row[1:], {})
 
     def _wrong(self, text: str) -> BadLog:
         shown = printable(text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}...")

@@ -53,7 +53,7 @@ class ExternalSimulator:
     ) -> RunResult:
         """Runs the robot in the world with the models `keep`, and with those that cannot be removed.
 
-        `progress(time, pose)` gets the simulated time (s) and the pose of the robot (x, y, z in m, qw, qx, qy, qz) of each row that
+        `progress(time, pose, {})` gets the simulated time (s) and the robot's pose (x, y, z in m, qw, qx, qy, qz) of each row that
         the command prints. `full` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises
         ValueError for unknown names, and UserError if no temporary file can be written.
         """

@@ -17,12 +17,24 @@ from ddenv.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
-from ddenv.workbench.map.picture import Line, Mark, Picture, Seen, crosshair, follow, picture, riders, robots, seen
+from ddenv.workbench.map.picture import (
+    Line,
+    Mark,
+    Picture,
+    Seen,
+    crosshair,
+    follow,
+    foremost,
+    picture,
+    riders,
+    robots,
+    seen,
+)
 from ddenv.workbench.map.place import Point, Shown
 from ddenv.workbench.run.poll import Snapshot
 
 if TYPE_CHECKING:
-    pass
+    from ddenv.workbench.map.moved_prints import MovedPrints
 
 T = TypeVar("T")
 # Dots of the original path, or of the second way, and of the gaps in it.
@@ -65,6 +77,7 @@ class MapDrawing:
         self._kept: Remembered[Kept] = Remembered()
         self._looks: Remembered[Looks] = Remembered()
         self._picture: Remembered[Picture] = Remembered()
+        self._moved: MovedPrints | None = None
 
     def fitting(self, shown: Shown, columns: int, rows: int) -> View:
         """A view of all important places."""
@@ -85,6 +98,7 @@ class MapDrawing:
 
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
+        shown = self._with_live(shown)
         still = self._still(shown, view, palette)
         canvas, trails = still.canvas.copy(), self._trails if "path" in shown.layers else {}
         if shown.ways:
@@ -94,6 +108,21 @@ class MapDrawing:
         if cursor is not None:
             crosshair(canvas, cursor, still.written, palette)
         return canvas, still
+
+    def _with_live(self, shown: Shown) -> Shown:
+        """With the models where they are in the running test whose robot stands out."""
+        live = None if shown.ways else foremost(shown.snapshot)
+        if (live is None or not live.models) and self._moved is None:
+            return shown
+        # NumPy is not loaded before something moves.
+        from ddenv.workbench.map.moved_prints import MovedPrints
+        from ddenv.world.motion import pose_of
+
+        if self._moved is None or self._moved.place is not shown.place:
+            self._moved = MovedPrints(shown.place)
+        poses = {} if live is None else {name: pose_of(values) for name, values in live.models.items()}
+        prints = self._moved.at(poses)
+        return shown if prints is shown.place.prints else replace(shown, place=replace(shown.place, prints=prints))
 
     def _still(self, shown: Shown, view: View, palette: Palette) -> Picture:
         """All but what moves."""

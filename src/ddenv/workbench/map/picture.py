@@ -15,6 +15,7 @@ from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.paint import NUMBERED, Canvas, readable
 from ddenv.map.raster import ARROWS, HOLLOW, Outlines, Spans, View, arrow, braille, heading, owners, spans
+from ddenv.runfile.store import Live
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts
 from ddenv.workbench.map.place import Point, Way
@@ -128,6 +129,18 @@ def follow(trails: Mapping[int, list[Point]], snapshot: Snapshot) -> dict[int, l
     return grown
 
 
+def _in_focus(snapshot: Snapshot) -> frozenset[int]:
+    """The running tests of the candidate in focus."""
+    focus = snapshot.focus
+    return frozenset(test.id for test in snapshot.running if focus is not None and test.candidate == focus.index)
+
+
+def foremost(snapshot: Snapshot) -> Live | None:
+    """The running test that stands out: one of the candidate in focus, if there is one."""
+    ids = _in_focus(snapshot)
+    return next((live for live in snapshot.live if live.test in ids), next(iter(snapshot.live), None))
+
+
 def robots(
     canvas: Canvas,
     view: View,
@@ -137,8 +150,7 @@ def robots(
     palette: Palette,
 ) -> None:
     """The robots as arrows with their paths, which hide no letter; those of the candidate in focus stand out."""
-    focus = snapshot.focus
-    ids = {test.id for test in snapshot.running if focus is not None and test.candidate == focus.index}
+    ids = _in_focus(snapshot)
     colors = {live.test: palette.live if live.test in ids or not ids else palette.dull for live in snapshot.live}
     for test, trail in trails.items():
         bits = braille(np.array(trail), view)

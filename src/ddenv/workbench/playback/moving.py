@@ -6,41 +6,26 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ddenv.map.footprints import Footprint, footprint
+from ddenv.map.footprints import Footprint
 from ddenv.runfile.events import Names
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round, RunState, Split, Trial
 from ddenv.runs.playback import Played
+from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.place import Place, Way
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.world.motion import pose_at
-from ddenv.world.pose import Pose
 
 
 class Moving:
-    """The models of a place as they move in a test: only those that have moved since the last call are drawn anew."""
+    """The models of a place as they move in a test."""
 
     def __init__(self, place: Place, one: Played) -> None:
-        self._prints = place.prints
-        numbers = {each.name: number for number, each in enumerate(place.prints)}
-        self._motions = [
-            (numbers[name], place.movable[name], samples)
-            for name, samples in one.moving.items()
-            if name in numbers and name in place.movable
-        ]
-        self._poses: dict[int, Pose] = {}
+        self._prints, self._motions = MovedPrints(place), one.moving
 
     def at(self, time: float) -> tuple[Footprint, ...]:
         """The footprints of all models at simulated `time`, s; the same object if nothing has moved."""
-        changed: dict[int, Footprint] = {}
-        for number, model, samples in self._motions:
-            pose = pose_at(samples, time)
-            if pose != self._poses.get(number):
-                self._poses[number] = pose
-                changed[number] = footprint(model, moved=pose @ model.links[0].pose.inverse())
-        if changed:
-            self._prints = tuple(changed.get(number, each) for number, each in enumerate(self._prints))
-        return self._prints
+        return self._prints.at({name: pose_at(samples, time) for name, samples in self._motions.items()})
 
 
 class RobotWay:

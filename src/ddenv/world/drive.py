@@ -1,26 +1,40 @@
-"""The drive of a wheeled robot: which joints are wheels, and how fast each must turn for a command."""
+"""The drive of a wheeled robot: which joints are wheels, how fast each must turn for a command, and how far each rolls on a way."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
-from ddenv.robot.drake.articulation import is_fixed
-from ddenv.robot.protocol import Twist, WheelSpeeds
 from ddenv.schemas import nearest
 from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Capsule, Collision, Cylinder, Ellipsoid, Joint, Link, Mesh, Model, Sphere
-from ddenv.world.pose import Vector
+from ddenv.world.model import Capsule, Collision, Cylinder, Ellipsoid, Joint, Link, Mesh, Model, Sphere, is_fixed
+from ddenv.world.pose import Pose, Vector
 from ddenv.world.scenario import Wheels
 
 # How much of a wheel's axis must point sideways: a swivel or a turret is no wheel.
 ACROSS = 0.5
 # The minimum distance between left and right wheels, m.
 NARROWEST = 1e-3
+
+
+class Twist(NamedTuple):
+    """Forward speed in m/s and turn rate in rad/s, positive to the left."""
+
+    speed: float
+    turn_rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class WheelSpeeds:
+    """Angular speeds of the wheel joints by name, rad/s, positive forward. A wheel that is not named stands still."""
+
+    speeds: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +106,37 @@ def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
 
 def turned_links(robot: Model, joints: tuple[str, ...]) -> frozenset[str]:
     """The names of the links that `joints` turn: their child links, and all links that are fixed to those."""
-    return frozenset(link.name for joint in robot.joints if joint.name in joints for link in _wheel(robot, joint))
+    return frozenset(link.name for joint in robot.joints if joint.name in joints for link in wheel_links(robot, joint))
+
+
+def wheel_links(robot: Model, joint: Joint) -> list[Link]:
+    """The links that a wheel's `joint` turns: its child, and all links that are fixed to it."""
+    names = {joint.child}
+    fixed = [each for each in robot.joints if is_fixed(each)]
+    while new := {each.child for each in fixed if each.parent in names} - names:
+        names |= new
+    return [link for link in robot.links if link.name in names]
+
+
+def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
+    """How far the left and the right wheels have turned at each of `rows`, shape (N, 2), rad, positive forward.
+
+    A run records where the robot was, not how its wheels turned. This is worked out from its way, by the kinematics of a
+    skid-steer: it moves along its x axis without slip, and turns by `skid` of what its wheels command. Wheels that spin or slide
+    turn otherwise.
+    `rows` are the motion of the robot's first link, shape (N, 8): t (s), x, y, z (m), qw, qx, qy, qz.
+    """
+    if len(rows) < 2:
+        return np.zeros((len(rows), 2))
+    to_model = robot.links[0].pose.inverse() @ robot.pose
+    ahead = np.array(
+        [Pose((0.0, 0.0, 0.0), tuple(row[4:8])).rotate(to_model.rotate((1.0, 0.0, 0.0))) for row in rows.tolist()]
+    )
+    between = (ahead[:-1] + ahead[1:]) / 2
+    moved = (np.diff(rows[:, 1:4], axis=0) * between).sum(axis=1)
+    sideways = np.diff(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))) * drive.track / skid / 2
+    turns = np.column_stack([moved - sideways, moved + sideways]) / drive.radius
+    return np.vstack([np.zeros(2), turns.cumsum(axis=0)])
 
 
 def footprint(robot: Model) -> tuple[float, float, float, float]:
@@ -145,18 +189,9 @@ def _side(robot: Model, joint: Joint) -> float:
     return robot.pose.inverse().rotate((x, y, z))[1]
 
 
-def _wheel(robot: Model, joint: Joint) -> list[Link]:
-    """The child link of `joint`, and all links that are fixed to it."""
-    names = {joint.child}
-    fixed = [each for each in robot.joints if is_fixed(each)]
-    while new := {each.child for each in fixed if each.parent in names} - names:
-        names |= new
-    return [link for link in robot.links if link.name in names]
-
-
 def _radius(robot: Model, joint: Joint) -> float:
     """The radius of the wheel on `joint`, m."""
-    collisions = [collision for link in _wheel(robot, joint) for collision in link.collisions]
+    collisions = [collision for link in wheel_links(robot, joint) for collision in link.collisions]
     radii = [_round(collision, joint.axis) for collision in collisions]
     if not any(radii):
         what = "a cylinder, sphere, capsule, ellipsoid or mesh"
