@@ -1,12 +1,14 @@
 """The command line: all commands, and their exit codes.
 
-Exit codes: 0 done (for a reduction: shown to be minimal), 1 stopped before that, 2 wrong input, 130 interrupted.
+Exit codes: 0 done (for a reduction: shown to be minimal), 1 stopped before that, 2 wrong input, 130 interrupted. Those of
+`ddenv reproduce` are for `git bisect run`, which takes 1 to 124 for "it fails": it says 125 whenever it has no answer.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import traceback
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,7 @@ from ddenv.cli.learn_command import learn_command
 from ddenv.cli.open_command import open_command
 from ddenv.cli.options import given_reading, reading_options
 from ddenv.cli.report_command import report_command
-from ddenv.cli.reproduce_command import reproduce_command
+from ddenv.cli.reproduce_command import CANNOT_SAY, reproduce_command
 from ddenv.cli.resume_command import resume_command
 from ddenv.cli.run_command import run_command
 from ddenv.cli.runs_command import runs_command
@@ -94,9 +96,7 @@ def app(context: click.Context, /, **reading: Any) -> None:
 
 
 def _cannot_print(error: OSError) -> int:
-    """Handles output that nobody reads any more (as with `| head`), or a full disk. Raises all other errors again."""
-    if not isinstance(error, BrokenPipeError) and error.filename is not None:
-        raise error
+    """Handles output that nobody reads any more (as with `| head`), or a full disk."""
     # Otherwise Python tries to write the rest again at exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if isinstance(error, BrokenPipeError):
@@ -139,22 +139,34 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    answers = sys.argv[1:2] == [reproduce_command.name]
     try:
         code = app(standalone_mode=False, prog_name="ddenv")
         sys.stdout.flush()
-    except UserError as error:
-        print(f"ddenv: {error}", file=sys.stderr)
-        code = 2
-    except OSError as error:
-        code = _cannot_print(error)
-    except click.exceptions.Abort:
+    except (KeyboardInterrupt, click.exceptions.Abort):
         code = 130
-    except KeyboardInterrupt:
-        code = 130
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.format_message(), file=sys.stderr)
-        code = 2
-    except click.ClickException as error:
-        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{_help_of(error)}'"), file=sys.stderr)
-        code = 2
+    except Exception as error:
+        code = _told(error, answers)
+        if answers:
+            code = CANNOT_SAY
     sys.exit(code)
+
+
+def _told(error: Exception, all_of_it: bool) -> int:
+    """Says what is wrong in one line; returns the exit code.
+
+    What is no error of the user is raised again, or shown if `all_of_it`.
+    """
+    if isinstance(error, UserError):
+        print(f"ddenv: {error}", file=sys.stderr)
+    elif isinstance(error, click.exceptions.NoArgsIsHelpError):
+        print(error.format_message(), file=sys.stderr)
+    elif isinstance(error, click.ClickException):
+        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{_help_of(error)}'"), file=sys.stderr)
+    elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
+        return _cannot_print(error)
+    elif all_of_it:
+        traceback.print_exception(error)
+    else:
+        raise error
+    return 2

@@ -29,8 +29,8 @@ FAILS, PASSES, CANNOT_SAY = 1, 0, 125
 def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust: bool, as_json: bool) -> int:
     """Runs what RUN (a name or a file) has left until it is known whether it still fails at the rate of its certificate.
 
-    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 the runs do not
-    say.
+    Exit codes are those of git bisect run: 1 it fails at that rate, 0 it does not (at less than half of it), 125 it cannot be
+    said: the runs do not decide, or something is wrong.
     """
     from ddenv.amounts import percent
     from ddenv.cli.test_summary import line
