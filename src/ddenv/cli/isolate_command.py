@@ -36,6 +36,8 @@ def isolate_command(
     """
     from ddenv.cli.follow import Interrupted, follow
     from ddenv.cli.trusting import allow_run
+    from ddenv.guiding.pace import Isolate
+    from ddenv.guiding.situation import Situation
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
@@ -46,12 +48,8 @@ def isolate_command(
     allow_run(path, trust, cluster)
     with RunFile(path) as file, engine_lock(path):
         state = fold(file.events())
-    if state.baseline is None:
-        raise UserError(
-            f"{path}: no failure is known yet, so there is nothing to isolate; run it first: ddenv resume {path}"
-        )
-    if state.status != "finished" and state.isolating is None:
-        raise UserError(f"{path}: its search is not over; let it end first: ddenv resume {path}")
+    if why := Isolate(again=True).refusal(Situation(state, "absent")):
+        raise UserError(f"{path}: {why}: ddenv resume {path}")
     if state.isolated is None or state.isolating is not None or again or runs is not None:
         where = {"cluster": cluster} if cluster else {}
         try:

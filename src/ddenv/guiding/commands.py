@@ -12,7 +12,7 @@ from typing import Any, get_args
 from ddenv.claims import fresh_runs_made, in_the_making
 from ddenv.errors import UserError
 from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
-from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step, Stop
+from ddenv.guiding.pace import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
 from ddenv.guiding.situation import NO_MODELS, Situation
@@ -46,7 +46,7 @@ GOES_ON = (Try, Adopt, AcceptOther, Undo, GoBack, Change)
 ANEW = (Pin, Unpin, Adopt, AcceptOther, Undo, GoBack)
 
 
-def refusal(command: Command | StartEngine, now: Situation) -> str:
+def refusal(command: Command | StartEngine | Isolate, now: Situation) -> str:
     """Why a command is not possible now, in one line, or ""."""
     return now.barred or command.refusal(now)
 

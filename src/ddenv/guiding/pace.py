@@ -100,3 +100,25 @@ class StartEngine:
             return FINISHED
         spent = state.budget is not None and state.made >= state.budget
         return f"the budget of {state.budget} tests is used up; c raises it" if spent else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Isolate:
+    """Start an engine that finds the nearest world that passes, or goes on with that. It is not a command, as `StartEngine`.
+
+    `again`: search also if that world is known.
+    """
+
+    offer: ClassVar[str] = "isolate"
+    again: bool = False
+
+    def refusal(self, now: Situation) -> str:
+        state = now.state
+        if state.baseline is None:
+            return "no failure is known yet, so there is nothing to isolate"
+        if state.status != "finished" and state.isolating is None:
+            return "its search is not over; let it end first"
+        if now.engine != "absent":
+            return "an engine is at work on the run; let it end first"
+        known = state.isolated is not None and state.isolating is None and not self.again
+        return "the nearest world that passes is known; 'ddenv isolate RUN --again' searches again" if known else ""

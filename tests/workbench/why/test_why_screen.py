@@ -5,12 +5,13 @@ import sqlite3
 import fake_moments
 import fake_run
 import pytest
-from attached import Attached
+from attached import Attached, starts
 from textual.widgets import OptionList
 
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
+from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.why.why_screen import WhyScreen
 
@@ -153,3 +154,50 @@ async def test_the_nearest_world_that_passes_stands_at_the_end_with_both_runs_si
         await session.app.workers.wait_for_complete()
         played = session.app.screen
         assert [one.test.id for one in played._tests] == [known.parting.with_test, known.parting.without_test]
+
+
+async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, monkeypatch):
+    started = starts(monkeypatch)
+    fake_moments.finished(run)
+    async with Attached(run) as session:
+        screen = await opened(session)
+        assert "world that passes" in session.text(KeyFooter)
+        await session.press("i")
+        assert started == [(run.path, run.state.jobs, {"accept_mode": "automatic", "isolate": 0})]
+        # The engine begins.
+        run.hold()
+        run.start_isolation(2)
+        run.live((run.isolate(run.remove("crate_00", "crate_01"), 0), 0.5))
+        await session.look()
+        screen._look()
+        assert "finding the nearest world that passes: without 2 models" in words(screen, "#why-header")
+        await session.press("i")
+        assert session.asked() == [("stop", {})]
+        run.write("engine_stopped", reason="stopped by the user")
+        run.let_go()
+        await session.look()
+        screen._look()
+        assert "(stopped)" in words(screen, "#why-header")
+        await session.press("i")
+        assert len(started) == 2
+
+
+@pytest.mark.parametrize(
+    ("moment", "why"),
+    [
+        (fake_moments.mid_round, "its search is not over"),
+        (fake_moments.isolated, "the nearest world that passes is known"),
+    ],
+)
+async def test_why_the_nearest_world_that_passes_cannot_be_found_now(run, monkeypatch, moment, why):
+    started = starts(monkeypatch)
+    moment(run)
+    async with Attached(run) as session:
+        await opened(session)
+        await session.press("i")
+        assert why in session.said()
+    async with Attached(run, watch=True) as session:
+        await opened(session)
+        await session.press("i")
+        assert "watching only" in session.said()
+    assert (started, run.file.commands()) == ([], [])

@@ -16,7 +16,7 @@ from textual.screen import Screen
 from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, data_of, question, refusal, said, starts_engine
-from ddenv.guiding.pace import StartEngine
+from ddenv.guiding.pace import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
 from ddenv.workbench.run.poll import Poll, Snapshot
@@ -72,6 +72,11 @@ class Asking:
     def _watching(self) -> str:
         return f"watching only: to guide it, use 'ddenv open {attach_name(self._poll.path)}' without --watch"
 
+    @property
+    def trouble(self) -> str:
+        """The error that ended the engine that this screen started, or ""."""
+        return self._engine.trouble if self._poll.snapshot.engine == "absent" else ""
+
     def waiting_for(self) -> str:
         """The command that waits for its answer, in words."""
         (id, command), snapshot = self._last, self._poll.snapshot
@@ -112,13 +117,15 @@ class Asking:
 
     # Sending.
 
-    def ask(self, command: Command | StartEngine, *, sure: bool = False) -> None:
+    def ask(self, command: Command | StartEngine | Isolate, *, sure: bool = False) -> None:
         """Sends a command, after its question unless the user is `sure`, or shows why it is not possible."""
         now = self.situation
         if why := refusal(command, now):
             self.refuse(why)
         elif isinstance(command, StartEngine):
             self._start_engine()
+        elif isinstance(command, Isolate):
+            self._once_trusted(lambda: self._start(isolate=0))
         elif sure or not (asked := question(command, now.state)):
             self.send(command)
         else:
@@ -209,10 +216,10 @@ class Asking:
                 self._screen.app, scenario, self._poll.path, lambda yes: then() if yes else self.refuse(UNTRUSTED)
             )
 
-    def _start(self) -> None:
+    def _start(self, **options: int) -> None:
         state = self._poll.snapshot.state
         try:
-            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode)
+            self._engine.start(state.jobs or processor.usable_cores(), state.accept_mode, **options)
         except UserError as error:
             self._screen.notify(str(error), severity="error", markup=False)
 

@@ -15,7 +15,6 @@ from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import RunState
 from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
@@ -118,12 +117,13 @@ class Opening:
 
     def why(self, position: Position) -> None:
         """Shows what happens without each model that is left."""
-        from ddenv.workbench.why.why_screen import WhyScreen
+        from ddenv.workbench.why.why_screen import Look, WhyScreen
 
-        def look() -> tuple[RunState, bool]:
-            return position.now, self._poll.snapshot.engine != "absent"
+        def look() -> Look:
+            return Look(position.now, self._poll.snapshot.engine != "absent", self._asking.trouble)
 
-        self._screen.app.push_screen(WhyScreen(self._poll.file, position, self._world.place, look))
+        screen = WhyScreen(self._poll.file, position, self._world.place, look, self._asking.ask)
+        self._screen.app.push_screen(screen)
 
     def open(self, what: str) -> None:
         """A dialog or another screen, by its name in the keys."""

@@ -29,12 +29,12 @@ class Engine:
         self._worked = False
         self._last_words = ""
 
-    def start(self, jobs: int, accept_mode: str) -> None:
-        """Raises UserError if it cannot be started."""
+    def start(self, jobs: int, accept_mode: str, **options: int) -> None:
+        """`options` are those of `start_engine`. Raises UserError if it cannot be started."""
         from ddenv.runs.programs import start_engine
 
         try:
-            self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode)
+            self._process = start_engine(self.run, max(1, jobs), accept_mode=accept_mode, **options)
         except OSError as error:
             raise UserError(f"{self.run}: the engine cannot be started: {error.strerror}") from None
         self._worked, self._last_words = False, ""

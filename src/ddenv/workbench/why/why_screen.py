@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
@@ -16,10 +17,12 @@ from textual.widgets.option_list import Option
 
 from ddenv.claims import current
 from ddenv.errors import UserError
+from ddenv.guiding.pace import Isolate, Stop
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import played
+from ddenv.words import isolating
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
@@ -42,12 +45,30 @@ def _ids(names: str) -> tuple[str, ...]:
     return tuple(f"why.{name}" for name in names.split())
 
 
-SHOWN = _ids("play copy closer farther fit signs help close")
-FIRST = _ids("help close play copy signs closer farther fit")
+SHOWN = _ids("play isolate copy closer farther fit signs help close")
+FIRST = _ids("help close play isolate copy signs closer farther fit")
+
+
+# What the key of isolation does, as the footer says.
+BEGIN, GO_ON, STOP = "world that passes", "go on", "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The run as it is shown, whether an engine works on it, and the error that ended the last one, or ""."""
+
+    state: RunState
+    works: bool
+    trouble: str = ""
+
+    @property
+    def isolates(self) -> bool:
+        """Whether an engine is finding the nearest world that passes."""
+        return self.works and self.state.isolating is not None
 
 
 class WhyScreen(Screen[None]):
-    """`look` returns the run as it is shown, and whether an engine works on it; `place` is its world, if it is read already."""
+    """`ask` starts and stops engines, or says why not; `place` is the run's world, if it is read already."""
 
     CSS_PATH = "why.tcss"
     HORIZONTAL_BREAKPOINTS = [(0, "-thin"), (SMALLEST[0], "-narrow"), (110, "-wide")]
@@ -63,6 +84,13 @@ class WhyScreen(Screen[None]):
             priority=True,
         ),
         Binding(
+            "i",
+            "isolate",
+            BEGIN,
+            id="why.isolate",
+            tooltip="find the nearest world that passes, in which the robot reaches its goal; while that goes on: stop it",
+        ),
+        Binding(
             "c", "copy", "copy", id="why.copy", tooltip="copy all sentences, or the command that is named (OSC 52)"
         ),
         Binding("plus,equals_sign", "zoom(1.25)", "closer", id="why.closer", tooltip="map: closer", key_display="+"),
@@ -74,11 +102,17 @@ class WhyScreen(Screen[None]):
     ]
 
     def __init__(
-        self, file: RunFile, position: Position, place: Place, look: Callable[[], tuple[RunState, bool]]
+        self,
+        file: RunFile,
+        position: Position,
+        place: Place,
+        look: Callable[[], Look],
+        ask: Callable[[Isolate | Stop], None],
     ) -> None:
         super().__init__()
-        self._file, self._position, self._place, self._look_at = file, position, place, look
+        self._file, self._position, self._place, self._look_at, self._ask = file, position, place, look, ask
         self._seen: tuple[object, ...] = ()
+        self._head = self._trouble = ""
         self._state = RunState()
         self._entries: tuple[Entry, ...] = ()
         self.map = WorldMap(id="why-map")
@@ -128,17 +162,31 @@ class WhyScreen(Screen[None]):
 
     def _look(self) -> None:
         """Reads all again once there is another certificate, or another nearest world that passes."""
-        state, works = self._look_at()
+        now = self._look_at()
+        state, works = now.state, now.works
+        self._show_isolation(now)
         known = current(state) is not None or state.isolated is not None
         seen = current(state), state.isolated, works, state.status, 0 if known else state.tests_done
         if seen == self._seen:
             return
         self._seen, self._state = seen, state
-        self.query_one("#why-header", Static).update(Text(f" {head_of(state)}", no_wrap=True, overflow="ellipsis"))
         if known:
             self._read(state)
         else:
             self._found((), 0, "")
+
+    def _show_isolation(self, now: Look) -> None:
+        """How far the search for the nearest world that passes is, and what its key does."""
+        begun = now.state.isolating is not None
+        head = head_of(now.state) + (f" · {isolating(now.state)}{'' if now.works else ' (stopped)'}" if begun else "")
+        if head != self._head:
+            self._head = head
+            self.query_one("#why-header", Static).update(Text(f" {plain(head)}", no_wrap=True, overflow="ellipsis"))
+        self.query_one(KeyFooter).say("why.isolate", STOP if now.isolates else GO_ON if begun else BEGIN)
+        if now.trouble != self._trouble:
+            self._trouble = now.trouble
+            if now.trouble:
+                self.notify(plain(now.trouble), severity="error", markup=False)
 
     @work(thread=True, group="why", exclusive=True)
     def _read(self, state: RunState) -> None:
@@ -156,8 +204,7 @@ class WhyScreen(Screen[None]):
         self._entries = found
         self.set_class(not found, "-empty")
         if not found:
-            _, works = self._look_at()
-            words = trouble or nothing_yet(self._state, works, attach_name(self._file.path))
+            words = trouble or nothing_yet(self._state, self._look_at().works, attach_name(self._file.path))
             self.query_one("#why-empty", Static).update(Text(plain_lines(words)))
             return
         beyond = f" · {more} more are not listed" if more else ""
@@ -227,9 +274,11 @@ class WhyScreen(Screen[None]):
         except UserError as error:
             self._refuse(str(error))
 
+    def action_isolate(self) -> None:
+        self._ask(Stop() if self._look_at().isolates else Isolate())
+
     def action_copy(self) -> None:
-        _, works = self._look_at()
-        command = remedy(self._state, works, attach_name(self._file.path))
+        command = remedy(self._state, self._look_at().works, attach_name(self._file.path))
         lines = [one.text for one in self._entries]
         if not lines and not command:
             self._refuse("there is nothing to copy yet")
