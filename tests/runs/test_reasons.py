@@ -9,7 +9,11 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.reasons import APART, GOAL, End, F, Parting, parted, parting_sentence, reasons, sentence
+from tests.conftest import ROOT
+from tests.runs.told import untrue
 from tests.workbench import fake_moments, fake_run
+
+LESSONS = ROOT / "src/ddenv/learn/lessons"
 
 
 @pytest.fixture
@@ -44,6 +48,29 @@ def test_a_robot_that_ends_lower_than_in_f_is_not_said_to_end_in_the_same_place(
     words = "gets stuck elsewhere, near (1.00, 2.00) m"
     assert f"{words}, 1.9 m lower than in f (4 of 4" in sentence(one)
     assert f"{words} (4 of 4" in sentence(replace(one, ends=(replace(stuck, above=0.1),)))
+
+
+def test_runs_that_end_far_from_each_other_are_not_said_to_end_near_one_place(found):
+    lost = End("lost", 3, 30.0, (1.0, 2.0), 0.0, 2.61)
+    one = replace(found[1][0], runs=3, ends=(lost,))
+    assert "takes another place for its goal, at most 2.7 m from (1.00, 2.00) m (3 of 3" in sentence(one)
+
+
+@pytest.mark.parametrize("lesson", ["ditch", "delivery", "quay-kept", "ditch-sliced", "yard-near"])
+def test_every_sentence_about_a_recorded_run_is_true(lesson):
+    number, wrong = untrue(LESSONS / f"{lesson}.ddenv")
+    assert number >= 4
+    assert wrong == []
+
+
+def test_every_sentence_about_a_run_with_its_ways_is_true(tmp_path, monkeypatch):
+    path = fake_moments.finished(fake_run.FakeRun(tmp_path / "one.ddenv")).path
+    number, wrong = untrue(path)
+    assert (number, wrong) == (4, [])
+    # What is said would be found to be wrong.
+    monkeypatch.setattr("ddenv.runs.reasons.wilson_interval", lambda *_: (0.1, 0.2))
+    monkeypatch.setattr("ddenv.runs.reasons.parted", lambda *_: (1.0, 2.0, (0.0, 0.0)))
+    assert len(untrue(path)[1]) >= 4
 
 
 def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):

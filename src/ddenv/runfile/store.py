@@ -216,7 +216,7 @@ class RunFile:
         """Samples of the robot in a finished test, flat rows of `COLUMNS` floats. Raises UserError if there are none."""
         samples = self.motion(test)
         if not samples or not all(map(math.isfinite, samples)):
-            raise UserError(f"{self.path}: damaged run file: test {test} has no trajectory")
+            raise UserError(f"{self.path}: test {test} has no trajectory in this file")
         return samples
 
     def motions(self, test: int) -> dict[str, array[float]]:

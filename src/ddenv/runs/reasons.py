@@ -21,12 +21,14 @@ from ddenv.runfile.supports import stack_with
 F, GOAL = "similar", "pass"
 # What the robot does, by the `failure` of a run.
 DOES = {
-    "stuck": "gets stuck",
-    "tipped over": "tips over",
-    "fell": "falls",
-    "lost": "is lost",
-    "out of time": "runs out of time",
+    "stuck": "gets stuck elsewhere",
+    "tipped over": "tips over elsewhere",
+    "fell": "falls elsewhere",
+    "lost": "takes another place for its goal",
+    "out of time": "runs out of time elsewhere",
 }
+# Runs that end within this distance of one place end near it, m.
+NEAR = 0.5
 # A robot that ends so much lower or higher than in f, m, stands on something else.
 LEVEL = 0.25
 # Two runs have visibly parted when the robots are this far from each other, m.
@@ -37,7 +39,8 @@ APART = 0.1
 class End:
     """A way in which `number` runs ended, after `seconds` of simulated time (their median) at `place`, x and y, m (medians).
 
-    They ended so far `above` f's end, m (median; negative: below it). `kind` is `F`, `GOAL`, or the `failure` of a run that ended
+    None of them ended farther than `reach`, m, from there, and they ended so far `above` f's end, m (median; negative: below it).
+    `kind` is `F`, `GOAL`, or the `failure` of a run that ended
     otherwise.
     """
 
@@ -46,6 +49,7 @@ class End:
     seconds: float
     place: tuple[float, float]
     above: float = 0.0
+    reach: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +138,11 @@ def _ends(tests: Sequence[Test], height: float) -> tuple[End, ...]:
     return tuple(sorted(ends, key=lambda end: -end.number))
 
 
-def _middle(tests: Sequence[Test], height: float) -> tuple[tuple[float, float], float]:
+def _middle(tests: Sequence[Test], height: float) -> tuple[tuple[float, float], float, float]:
     places = [test.end_pose for test in tests if test.end_pose is not None] or [(math.nan, math.nan, math.nan)]
     x, y, z = (median(place[axis] for place in places) for axis in range(3))
-    return (x, y), 0.0 if math.isnan(z - height) else z - height
+    reach = max(math.dist((x, y), place[:2]) for place in places)
+    return (x, y), 0.0 if math.isnan(z - height) else z - height, reach
 
 
 def _parting(file: RunFile, with_it: Test, without: Test, gone: Sequence[str]) -> Parting:
@@ -184,7 +189,9 @@ def _does(end: End) -> str:
     level = (
         "" if abs(end.above) < LEVEL else f", {abs(end.above):.1f} m {'higher' if end.above > 0 else 'lower'} than in f"
     )
-    return f"{DOES.get(end.kind, 'fails')} elsewhere, near {_point(end.place)}{level}"
+    # Rounded up: no run ends farther away than is said.
+    near = "near" if end.reach <= NEAR else f"at most {math.ceil(10 * end.reach) / 10:.1f} m from"
+    return f"{DOES.get(end.kind, 'fails elsewhere')}, {near} {_point(end.place)}{level}"
 
 
 def _point(place: tuple[float, float]) -> str:
@@ -213,10 +220,10 @@ def parting_unknown(lacks: str) -> str:
 
 def where_they_part(one: Parting) -> str:
     """When two runs begin to differ, and when and where they are visibly apart, in one sentence."""
+    if one.apart is None or one.place is None:
+        # Their ways may be equal to the end.
+        equal = f" equal until {one.equal:.1f} s, and" if one.equal else ""
+        return f"With seed {one.seed} the two runs are{equal} never {APART:g} m apart."
     start = "from the start" if not one.equal else f"after {one.equal:.1f} s"
-    apart = (
-        ""
-        if one.apart is None or one.place is None
-        else (f", and are {APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}")
-    )
-    return f"With seed {one.seed} the two runs differ {start}{apart}."
+    apart = f"{APART:g} m apart after {one.apart:.1f} s, at {_point(one.place)}"
+    return f"With seed {one.seed} the two runs differ {start}, and are {apart}."
