@@ -178,6 +178,8 @@ def _isolation(kind: str, before: RunState, after: RunState) -> str:
         case "isolation_checked":
             first = after.isolations[-1].checks[-1].claims[0]
             return f"  fresh runs: the robot reaches its goal in {first.reached} of {first.runs}: {first.verdict}"
+        case "isolation_given_up":
+            return "the search for the nearest world that passes is given up; the reduction is as it was"
         case "isolation_finished":
             return of_passing(after, after.isolations[-1])
     return ""

@@ -51,6 +51,17 @@ def test_one_that_was_stopped_goes_on(run, started, monkeypatch, capsys):
     assert (done.returncode, done.stderr) == (2, f"ddenv: {run.path}: stopped by the user\n")
 
 
+def test_one_that_was_interrupted_can_be_given_up(run, started, monkeypatch, capsys):
+    fake_moments.isolating(run).write("engine_stopped", reason="stopped by the user")
+    done = in_process(monkeypatch, capsys, "isolate", run.path, "--give-up")
+    assert (done.returncode, started) == (0, [(run.path, 1, {"give_up": "yes"})])
+    run.write("isolation_given_up")
+    assert (run.state.status, run.state.certified) == ("finished", True)
+    again = in_process(monkeypatch, capsys, "isolate", run.path, "--give-up")
+    assert (again.returncode, again.stderr.count("\n"), len(started)) == (2, 1, 1)
+    assert "none to give up" in again.stderr
+
+
 def test_a_run_that_has_not_ended_is_refused_in_one_line(run, started, monkeypatch, capsys):
     run.created()
     said = in_process(monkeypatch, capsys, "isolate", run.path)

@@ -2,15 +2,17 @@
 
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 from zlib import crc32
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from ddenv.engine.ahead import LONGEST, Ahead
 from ddenv.engine.journal import Journal
 from ddenv.reduction.round import make_round
-from ddenv.reduction.rounds_ahead import Place
+from ddenv.reduction.rounds_ahead import Place, RoundsAhead
 from ddenv.runfile.state import AHEAD, BROKEN, FRESH
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import FakePool, drive, new_run
@@ -161,6 +163,30 @@ def test_the_next_test_of_the_search_never_waits_for_those_of_later_rounds(tmp_p
     first = [(one["phase"], one["candidate"], one["run"]) for one in begun]
     late = first.index(("round", 0, 12))
     assert late - first.index(("round", 0, 11)) <= 2 * workers
+
+
+def test_no_look_begins_a_step_that_would_take_too_long(tmp_path, monkeypatch):
+    """Commands wait for it."""
+    now, steps, looks = 0.0, 0, []
+    find, look = RoundsAhead._next, Ahead.likely
+
+    def found(*place):
+        nonlocal now, steps
+        now, steps = now + 0.7 * LONGEST, steps + 1
+        return find(*place)
+
+    def looked(*asked):
+        began = now
+        likely = look(*asked)
+        looks.append(now - began)
+        return likely
+
+    monkeypatch.setattr("ddenv.engine.ahead.time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(RoundsAhead, "_next", found)
+    monkeypatch.setattr(Ahead, "likely", looked)
+    drive(sliced_run(tmp_path, **METHODS[1]), FakePool(needs(*MODELS[3:5]), 16))
+    assert steps > 2
+    assert max(looks) <= LONGEST
 
 
 def test_candidates_that_are_judged_are_forgotten(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine.__main__ import _begin
+from ddenv.engine.__main__ import _begin, _give_up
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
@@ -33,7 +33,7 @@ def reduced(folder, oracle, **more):
     return path
 
 
-def work(path, pool, prepare=lambda _: None):
+def work(path, pool, prepare=lambda _: None, at_least=None):
     """Isolates as the engine program does, in this process."""
     with RunFile(path) as file:
         prepare(file)
@@ -43,7 +43,7 @@ def work(path, pool, prepare=lambda _: None):
         before = journal.state.reason
         _begin(journal, pool.jobs, None)
         control = Control(journal, threading.Event(), time.time())
-        isolate(world, journal, Bench(journal, pool, control), None, before)
+        isolate(world, journal, Bench(journal, pool, control), at_least, before)
         return journal.state
 
 
@@ -221,6 +221,57 @@ def test_a_finished_run_implies_tests_here_too(tmp_path):
         keep = frozenset(ELEMENTS).difference(state.removals[test.removal - 1].models)
         assert test.outcome == oracle(keep, test.seed)
     assert state.refuted is None
+
+
+def test_the_budget_of_the_reduction_does_not_end_it(tmp_path):
+    oracle = needs("wall", "beam")
+    path = reduced(tmp_path, oracle, budget=500)
+    with RunFile(path) as file:
+        budget = fold(file.events()).made
+        file.send("change", settings={"budget": budget + 1})
+    drive(path, FakePool(oracle, 1))
+    state = work(path, FakePool(oracle, 2))
+    assert (state.budget, state.status) == (budget + 1, "finished")
+    assert state.made > state.budget
+    assert removed(state) < {"wall", "beam"}
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """An isolation that was killed after some tests, and how the reduction had ended."""
+    oracle = any_of(frozenset({"wall", "beam"}), frozenset({"ball"}))
+    path = reduced(tmp_path, oracle)
+    with RunFile(path) as file:
+        before = fold(file.events())
+    with suppress(Killed):
+        work(path, FakePool(oracle, 2), lambda file: kill_after(file, 30))
+    with RunFile(path) as file:
+        assert fold(file.events()).isolating is not None
+    return path, before, oracle
+
+
+def test_one_that_is_given_up_leaves_the_run_as_it_was(interrupted):
+    path, before, oracle = interrupted
+    with RunFile(path) as file:
+        _give_up(file)
+        after = fold(file.events())
+    assert (after.isolating, after.isolated) == (None, None)
+    same = ("status", "reason", "minimal", "environment", "certificates", "nodes", "started_at")
+    assert [getattr(after, name) for name in same] == [getattr(before, name) for name in same]
+    # Another one finds its tests again.
+    pool = FakePool(oracle, 1)
+    state = work(path, pool)
+    assert len(removed(state)) == 2
+    assert len(pool.made) < sum(test.phase == ISOLATE for test in state.finished_tests)
+
+
+def test_another_number_of_fresh_runs_is_kept_where_one_was_interrupted(interrupted):
+    path, before, oracle = interrupted
+    state = work(path, FakePool(oracle, 2), at_least=30)
+    assert [one.at_least for one in state.isolations] == [FEWEST_RUNS, 30]
+    assert state.isolations[0].broken_off
+    assert state.isolated.checks[-1].claims[0].runs == 30
+    assert (state.status, state.reason) == (before.status, before.reason)
 
 
 def test_the_search_can_go_on_after_it(tmp_path):

@@ -24,12 +24,13 @@ from ddenv.errors import UserError, printable
     help="Run the world that passes at least so often with fresh seeds; at least 20 times if not given.",
 )
 @click.option("--again", is_flag=True, help="Search again, although the nearest world that passes is known.")
+@click.option("--give-up", is_flag=True, help="End a search that was interrupted; the run is as it was before.")
 @jobs_option()
 @cluster_option()
 @trust_option
 @json_option
 def isolate_command(
-    run: str, runs: int | None, again: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
+    run: str, runs: int | None, again: bool, give_up: bool, jobs: int, cluster: str | None, trust: bool, as_json: bool
 ) -> int:
     """Finds the nearest world that passes: as few models removed from the whole world of RUN (a name or a file) as it takes for the
     robot to reach its goal. It changes nothing else.
@@ -48,6 +49,11 @@ def isolate_command(
     allow_run(path, trust, cluster)
     with RunFile(path) as file, engine_lock(path):
         state = fold(file.events())
+    if give_up:
+        if state.isolating is None:
+            raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")
+        follow(path, start_engine(path, 1, give_up="yes"), sys.stderr if as_json else sys.stdout)
+        return 0
     if why := Isolate(again=True).refusal(Situation(state, "absent")):
         raise UserError(f"{path}: {why}: ddenv resume {path}")
     if state.isolated is None or state.isolating is not None or again or runs is not None:
@@ -56,7 +62,10 @@ def isolate_command(
             follow(path, start_engine(path, jobs, isolate=runs or 0, **where), sys.stderr if as_json else sys.stdout)
         except Interrupted as interrupted:
             if interrupted.state.isolating is not None or interrupted.state.isolated is None:
-                print(printable(f"interrupted; continue with: ddenv isolate {path}"), file=sys.stderr)
+                print(
+                    printable(f"interrupted; continue with: ddenv isolate {path}, or end it with --give-up"),
+                    file=sys.stderr,
+                )
                 return 130
     return _print(path, as_json)
 

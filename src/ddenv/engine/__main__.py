@@ -58,6 +58,7 @@ def main() -> int:
         type=int,
         help="find the nearest world that passes, with at least so many fresh runs of it; 0: as many as usual",
     )
+    parser.add_argument("--give-up", choices=("yes", "no"), default="no", help="end the isolation that is open")
     parser.add_argument("--after", type=int, help="the last command before it was asked to start")
     options = parser.parse_args()
     _say(ENGINE_STARTED)
@@ -66,7 +67,7 @@ def main() -> int:
         signal.signal(number, lambda *_: terminated.set())
     try:
         with RunFile(options.run) as file, engine_lock(options.run):
-            return _work(file, options, terminated)
+            return _give_up(file) if options.give_up == "yes" else _work(file, options, terminated)
     except UserError as error:
         _say(str(error))
         return 2
@@ -134,6 +135,15 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     finally:
         file.set_live([])
         file.settle()
+    return 0
+
+
+def _give_up(file: RunFile) -> int:
+    """Ends the isolation that is open."""
+    file.own()
+    journal = Journal(file)
+    if journal.state.isolating is not None:
+        journal.record("isolation_given_up")
     return 0
 
 

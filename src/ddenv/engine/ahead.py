@@ -24,7 +24,7 @@ from ddenv.runfile.state import AHEAD
 LEAST_WORTH = 0.04
 # The search may never come to a certificate; if it does, the whole world is run for it, whatever is left.
 COMES_TO_CERTIFICATE = 0.9
-# No look takes longer than this, s: tests end meanwhile.
+# No look takes longer than this, s: tests end meanwhile, and commands wait. One step of it, which finds a round, cannot be cut.
 LONGEST = 0.1
 
 Test = tuple[Keep, int]
@@ -114,7 +114,13 @@ class Ahead:
         branches = [_Branch(-1.0, next(numbers), lambda: here, now.judged, {})]
         if self._goes_on:
             self._add_fresh(found, COMES_TO_CERTIFICATE, only=self._journal.whole)
-        while branches and -branches[0].less >= LEAST_WORTH and time.monotonic() < until:
+        slowest, in_time = 0.0, True
+        while branches and -branches[0].less >= LEAST_WORTH:
+            began = time.monotonic()
+            # Of thousands of models a step takes a good part of that time.
+            if began + slowest > until:
+                in_time = False
+                break
             branch = heapq.heappop(branches)
             if found.enough(-branch.less):
                 break
@@ -123,8 +129,9 @@ class Ahead:
                 for after in self._follow(branch, place, now.number if place is here else None, found):
                     after.order = next(numbers)
                     heapq.heappush(branches, after)
+            slowest = max(slowest, time.monotonic() - began)
         best = list(islice((asked for asked in found.best() if self._needs_run(asked)), most))
-        if not best and time.monotonic() < until:
+        if not best and in_time:
             self._vain = self._journal.state.revision
         return best
 

@@ -28,7 +28,7 @@ from ddenv.errors import UserError
 from ddenv.reduction.verdict import standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import AHEAD, BROKEN, Trial
+from ddenv.runfile.state import AHEAD, BROKEN, ISOLATE, Trial
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.world.scenario import FailureSpec
 
@@ -159,7 +159,8 @@ class Bench:
         if source is not None and asked.phase != "audit" and not audit_is_due(journal.state, asked.phase):
             journal.imply(asked, source)
             return True
-        if self._is_spent() or not self._control.has_room():
+        # The budget is that of the reduction, which is over.
+        if (asked.phase != ISOLATE and self._is_spent()) or not self._control.has_room():
             return None
         test = journal.start_test(asked, source)
         self._started.add((asked.keep, asked.run, full))

@@ -45,10 +45,12 @@ Named = tuple[str | None, Keep, Claim]
 def isolate(world: World, journal: Journal, bench: Bench, at_least: int | None, before: str) -> None:
     """Finds the nearest world that passes, or goes on with that; the run is finished then as it was, because of `before`.
 
-    The end has `at_least` fresh runs, `FEWEST_RUNS` by default. Raises as `Bench.work`.
+    The end has `at_least` fresh runs, `FEWEST_RUNS` by default; another number than the open search has begins a new one, which
+    finds its tests again. Raises as `Bench.work`.
     """
-    if journal.state.isolating is None:
-        _begin(world, journal, at_least, before)
+    now = journal.state.isolating
+    if now is None or at_least not in (None, now.at_least):
+        _begin(world, journal, at_least, before if now is None else now.before)
     isolator = Isolator(journal, bench)
     found = isolator.found()
     bench.finish_trials()

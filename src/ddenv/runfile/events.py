@@ -49,6 +49,7 @@ The kinds of events with their data. Models are indices into the run's `elements
     removal_judged       removal, verdict (passes, fails or unknown), tests [ids]
     isolation_checked    removal, claims [{back (a model or null), verdict, reached, runs, low, high}], tests [ids]: fresh runs
     isolation_finished   removal (null if there is no such world)
+    isolation_given_up
     confirm_started      (format 4) the rounds are over; full runs of what is left follow
     paused / resumed
     room                 enough, needed, free (bytes): without enough room on the disk no tests are started

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ddenv.amounts import count
 from ddenv.runfile.events import Changes, Data, names, number, one_of, whole
+from ddenv.runfile.fold_isolation import without_open
 from ddenv.runfile.fold_rates import counted_again, same_runs, seen
 from ddenv.runfile.progress import Point
 from ddenv.runfile.state import Decision, Node, RunState, Test, Trial
@@ -233,9 +234,12 @@ def left_round(state: RunState) -> Changes:
     """The current search and its round are over."""
     last = state.certificates[-1:]
     past = (*state.certificates[:-1], *(replace(one, past=True) for one in last))
-    changes: Changes = {"confirming": False, "certificates": past, **waits_no_more(state)}
-    if state.isolating is not None:
-        changes["isolations"] = (*state.isolations[:-1], replace(state.isolating, broken_off=True))
+    changes: Changes = {
+        "confirming": False,
+        "certificates": past,
+        "isolations": without_open(state),
+        **waits_no_more(state),
+    }
     if state.round is not None and not state.round.done:
         changes["round"] = replace(state.round, done=True)
     return changes

@@ -27,7 +27,7 @@ def isolation_started(state: RunState, data: Data, _: float) -> Changes:
     sound = 0 < one.rather_than < one.wanted < 1 and one.error > 0 and one.first_run >= 0 and one.at_least >= 0
     if one.number != len(state.isolations) + 1 or not sound or state.baseline is None:
         raise ValueError(one.number)
-    return {"isolations": (*state.isolations, one)}
+    return {"isolations": (*without_open(state), one)}
 
 
 def removal_tried(state: RunState, data: Data, _: float) -> Changes:
@@ -57,14 +57,22 @@ def isolation_finished(state: RunState, data: Data, at: float) -> Changes:
     last, found = _open(state), data["removal"]
     if found is not None and (not last.checks or last.checks[-1].removal != found):
         raise ValueError(found)
-    return {
-        **_changed(state, replace(last, ended=True, found=found)),
-        **working.stopped(state, at),
-        # The reduction is as it was.
-        "status": "finished",
-        "reason": last.before,
-        "paused": False,
-    }
+    return {**_changed(state, replace(last, ended=True, found=found)), **_as_it_was(state, last, at)}
+
+
+def isolation_given_up(state: RunState, _: Data, at: float) -> Changes:
+    return {"isolations": without_open(state), **_as_it_was(state, _open(state), at)}
+
+
+def _as_it_was(state: RunState, last: Isolation, at: float) -> Changes:
+    """The reduction is as it was before the isolation."""
+    return {**working.stopped(state, at), "status": "finished", "reason": last.before, "paused": False}
+
+
+def without_open(state: RunState) -> tuple[Isolation, ...]:
+    """All isolations; the one that is under way, if there is one, is broken off."""
+    last = state.isolating
+    return state.isolations if last is None else (*state.isolations[:-1], replace(last, broken_off=True))
 
 
 HANDLERS = {
@@ -73,6 +81,7 @@ HANDLERS = {
     "removal_judged": removal_judged,
     "isolation_checked": isolation_checked,
     "isolation_finished": isolation_finished,
+    "isolation_given_up": isolation_given_up,
 }
 
 

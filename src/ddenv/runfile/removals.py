@@ -51,8 +51,8 @@ class Isolation:
     number of the first run with a fresh seed; each check has `block` of them. The `suspects` are removed first to last, at first
     `size` of them: what the reduction left. `before` is why the reduction had ended.
     `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
-    spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: a decision of the user
-    ended it.
+    spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
+    gave it up, or ended it by another decision.
     """
 
     number: int
