@@ -82,6 +82,19 @@ def test_the_runs_that_are_compared_have_one_seed_and_other_ends(found):
         assert (other.outcome, other.without) == ("pass", one.without)
 
 
+def test_runs_are_compared_also_where_f_is_what_happens_most(tmp_path):
+    run = fake_moments._rounds(fake_run.FakeRun(tmp_path / "one.ddenv"))
+    run.start_certificate()
+    run.certify_all(2, None, 6 * "s")
+    run.certify_all(2, "crate_00", "sspss")
+    run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "not shown", "sspss"))
+    with RunFile(run.path) as file:
+        state = fold(file.events())
+        one = reasons(file, state)[0]
+    assert one.ends[0].kind == F
+    assert state.tests[one.parting.without_test - 1].outcome == "pass"
+
+
 def test_trajectories_part_where_they_first_differ_by_more_than_a_tenth_of_a_metre():
     def way(*ys):
         return array("d", [value for number, y in enumerate(ys) for value in (0.1 * number, number, y, 0, 1, 0, 0, 0)])
