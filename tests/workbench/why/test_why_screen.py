@@ -170,14 +170,14 @@ async def test_a_key_finds_the_nearest_world_that_passes_and_stops_that(run, mon
         run.live((run.isolate(run.remove("crate_00", "crate_01"), 0), 0.5))
         await session.look()
         screen._look()
-        assert "finding the nearest world that passes: without 2 models" in words(screen, "#why-header")
+        assert words(screen, "#why-header").startswith(" finding the nearest world that passes: without 2 models ·")
         await session.press("i")
         assert session.asked() == [("stop", {})]
         run.write("engine_stopped", reason="stopped by the user")
         run.let_go()
         await session.look()
         screen._look()
-        assert "(stopped)" in words(screen, "#why-header")
+        assert "(stopped) · what is left" in words(screen, "#why-header")
         await session.press("i")
         assert len(started) == 2
 

@@ -22,7 +22,6 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import played
-from ddenv.words import isolating
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
@@ -178,7 +177,7 @@ class WhyScreen(Screen[None]):
     def _show_isolation(self, now: Look) -> None:
         """How far the search for the nearest world that passes is, and what its key does."""
         begun = now.state.isolating is not None
-        head = head_of(now.state) + (f" · {isolating(now.state)}{'' if now.works else ' (stopped)'}" if begun else "")
+        head = head_of(now.state, now.works)
         if head != self._head:
             self._head = head
             self.query_one("#why-header", Static).update(Text(f" {plain(head)}", no_wrap=True, overflow="ellipsis"))

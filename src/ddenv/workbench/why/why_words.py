@@ -9,6 +9,7 @@ from rich.text import Text
 from ddenv.claims import current, in_the_making, made_of_usual, rate
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
+from ddenv.words import isolating
 from ddenv.workbench.why.entries import NEAREST, Entry
 from ddenv.workbench.wording import CLAIM, percent, plain
 
@@ -48,12 +49,14 @@ def said(one: Entry, lacks: Sequence[str]) -> Text:
     return text
 
 
-def head_of(state: RunState) -> str:
-    """How often f shows in what is left, for the head of the screen."""
+def head_of(state: RunState, works: bool) -> str:
+    """How far the search for the nearest world that passes is, if one has begun, and how often f shows in what is left.
+
+    The first comes first: a narrow screen has no room for both.
+    """
     certificate = current(state)
-    if certificate is None:
-        return "Why it fails"
-    return f"Why it fails · what is left: {rate(certificate.claims[0])}"
+    title = "Why it fails" if state.isolating is None else isolating(state) + ("" if works else " (stopped)")
+    return title if certificate is None else f"{title} · what is left: {rate(certificate.claims[0])}"
 
 
 def nothing_yet(state: RunState, works: bool, run: str) -> str:
