@@ -9,7 +9,9 @@ import yaml
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
+from ddenv.runs.export import export_world
 from ddenv.runs.trust import check_trusted, program_of, trust, trust_own
+from ddenv.workbench.setup.save_scenario import save_scenario
 from ddenv.world.load import load_scenario
 from tests.conftest import DATA
 from tests.tiers import slow
@@ -91,6 +93,20 @@ def test_a_file_of_the_users_own_is_trusted_and_one_that_others_can_write_is_not
     check_trusted(load_scenario(path), path)
 
 
+def test_a_scenario_that_ddenv_wrote_of_a_run_is_asked_about(scenario, home):
+    run, written, saved = (home / "own" / name for name in ("mail.ddenv", "minimal.yaml", "saved.yaml"))
+    loaded = load_scenario(scenario(BRINGS["command"]))
+    create_run(loaded, run)
+    with RunFile(run) as file:
+        file.append("engine_started", {"pid": 1, "jobs": 1, "version": "0.1.0", "simulator": "none"})
+    export_world(run, written.with_suffix(".sdf"), written)
+    save_scenario(loaded, saved)
+    for path in (written, saved):
+        trust_own(load_scenario(path), path)
+        with pytest.raises(UserError, match="would start the command"):
+            check_trusted(load_scenario(path), path)
+
+
 @pytest.mark.parametrize("damage", ["{", "[1, {}]", '{"a": 1}', ""])
 def test_damaged_memory_trusts_nothing(scenario, home, damage):
     loaded = load_scenario(scenario(BRINGS["command"]))
@@ -104,6 +120,7 @@ COMMANDS = {
     "resume again": ["resume", "RUN", "--again"],
     "test": ["test", "RUN"],
     "certify": ["certify", "RUN"],
+    "isolate": ["isolate", "RUN"],
 }
 
 

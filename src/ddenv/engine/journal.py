@@ -14,7 +14,7 @@ from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.state import AHEAD, BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, ISOLATE, Round, RunState, Test
-from ddenv.runfile.store import ROBOT, Event, Motions, RunFile
+from ddenv.runfile.store import ROBOT, Event, Motions, RunFile, uncollected
 from ddenv.runfile.supports import stack_with
 
 # After these events the search starts again from what the user left.
@@ -86,7 +86,7 @@ class Journal:
         self._again: tuple[tuple[str, ...], ...] = ()
         # Of thousands of models, a set that is made anew takes a while to be found in the ledger.
         self._whole: tuple[tuple[str, ...], Keep] = (), frozenset()
-        for event in file.events():
+        for event in uncollected(file.events()):
             self._take(event)
 
     def record(self, kind: str, motions: Motions | None = None, **data: Any) -> None:

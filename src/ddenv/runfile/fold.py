@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 from ddenv.amounts import count
@@ -24,15 +25,12 @@ from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Forecast, Point
 from ddenv.runfile.state import REFUSED, Candidate, Node, Round, RunState, Split, Test, Trial
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Event, uncollected
 
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
     """The state after `events`, from the beginning or from an earlier `state`. Raises UserError for invalid events."""
-    state = state or RunState()
-    for event in events:
-        state = apply(state, event)
-    return state
+    return reduce(apply, uncollected(events), state or RunState())
 
 
 def apply(state: RunState, event: Event) -> RunState:

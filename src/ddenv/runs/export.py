@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import RESOURCE, read_parts
 from ddenv.runs.nearest import removed_in_passing
+from ddenv.runs.trust import scenario_text
 from ddenv.world.files.access import Missing, Unusable, write_file
 from ddenv.world.files.resolve import find
 from ddenv.world.files.resources import Stored
@@ -86,7 +85,7 @@ def export_world(run: Path, sdf: Path, scenario_file: Path | None, passes: bool 
     needed = (*_folders(scenario, asked, robot, stored), *_packages(scenario.robot.model, robot))
     model_path = (*scenario.reading.model_path, *needed)
     data["reading"]["model_path"] = list(dict.fromkeys(_name(each, folder) for each in model_path))
-    write_file(scenario_file, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+    write_file(scenario_file, scenario_text(data, scenario))
     return Exported([sdf, model, scenario_file], needs)
 
 

@@ -12,10 +12,13 @@ import json
 import os
 import shlex
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from ddenv.errors import UserError
 from ddenv.runs.clusters import HERE
@@ -24,6 +27,8 @@ from ddenv.world.command import start_folder
 from ddenv.world.scenario import Scenario
 
 FILE = "trusted.json"
+# Begins a scenario's file that ddenv wrote: it may be of a run that somebody sent, whose program nobody here has chosen.
+WRITTEN = "# Written by ddenv; a program that it starts is asked about.\n"
 # Maximum number of files of one program that are looked at.
 MOST_FILES = 1000
 
@@ -128,10 +133,16 @@ def is_own(path: Path) -> bool:
 
 
 def trust_own(scenario: Scenario, path: Path) -> None:
-    """Trusts what a scenario starts whose file the user named, and owns."""
+    """Trusts what a scenario starts whose file the user named, owns, and has not from ddenv."""
     program = program_of(scenario)
-    if program is not None and is_own(path):
+    if program is not None and is_own(path) and not path.read_bytes().startswith(WRITTEN.encode()):
         trust(program)
+
+
+def scenario_text(data: Mapping[str, Any], scenario: Scenario) -> bytes:
+    """The file of `scenario`, with `data` in it, as ddenv writes it."""
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    return (text if program_of(scenario) is None else WRITTEN + text).encode()
 
 
 def trust_cluster(scenario: Scenario) -> None:

@@ -50,8 +50,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
 
     Files in the folder of `path` are named relative to it, so that the folder can be moved.
     """
-    import yaml
-
+    from ddenv.runs.trust import scenario_text
     from ddenv.world.files.access import write_file
 
     for each in (scenario.world, scenario.robot.model):
@@ -68,7 +67,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
         del data["folder"]
     else:
         data["folder"] = _name(scenario.folder, folder)
-    write_file(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+    write_file(path, scenario_text(data, scenario))
 
 
 def _name(path: Path, folder: Path) -> str:
