@@ -100,6 +100,14 @@ def test_a_model_that_takes_no_part_leaves_no_trace_when_it_is_removed(template,
     assert bits(run(template(*near, *far[1:]), *names - {"far"})) == bits(without)
 
 
+def test_what_moves_far_away_does_not_decide_whether_the_robot_wakes_what_it_passes(template):
+    """What touches itself has no twin, and wakes before the robot can touch it."""
+    links = (link_of(name, Box((0.3, 0.3, 0.3)), Pose((1.2, 0.55, z))) for name, z in (("a", 0.15), ("b", 0.46)))
+    near = replace(model_of("near", *links), self_collide=True)
+    both = template(near, *FAR["swinging"], failure={"timeout": 3.0})
+    assert bits(run(both, "near", "far"), "far") == bits(run(both, "near"))
+
+
 def test_what_fell_to_rest_does_not_creep_at_all(template):
     pile = template(cube("low", 1.0, 3.0, 0.2), cube("high", 1.0, 3.1, 0.6), failure={"timeout": 10.0})
     motions = run(pile, "low", "high").motions

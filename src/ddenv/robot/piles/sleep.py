@@ -228,7 +228,8 @@ class Sleep:
         slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
         speed = np.maximum.reduceat(self._motion.speed, self._links.first)
         near, close = self._near(speed)
-        if not (near.any() or self._awake.any() or (self._played >= 0).any() or self._due.any()):
+        moves = self._awake | (self._played >= 0) | self._due
+        if not (near | close | moves).any():
             return
         now = self._situation(speed, slow, close)
         self._took_part |= near | now.reached
