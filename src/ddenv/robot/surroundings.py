@@ -46,7 +46,7 @@ class Surroundings:
     @classmethod
     def of(cls, boxes: Sequence[Still], robot: Model, built: Built) -> Surroundings:
         geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
-        geometry += [(name, tuple(part.geometry for part in parts)) for name, parts in built.twins.items()]
+        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
         return cls(
             contacts=built.plant.get_contact_results_output_port(),
             robot=frozenset(one.get_value() for one in built.robot.geometry),

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddenv.robot.drake.plant import MANY
 from ddenv.robot.drake.template import FALL, Template
 from ddenv.robot.piles import rehearsal
 from ddenv.robot.result import RunResult
@@ -38,6 +39,18 @@ def flap(name: str, x: float, y: float, lower: float = -0.3, damping: float = 0.
     return model_of(name, plate, joints=(hinge,))
 
 
+def tile(name: str, x: float, y: float, mass: float = 20.0) -> Model:
+    """A plate of many boxes side by side, 0.9 m wide and 0.2 m high."""
+    link = link_of("link", Box((0.3, 0.3, 0.2)), Pose((x, y, 0.1)), mass)
+    shapes = [
+        replace(link.collisions[0], pose=Pose((x + 0.3 * column, y + 0.3 * row, 0.1)))
+        for column in (-1, 0, 1)
+        for row in (-1, 0, 1)
+    ]
+    assert len(shapes) > MANY
+    return model_of(name, replace(link, collisions=tuple(shapes)))
+
+
 def slope(name: str, x: float, y: float) -> Model:
     """A static ramp that rises along x, 0.3 m in 1 m."""
     return model_of(name, link_of("link", wedge(1.0, 1.0, 0.3), Pose((x, y, 0.15)), mass=None))
@@ -56,6 +69,7 @@ FAR = {
             link_of("b", Sphere(0.2), Pose((2.0, 7.0, 0.5))),
         ),
     ),
+    "of many shapes": (tile("far", 2.0, 6.0),),
     "out of the world": (cube("far", 2.0, 6.0, -3.0),),
     "colliding with itself": (
         model_of(
@@ -137,6 +151,17 @@ def test_the_robot_pushes_what_was_asleep_as_if_it_had_been_awake(template):
     assert slept.motions["crate"][-1, 1] > 3.0
     assert slept.trajectory[:, 1:4] == pytest.approx(awake.trajectory[:, 1:4], abs=0.01)
     assert slept.motions["crate"][:, 1:4] == pytest.approx(awake.motions["crate"][:, 1:4], abs=0.03)
+
+
+def test_models_of_many_and_of_few_shapes_rest_on_each_other_and_are_pushed(template):
+    # At rest the cube lies a little within the tile. Drake must not look for contacts of one twin with another.
+    pile = template(tile("tile", 2.0, 0.0), cube("cube", 2.0, 0.0, 0.349), tile("beside", 2.0, 0.905))
+    slept = run(pile, "tile", "cube", "beside")
+    pile._sleeping = False
+    awake = run(pile, "tile", "cube", "beside")
+    assert slept.motions["tile"][-1, 1] > 2.5
+    for name in ("tile", "cube"):
+        assert slept.motions[name][:, 1:4] == pytest.approx(awake.motions[name][:, 1:4], abs=0.05)
 
 
 def test_a_pile_wakes_as_one(template):

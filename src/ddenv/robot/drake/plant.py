@@ -6,15 +6,23 @@ There is no visual geometry: nobody looks at a worker.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import cast
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    ModelInstanceIndex,
+    PdControllerGains,
+    RigidBody,
+    SpatialInertia,
+    WeldJoint,
+)
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from ddenv.robot.drake.articulation import add_joint, anchored, spatial_inertia, to_drake, transform
@@ -34,12 +42,16 @@ from ddenv.world.scenario import Simulation
 
 # Where the twins of models wait that are not at rest: this deep, and this far from each other, m. Shapes in one place would make
 # Drake's search for contacts slow.
-DEEP, APART = -1e5, 1e3
+DEEP, DEEPER, APART = -1e5, -2e5, 1e3
+
+
+# A model with more shapes than this has a twin with bodies of its own, see `Twin`.
+MANY = 8
 
 
 @dataclass(frozen=True)
 class Part:
-    """A collision shape of a twin: of the link with the number `link`, at `pose` in that link's frame.
+    """A collision shape of a twin on the world's body, at `pose` in the frame of the model's link with the number `link`.
 
     While it is not needed it waits at `away` in the world.
     """
@@ -49,6 +61,27 @@ class Part:
     shape: Shape
     pose: RigidTransform
     away: RigidTransform
+
+
+@dataclass(frozen=True)
+class Place:
+    """The frame that a link's twin is welded to. While the twin is not needed the frame waits at `away` in the world."""
+
+    frame: FixedOffsetFrame
+    away: RigidTransform
+
+
+@dataclass(frozen=True)
+class Twin:
+    """What stands for a model where it lies at rest: `parts`, or where it has many shapes `places` with a body for each link.
+
+    `geometry` are its shapes. To move a shape of the world takes Drake longer the more shapes the plant has: half a millisecond in
+    a world of boards, 12 ms among 3,200. To move a frame takes it microseconds, but each body costs 14 us in every step.
+    """
+
+    geometry: tuple[GeometryId, ...]
+    parts: tuple[Part, ...] = ()
+    places: tuple[Place, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,8 +111,7 @@ class Built:
     """The plant of a world.
 
     `static` is the geometry that never moves, by model: that of static models, and of links of dynamic models that are fixed to the
-    world. `moving` are the dynamic models in the order of the world file; `twins` are the shapes that stand for those of them that
-    float where they lie at rest.
+    world. `moving` are the dynamic models in the order of the world file; `twins` stand for those of them that float.
     """
 
     diagram: Diagram
@@ -88,7 +120,7 @@ class Built:
     robot: Body
     static: dict[str, tuple[GeometryId, ...]]
     moving: dict[str, Body]
-    twins: dict[str, tuple[Part, ...]]
+    twins: dict[str, Twin]
 
 
 def build(world: World, robot: Model, drive: Drive, simulation: Simulation, motor_gain: float) -> Built:
@@ -118,9 +150,7 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
         if not model.static and model.links
     }
     twins = {
-        model.name: tuple(_twin(plant, model, wheels))
-        for model in world.models
-        if model.name in moving and _floats(model)
+        model.name: _twin(plant, model, wheels) for model in world.models if model.name in moving and _floats(model)
     }
     filters = scene_graph.collision_filter_manager()
     for body in moving.values():
@@ -136,16 +166,39 @@ def _floats(model: Model) -> bool:
     return not model.self_collide and not any("world" in (joint.parent, joint.child) for joint in model.joints)
 
 
-def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Iterator[Part]:
-    for number, link in enumerate(model.links):
-        for collision in link.collisions:
-            # Without corners: each shape that is put somewhere costs Drake half a millisecond.
-            for shape, pose in drake_shapes(collision):
-                name = str(plant.num_collision_geometries())
-                properties = surface(world_friction(collision.mu, wheels))
-                away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
-                geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
-                yield Part(geometry, number, shape, transform(link.pose.inverse() @ pose), away)
+def _twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
+    # Without corners: the model rests on nothing while its twin stands for it.
+    shapes = [
+        (number, link, collision.mu, *one)
+        for number, link in enumerate(model.links)
+        for collision in link.collisions
+        for one in drake_shapes(collision)
+    ]
+    if len(shapes) > MANY:
+        return _welded_twin(plant, model, wheels)
+    parts: list[Part] = []
+    for number, link, mu, shape, pose in shapes:
+        name = str(plant.num_collision_geometries())
+        away = RigidTransform(to_drake(np.array([APART * plant.num_collision_geometries(), 0.0, DEEP])))
+        properties = surface(world_friction(mu, wheels))
+        geometry = plant.RegisterCollisionGeometry(plant.world_body(), away, shape, name, properties)
+        parts.append(Part(geometry, number, shape, transform(link.pose.inverse() @ pose), away))
+    return Twin(tuple(part.geometry for part in parts), parts=tuple(parts))
+
+
+def _welded_twin(plant: MultibodyPlant, model: Model, wheels: float) -> Twin:
+    instance = plant.AddModelInstance(f"twin/{model.name}")
+    geometry: list[GeometryId] = []
+    places: list[Place] = []
+    for link in model.links:
+        away = RigidTransform(to_drake(np.array([APART * plant.num_bodies(), 0.0, DEEPER])))
+        loose = FixedOffsetFrame(f"at/{link.name}", plant.world_frame(), away, instance)
+        frame = cast(FixedOffsetFrame, plant.AddFrame(loose))
+        body = plant.AddRigidBody(link.name, instance, SpatialInertia.Zero())
+        plant.AddJoint(WeldJoint(f"weld/{link.name}", frame, body.body_frame(), RigidTransform()))
+        geometry += _register(plant, body, link.pose.inverse(), [link], wheels, corners=False)
+        places.append(Place(frame, away))
+    return Twin(tuple(geometry), places=tuple(places))
 
 
 def _own_pairs(

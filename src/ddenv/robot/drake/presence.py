@@ -27,7 +27,7 @@ class Presence:
         # What has a twin waits away from everything while it is not simulated, and needs no filter.
         self._free = [body.geometry for body in built.moving.values() if body.name in built.twins]
         self._movers = _set([built.robot.geometry, *self._free])
-        self._free += [tuple(part.geometry for part in parts) for parts in built.twins.values()]
+        self._free += [twin.geometry for twin in built.twins.values()]
         self._removed: frozenset[str] = frozenset()
         self._kept = built.static
         self._all_kept: GeometrySet | None = None

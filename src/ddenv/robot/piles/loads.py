@@ -14,6 +14,8 @@ from ddenv.robot.drake.run_context import RunContext
 
 # A model at rest bears a change of its load up to this many times its own weight: it also carries others.
 BEARS = 3.0
+# One that a change of its load woke, and that came to rest again where it had lain, bears this many times that change.
+BORE = 1.5
 # A support carries if it takes this part of the model's weight; the model wakes when half of that is gone.
 CARRIES = 0.1
 LOST = 0.5
@@ -32,11 +34,18 @@ class Loads:
         movers = [*(body.geometry for body in models), built.robot.geometry]
         self._mover = {shape: number for number, shapes in enumerate(movers) for shape in shapes}
         self._twin = {
-            part.geometry: number for number, body in enumerate(models) for part in built.twins.get(body.name, ())
+            shape: number
+            for number, body in enumerate(models)
+            if body.name in built.twins
+            for shape in built.twins[body.name].geometry
         }
         self._weights = GRAVITY * np.array([sum(link.default_mass() for link in body.links) for body in models])
         down = cast(Floats, built.plant.gravity_field().gravity_vector())
         self._up = -down / max(float(np.linalg.norm(down)), 1e-9)
+        self._bears = BEARS * self._weights
+        # How much its load had changed when a model woke last, N; 0 if something else woke it.
+        self._change = np.zeros(count)
+        self._woken_by = np.zeros(count)
         self._known: Booleans = np.zeros((count, count + 1), dtype=bool)
         self._at_rest = np.zeros((count, count + 1, 3))
         self._mean = np.zeros((count, count + 1, 3))
@@ -56,8 +65,17 @@ class Loads:
         change = np.where(self._known[..., None], self._mean - self._at_rest, 0.0).sum(axis=1)
         before, now = self._at_rest @ self._up, self._mean @ self._up
         lost = self._known & (before > CARRIES * self._weights[:, None]) & (now < LOST * before)
-        woken: Booleans = (np.linalg.norm(change, axis=1) > BEARS * self._weights) | lost.any(axis=1)
+        self._change = np.linalg.norm(change, axis=1)
+        woken: Booleans = (self._change > self._bears) | lost.any(axis=1)
         return woken
+
+    def woke(self, models: Booleans, pressed: Booleans) -> None:
+        """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of their load."""
+        self._woken_by[models] = np.where(pressed, self._change, 0.0)[models]
+
+    def bore(self, models: Booleans) -> None:
+        """Takes in that `models` (M,) came to rest where they lay before they woke."""
+        self._bears[models] = np.maximum(self._bears, BORE * self._woken_by)[models]
 
     def _forces(self) -> Floats:
         """The force (M, M + 1, 3) on each model at rest from each moving one, N in the world frame."""

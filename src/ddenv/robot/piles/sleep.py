@@ -99,6 +99,8 @@ class Sleep:
         self._pace = np.zeros(len(self._links.bodies))
         self._took_part: Booleans = np.zeros(count, dtype=bool)
         self._stillness = Stillness(self._links)
+        # Where models were when they woke last.
+        self._when_woken = Stillness(self._links)
         self._loads = Loads(context, kept)
         # Where the robot was (M, 12) when each model last woke, or was awake, beside it, m.
         self._robot_was = np.full((count, 12), np.inf)
@@ -238,6 +240,7 @@ class Sleep:
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
         start: Booleans = ~self._awake & (now.close | now.met | self._due | (pressed & self._settled))
         if start.any():
+            self._loads.woke(start, pressed)
             # What has no twin cannot stay asleep beside what wakes.
             joined = now.together | (now.touching & ~self._has_twin[:, None])
             self._wake(spread(start, joined) & ~self._awake & ~self._gone)
@@ -314,11 +317,13 @@ class Sleep:
         self._took_part |= models
         self._due &= ~models
         self._stillness.restart(models, self._motion)
+        self._when_woken.restart(models, self._motion)
 
     def _lay(self, models: Booleans) -> None:
         """Holds `models` (M,), which are awake, where they are now."""
         if not models.any():
             return
+        self._loads.bore(models & ~self._when_woken.moved(self._motion))
         numbers = np.flatnonzero(models)
         entries = np.concatenate([self._entries[number] for number in numbers])
         self._real[entries] = self._hold.state()[entries]

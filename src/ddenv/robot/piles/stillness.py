@@ -22,11 +22,15 @@ class Stillness:
 
     def look(self, motion: Motion, seconds: float) -> None:
         """Takes in where all links are, `seconds` after the last time."""
+        self._calm += seconds
+        self.restart(self.moved(motion), motion)
+
+    def moved(self, motion: Motion) -> Booleans:
+        """Which models (M,) have moved since their time was last counted anew."""
         way = np.linalg.norm(motion.places - self._places, axis=1)
         turn = np.linalg.norm(motion.turns - self._turns, axis=(1, 2)) / np.sqrt(2.0)
-        moved = np.maximum.reduceat(way + turn * self._links.reach, self._links.first) > SLOW * CALM
-        self._calm += seconds
-        self.restart(moved, motion)
+        moved: Booleans = np.maximum.reduceat(way + turn * self._links.reach, self._links.first) > SLOW * CALM
+        return moved
 
     def restart(self, models: Booleans, motion: Motion) -> None:
         """Counts the time of `models` (M,) from now on."""
