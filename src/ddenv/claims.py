@@ -218,7 +218,8 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
     """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    return certificate_tests(now.rate, now.keep_rate, left, now.at_least)
+    seen = 0 if state.baseline is None else state.baseline.runs
+    return certificate_tests(now.rate, now.keep_rate, left, now.at_least, seen)
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:

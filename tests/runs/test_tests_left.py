@@ -55,8 +55,9 @@ def test_tiny_worlds_take_few_tests(models, algorithm):
     assert 0 <= low <= likely <= high < 60
 
 
-def certified(rate, keep_rate, left, at_least, random):
+def certified(rate, keep_rate, left, at_least, random, believed=None):
     """The tests of a certificate of so many needed models that keep the whole world's rate, as the engine makes it."""
+    believed = rate if believed is None else believed
     whole, end = frozenset("whole"), frozenset("end")
     shown = {}
 
@@ -64,9 +65,9 @@ def certified(rate, keep_rate, left, at_least, random):
         return shown.setdefault((subject, number), subject in (whole, end) and random.random() < rate)
 
     error = error_of(1) / 2
-    settle(keeps(end, whole, Terms(keep_rate, rate, error, at_least)), show)
+    settle(keeps(end, whole, Terms(keep_rate, believed, error, at_least)), show)
     for model in range(left):
-        terms = Terms(keep_rate, rate, error / left, at_least)
+        terms = Terms(keep_rate, believed, error / left, at_least)
         settle(falls(frozenset([str(model)]), whole, terms), show)
     return len(shown)
 
@@ -82,11 +83,30 @@ def test_the_tests_of_a_certificate_are_those_that_the_engine_makes(rate, keep_r
     assert low < likely < high
 
 
+@pytest.mark.parametrize("runs", [4, 10])
+def test_a_rate_that_few_runs_showed_may_be_another_one(runs):
+    random, inside = Random(2), []
+    for _ in range(60):
+        rate = random.uniform(0.5, 1.0)
+        believed = (sum(random.random() < rate for _ in range(runs)) + 0.5) / (runs + 1)
+        low, likely, high = certificate_tests(believed, 0.8, 3, runs, runs)
+        inside.append(low <= certified(rate, 0.8, 3, runs, random, believed) <= high)
+        assert (
+            low
+            <= certificate_tests(believed, 0.8, 3, runs)[0]
+            < likely
+            < certificate_tests(believed, 0.8, 3, runs)[2]
+            <= high
+        )
+    assert sum(inside) >= 48
+
+
 @pytest.mark.parametrize("keep_rate", [0.0, 1.0])
 @pytest.mark.parametrize("left", [0, 3])
 def test_terms_that_make_no_sense_have_a_number_too(keep_rate, left):
-    low, likely, high = certificate_tests(1.0, keep_rate, left, 0)
-    assert 0 <= low <= likely <= high
+    for seen in (-1, 0, 1, 10**400):
+        low, likely, high = certificate_tests(1.0, keep_rate, left, 0, seen)
+        assert 0 <= low <= likely <= high
 
 
 def test_a_rough_run_has_its_certificate():
@@ -109,7 +129,7 @@ def test_each_test_leaves_one_less(run):
 
 
 # After three of four baseline runs with f.
-CERTIFICATE = certificate_tests(3.5 / 5, 0.8, 3, 4)
+CERTIFICATE = certificate_tests(3.5 / 5, 0.8, 3, 4, 4)
 
 
 def test_the_certificate_is_left_after_the_search(run):
@@ -122,7 +142,7 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
     fake_moments.mid_round(run)
     terms = {"rate": 0.99, "keep_rate": 0.8, "error": 0.03, "at_least": 4}
     run.write("certificate_started", certificate=1, run=10_000, **terms)
-    low, likely, high = certificate_tests(0.99, 0.8, 6, 4)
+    low, likely, high = certificate_tests(0.99, 0.8, 6, 4, 4)
     assert left(run).tests == (low, likely, high)
 
     def make(number):

@@ -73,7 +73,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
-    certificate = certificate_tests(rate, _keep_rate(state), left, baseline.runs)
+    certificate = certificate_tests(rate, _keep_rate(state), left, baseline.runs, baseline.runs)
     search = (max(0, each - done) for each in (forecast.low, forecast.likely, forecast.high))
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
@@ -133,7 +133,9 @@ def rough_run(models: int, asked: Reduction, rate: float | None = None) -> Rough
     runs = runs if asked.accept_rate == "first" else min(runs, FEWEST_MISSES)
     search = rough_tests(models, asked.algorithm, runs, asked.growth == "paper")
     low, likely, high = (asked.baseline_runs + each for each in search)
+    # Assumed without a word of earlier runs, the rate is taken as it is.
+    seen = asked.baseline_runs
     if rate is None:
-        rate = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1)
-    certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs)
+        rate, seen = (asked.baseline_runs + 0.5) / (asked.baseline_runs + 1), 0
+    certificate = certificate_tests(rate, asked.keep_rate, min(models, SURVIVORS), asked.baseline_runs, seen)
     return Rough((low, likely, high), certificate)
