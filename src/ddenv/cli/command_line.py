@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+from difflib import get_close_matches
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,15 @@ def _help_of(error: click.ClickException) -> str:
     return f"{'ddenv' if context is None else context.command_path} --help"
 
 
+def _said(error: click.ClickException) -> str:
+    """What is wrong, with options that are really like a mistyped one: their dashes alone make short ones alike."""
+    if isinstance(error, click.NoSuchOption) and error.possibilities:
+        word = error.option_name.lstrip("-")
+        like = [each for each in error.possibilities if get_close_matches(word, [each.lstrip("-")])]
+        error = click.NoSuchOption(error.option_name, possibilities=like)
+    return error.format_message().rstrip(".")
+
+
 def main() -> None:
     # A terminal without a letter of a model's name shows its code instead.
     for stream in (sys.stdout, sys.stderr):
@@ -162,7 +172,7 @@ def _told(error: Exception, all_of_it: bool) -> int:
     elif isinstance(error, click.exceptions.NoArgsIsHelpError):
         print(error.format_message(), file=sys.stderr)
     elif isinstance(error, click.ClickException):
-        print(printable(f"ddenv: {error.format_message().rstrip('.')}; see '{_help_of(error)}'"), file=sys.stderr)
+        print(printable(f"ddenv: {_said(error)}; see '{_help_of(error)}'"), file=sys.stderr)
     elif isinstance(error, OSError) and (isinstance(error, BrokenPipeError) or error.filename is None):
         return _cannot_print(error)
     elif all_of_it:

@@ -168,7 +168,8 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
     if spawn is None or goal is None:
         # A file that is no world needs no places either.
         read_world(Path(name), reading_of(**reading), announce)
-        raise UserError(f"{name}: an SDF world needs --spawn x,y,z,yaw and --goal x,y")
+        example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
+        raise UserError(f"{name}: an SDF world needs a start and a goal, such as {example}")
     if world is not None:
         raise UserError(f"--world: only for a scenario; {name} is a world")
     scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)

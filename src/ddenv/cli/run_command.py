@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def run_command(
     scenario: str, name: str | None, output: Path | None, jobs: int, trust: bool, as_json: bool, **options: Any
 ) -> int:
-    """Reduces SCENARIO (a bundled name, a YAML file or an SDF world) without a screen."""
+    """Reduces SCENARIO (ditch, rubble, friction, a YAML file or an SDF world) without a screen."""
     from ddenv.cli.export_command import announce_needs
     from ddenv.cli.follow import follow_to_summary
     from ddenv.cli.trusting import allow_named

@@ -17,13 +17,14 @@ from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed
 from ddenv.runs.export import export_world
+from ddenv.runs.folder import BUNDLED_RUN
 from ddenv.runs.reasons import sentence
 from ddenv.version import __version__, how_to_install
 from ddenv.words import count
 from ddenv.world.files.access import write_file
 
 RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
-    "run.ddenv",
+    BUNDLED_RUN,
     "world.sdf",
     "scenario.yaml",
     "report.html",

@@ -13,6 +13,8 @@ import platformdirs
 from ddenv.errors import UserError
 
 SUFFIX = ".ddenv"
+# The run in the folder of a bundle.
+BUNDLED_RUN = f"run{SUFFIX}"
 # Maximum length of a run's name, bytes: leaves room for a number and for the suffixes of the files beside it.
 LONGEST_STEM = 180
 
@@ -24,11 +26,13 @@ def runs_folder() -> Path:
 
 
 def find_run(name: str) -> Path:
-    """The run file called `name`, a path or a name in the runs folder."""
+    """The run file called `name`: a path, a name in the runs folder, or the folder of a bundle."""
     path = Path(name)
-    if path.is_file() or len(path.parts) > 1:
+    if path.is_file():
         return path
-    return runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
+    stored = path if len(path.parts) > 1 else runs_folder() / f"{name.removesuffix(SUFFIX)}{SUFFIX}"
+    bundled = path / BUNDLED_RUN
+    return bundled if not stored.is_file() and bundled.is_file() else stored
 
 
 def dropped_run(text: str) -> Path | None:
