@@ -236,7 +236,7 @@ def test_settings_that_one_run_lacks_differ():
     ]
 
 
-@pytest.mark.parametrize("how", ["typed", "pasted", "quoted", "url"])
+@pytest.mark.parametrize("how", ["typed", "completed", "pasted", "quoted", "url"])
 async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
     folder = tmp_path / "from a robot"
     folder.mkdir()
@@ -248,6 +248,10 @@ async def test_a_run_of_elsewhere_is_opened_by_its_path(run, tmp_path, how):
             await listed.press("o")
             listed.app.screen.query_one("#path", Input).value = text
             await listed.press("enter")
+        elif how == "completed":
+            await listed.press("o")
+            listed.app.screen.query_one("#path", Input).value = f"{folder}/f"
+            await listed.press("end", "tab", "enter")
         else:
             listed.app.post_message(events.Paste("no run at all"))
             listed.app.post_message(events.Paste(text))
@@ -272,6 +276,8 @@ async def test_slash_filters_and_escape_goes_back(several):
         assert listed.app.focused is listed.table
         await listed.press("escape")
         assert len(listed.rows()) == 5 and listed.app.screen.query_one("#filter", Input).value == ""
+        await listed.press("slash", "enter")
+        assert not listed.app.screen.query_one("#filter").display and listed.app.focused is listed.table
         await listed.press("escape")
         assert isinstance(listed.app.screen, RunScreen)
 

@@ -21,6 +21,7 @@ from ddenv.workbench.messages import ShowRun, ShowSetup
 from ddenv.workbench.runs.deleted_runs import bring_back, delete_run
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
+from ddenv.workbench.widgets.path_entry import PathEntry
 from ddenv.workbench.wording import count, plain, shorten
 
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
@@ -80,7 +81,7 @@ class RunsScreen(Screen[None]):
                 yield RunTable(id="table")
                 yield Static("reading ...", id="empty", markup=False)
                 yield Input(placeholder="a part of name, scenario, method or state", id="filter", compact=True)
-                yield Input(placeholder="path of a run file (.ddenv)", id="path", compact=True)
+                yield PathEntry(placeholder="path of a run file (.ddenv); tab completes", id="path")
             with VerticalScroll(id="preview", classes="panel", can_focus=False) as panel:
                 panel.border_title = "This run"
                 yield Static("", id="about", markup=False)
@@ -283,7 +284,8 @@ class RunsScreen(Screen[None]):
         self._list()
 
     @on(Input.Submitted, "#filter")
-    def _taken(self) -> None:
+    def _taken(self, event: Input.Submitted) -> None:
+        self.set_class(bool(event.value), "-filtering")
         self.query_one(RunTable).focus()
 
     def action_back(self) -> None:
