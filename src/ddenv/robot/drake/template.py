@@ -196,7 +196,8 @@ class Template:
     def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
         """The moving models `kept` at their start, in a world that keeps the models `present`, and what moves otherwise there."""
         piles = self._rehearsals.piles(kept, present) if self._sleeping else []
-        unusual = self._repertoire.unusual(piles, present)
+        held = frozenset(self._context.built.moving) - set(self._context.built.twins)
+        unusual = self._repertoire.unusual(piles, present, held)
         scripts = [known.script for known in piles if known.script is not None]
         self._context.diagram_context.SetTime(0.0)
         sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)

@@ -85,13 +85,18 @@ class Repertoire:
         """Whether it knows the piles of the whole world."""
         return self._usual is not None
 
-    def unusual(self, piles: Iterable[Known], present: frozenset[str]) -> frozenset[str]:
+    def unusual(self, piles: Iterable[Known], present: frozenset[str], held: frozenset[str]) -> frozenset[str]:
         """The models of those among `piles` that do not move as in the whole world, and the static ones near them.
 
-        `present` are the models that are kept.
+        `present` are the models that are kept. A pile with one of `held`, which have no twin, counts as well: where such a door was
+        played back while it lay against a falling pile, the robot's last bits were not those without the pile. Why is not known.
         """
         usual = self._usual or {}
-        other = (known for known in piles if not usual.get(known.names, known.near | {""}) <= present)
+        other = (
+            known
+            for known in piles
+            if not usual.get(known.names, known.near | {""}) <= present or not held.isdisjoint(known.names)
+        )
         return frozenset(name for known in other for name in (*known.names, *(known.near & present)))
 
     def find(self, names: tuple[str, ...], present: frozenset[str]) -> Known | None:
