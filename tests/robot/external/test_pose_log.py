@@ -50,7 +50,7 @@ def test_progress_gets_what_is_kept():
     reported = []
     log = PoseLog(lambda *row: reported.append(row))
     log.add(ROW.encode() + b"1.01,9,9,9,0,0,0,1\n1.1,2,3,5,0,0,0,1\n1.2,2,")
-    assert reported == [(1, (2, 3, 4, 1, 0, 0, 0)), (1.1, (2, 3, 5, 1, 0, 0, 0))]
+    assert reported == [(1, (2, 3, 4, 1, 0, 0, 0), {}), (1.1, (2, 3, 5, 1, 0, 0, 0), {})]
 
 
 @pytest.mark.parametrize(
