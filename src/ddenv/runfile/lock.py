@@ -6,7 +6,7 @@ import os
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ddenv.errors import UserError
@@ -19,6 +19,9 @@ except ImportError:
 
 # The mode of a file that only its owner may read.
 OWN = 0o600
+PROC = Path("/proc")
+# More than any number of a process has.
+_DIGITS = 20
 
 
 def _lock_path(run: Path) -> Path:
@@ -47,7 +50,10 @@ def mode_beside(run: Path) -> int:
 
 @contextmanager
 def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) -> Iterator[None]:
-    """Holds the file `lock`. Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked."""
+    """Holds the file `lock`, with the number of this process in it.
+
+    Raises UserError: `taken` if another process holds it, `refused` if it cannot be made or locked.
+    """
     if fcntl is None:
         raise UserError(f"{refused}: this system has no file locks; use Linux or macOS, or WSL on Windows")
     try:
@@ -70,6 +76,10 @@ def held(lock: Path, taken: str, refused: str, instead: str, mode: int = OWN) ->
         os.close(handle)
         raise
     try:
+        # A full disk may have no room for it.
+        with suppress(OSError):
+            os.truncate(handle, 0)
+            os.write(handle, str(os.getpid()).encode())
         yield
     finally:
         os.close(handle)
@@ -90,6 +100,17 @@ def engine_is_alive(run: Path) -> bool:
         return False
     finally:
         os.close(handle)
+
+
+def suspended_engine(run: Path) -> int | None:
+    """The process of the engine that works on the run, if it is suspended (SIGSTOP); None if not, and where that is unknown."""
+    try:
+        with _lock_path(run).open("rb") as lock:
+            process = int(lock.read(_DIGITS))
+        # The name of the program stands before this in brackets, and may have any letters.
+        return process if (PROC / str(process) / "stat").read_bytes().rpartition(b")")[2].split()[0] == b"T" else None
+    except (OSError, ValueError, IndexError):
+        return None
 
 
 def _try(handle: int, kind: int) -> bool:

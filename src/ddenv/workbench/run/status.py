@@ -26,7 +26,7 @@ OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
 SHRINK = (
     *("cut", "time", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
-    *("asked", "engine", "tests", "drift"),
+    *("asked", "engine", "tests", "drift", "state"),
 )
 
 
@@ -110,7 +110,8 @@ class Status(Widget):
         if name == "state":
             colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
             status = self._snapshot.status if self._snapshot else ""
-            variable = "text-warning" if self._besides[2] else colors.get(status, "text-success")
+            warns = self._besides[2] or (self._snapshot and self._snapshot.suspended is not None)
+            variable = "text-warning" if warns else colors.get(status, "text-success")
             return ink(self.app.theme_variables, variable, bold=True)
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
@@ -162,22 +163,24 @@ def facts(
     status = "certifying" if snapshot.status == "running" and state.confirming else snapshot.status
     status = "isolating" if snapshot.status == "running" and state.isolating is not None else status
     status = "settling" if status == "baseline" and state.settling else status
-    sign, word = STATUS.get(status, ("·", status))
+    (sign, word), way_on = STATUS.get(status, ("·", status)), ""
     if snapshot.gone:
         sign, word = "✗", "the run file is gone"
     elif status == "lost":
-        word = f"{word}: r resumes"
+        way_on = ": r resumes"
+    elif snapshot.suspended is not None and not state.ended:
+        sign, word, way_on = "!", "engine suspended", f": kill -CONT {snapshot.suspended} wakes it"
     elif state.needs_room and not state.ended:
         sign, word = "!", "no room on the disk"
     mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
     said = (
-        Fact("state", (f"{sign} {word}",)),
+        Fact("state", (f"{sign} {word}{way_on}", f"{sign} {word}")),
         Fact("asked", (f"… {asked}" if asked else "", "…" if asked else "")),
         Fact("tests", tests_said(state)),
         Fact("drift", drift_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
+        Fact("left", left_said(remaining(state, snapshot.engine == "alive" and snapshot.suspended is None))),
         Fact("mode", (mode, "")),
         Fact("engine", engine_said(snapshot)),
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
