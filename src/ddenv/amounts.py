@@ -27,6 +27,27 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60:02} min"
 
 
+def rounded(number: float) -> int:
+    """An estimate as it is said: no more exact than to a tenth, and only up to 10 to a single one; 1 at least."""
+    if not 10 <= number < math.inf:
+        return max(1, round(number)) if math.isfinite(number) else 1
+    digits: int = 10 ** math.floor(math.log10(number))
+    step = digits // 2 if number < 5 * digits else digits
+    return step * round(number / step)
+
+
+def between(low: float, high: float) -> str:
+    """An estimate's range as it is said: "50 to 1,000"."""
+    return f"{rounded(low):,} to {rounded(high):,}"
+
+
+def about(low: float, middle: float, high: float) -> str:
+    """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
+    unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
+    interval = f" ({between(low / unit, high / unit)})" if rounded(low / unit) < rounded(high / unit) else ""
+    return f"{rounded(middle / unit):,} {name}{interval}"
+
+
 def percent(part: float) -> str:
     """A fraction as a whole percentage that is never rounded to certainty."""
     value = round(100 * part)

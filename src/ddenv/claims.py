@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from ddenv.amounts import count, first_of, percent
-from ddenv.certificate_cost import certificate_tests
+from ddenv.amounts import between, count, first_of, percent
+from ddenv.certificate_cost import Made, certificate_tests
 from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim
 from ddenv.runfile.removals import Isolation, Returned
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.runfile.state import BROKEN, Node, RunState, Trial
 from ddenv.runfile.supports import stack_with
 
 MOST_NAMES = 3
@@ -218,22 +218,33 @@ def fresh_runs_made(state: RunState, now: Certificate) -> int:
 def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
     """How many runs a certificate of the current environment takes, as (low, likely, high)."""
     left = len(state.environment) - len(state.pinned.intersection(state.environment))
-    seen = 0 if state.baseline is None else state.baseline.runs
-    return certificate_tests(now.rate, now.keep_rate, left, now.at_least, seen)
+    first, made = origin(state, now.node).number, 0
+    shown: dict[tuple[int, str | None], tuple[int, int]] = {}
+    for test in state.confirm_tests:
+        if test.run < now.first_run or not test.is_finished:
+            continue
+        made += 1
+        if test.outcome not in BROKEN:
+            hits, runs = shown.get((test.node, test.without), (0, 0))
+            shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
+    # The rate that it began with rests on the runs before; its own narrow the range.
+    hits, runs = shown.get((first, None), (0, 0))
+    before = 0 if state.baseline is None else state.baseline.runs
+    rate = (now.rate * before + hits) / (before + runs) if before + runs else now.rate
+    without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
+    done = Made(made, shown.get((now.node, None), (0, 0)), without)
+    return certificate_tests(rate, now.keep_rate, left, now.at_least, before + runs, done)
 
 
 def usual_runs(state: RunState, now: Certificate) -> str:
-    """How many runs a certificate usually takes, such as "32 to 145 runs"."""
+    """How many runs a certificate is expected to take, such as "30 to 150 runs"."""
     low, _, high = expected_fresh_runs(state, now)
-    return f"{low} to {high:,} runs"
+    return f"{between(low, high)} runs"
 
 
 def made_of_usual(state: RunState, now: Certificate) -> str:
-    """How far a certificate is: "23 of usually 32 to 145 runs"; it says so where it takes more."""
-    made, usual = fresh_runs_made(state, now), usual_runs(state, now)
-    if made < expected_fresh_runs(state, now)[2]:
-        return f"{made} of usually {usual}"
-    return f"{count(made, 'run')}, more than the usual {usual.removesuffix(' runs')}"
+    """How far a certificate is: "23 of about 30 to 150 runs"."""
+    return f"{fresh_runs_made(state, now)} of about {usual_runs(state, now)}"
 
 
 def short(claim: Claim) -> str:

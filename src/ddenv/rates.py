@@ -8,13 +8,16 @@ from collections.abc import Iterable
 Z_95 = 1.959963984540054
 
 
-def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
-    """The 95 % Wilson interval of a rate that was seen `successes` times in `trials`. Raises ValueError for impossible counts."""
+def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tuple[float, float]:
+    """The Wilson interval of a rate that was seen `successes` times in `trials`, of 95 % or of so many standard deviations.
+
+    Raises ValueError for impossible counts.
+    """
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials}")
-    rate, z2 = successes / trials, Z_95**2
+    rate, z2 = successes / trials, deviations**2
     centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
-    half = Z_95 / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    half = deviations / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
     # Rounding must not push the rate out of its own interval.
     return min(rate, max(0.0, centre - half)), max(rate, min(1.0, centre + half))
 

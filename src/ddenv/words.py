@@ -156,7 +156,7 @@ def _certificate(kind: str, after: RunState) -> str:
     match kind:
         case "certificate_started":
             what = f"fresh runs of what is left ({models}), without each model, and of the whole world"
-            return f"certificate {last.number}: {what}; usually {usual_runs(after, last)}"
+            return f"certificate {last.number}: {what}; about {usual_runs(after, last)}"
         case "certificate_finished":
             return f"  certificate {last.number}: {verdict_on(last, never_left_out(after, last))}"
         case "rate_lost":

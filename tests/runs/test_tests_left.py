@@ -5,7 +5,7 @@ from statistics import median
 
 import pytest
 
-from ddenv.certificate_cost import certificate_tests
+from ddenv.certificate_cost import Made, certificate_tests
 from ddenv.reduction.certificate import Terms, error_of, falls, keeps, settle
 from ddenv.runfile.fold import fold
 from ddenv.runs.tests_left import remaining, rough_run, rough_tests
@@ -57,19 +57,25 @@ def test_tiny_worlds_take_few_tests(models, algorithm):
 
 def certified(rate, keep_rate, left, at_least, random, believed=None):
     """The tests of a certificate of so many needed models that keep the whole world's rate, as the engine makes it."""
-    believed = rate if believed is None else believed
-    whole, end = frozenset("whole"), frozenset("end")
-    shown = {}
+    return len(runs_of(rate, rate, keep_rate, left, at_least, random, rate if believed is None else believed))
+
+
+def runs_of(rate, of_end, keep_rate, left, at_least, random, believed):
+    """Whether each run of a certificate shows f, by its models and its number."""
+    whole, end = "whole", "end"
+    rates, shown = {whole: rate, end: of_end}, {}
 
     def show(subject, number):
-        return shown.setdefault((subject, number), subject in (whole, end) and random.random() < rate)
+        (name,) = subject
+        return shown.setdefault((name, number), random.random() < rates.get(name, 0.0))
 
     error = error_of(1) / 2
-    settle(keeps(end, whole, Terms(keep_rate, believed, error, at_least)), show)
-    for model in range(left):
+    terms = Terms(keep_rate, believed, error, at_least)
+    kept = settle(keeps(frozenset([end]), frozenset([whole]), terms), show).verdict == "kept"
+    for model in range(left if kept else 0):
         terms = Terms(keep_rate, believed, error / left, at_least)
-        settle(falls(frozenset([str(model)]), whole, terms), show)
-    return len(shown)
+        settle(falls(frozenset([str(model)]), frozenset([whole]), terms), show)
+    return shown
 
 
 @pytest.mark.parametrize("keep_rate", [0.8, 0.5])
@@ -101,22 +107,63 @@ def test_a_rate_that_few_runs_showed_may_be_another_one(runs):
     assert sum(inside) >= 48
 
 
+def test_the_runs_of_a_certificate_narrow_its_range():
+    random, inside, narrower = Random(3), [], []
+    for _ in range(80):
+        rate = random.uniform(0.7, 1.0)
+        hits = sum(random.random() < rate for _ in range(10))
+        believed = (hits + 0.5) / 11
+        # What is left shows f as often, or always, or half as often.
+        shown = runs_of(rate, random.choice([rate, 1.0, rate / 2]), 0.8, 3, 10, random, believed)
+        first = [(subject, number) for subject, number in shown if number < 20]
+        if len(first) == len(shown):
+            continue
+
+        of_each = {name: [shown[each] for each in first if each[0] == name] for name in ("whole", "end", "0", "1", "2")}
+        of_whole, of_end, *without = ((sum(each), len(each)) for each in of_each.values())
+        made, seen = Made(len(first), of_end, without), 10 + of_whole[1]
+        before = certificate_tests(believed, 0.8, 3, 10, 10)
+        low, likely, high = certificate_tests((believed * 10 + of_whole[0]) / seen, 0.8, 3, 10, seen, made)
+        assert made.tests <= low <= likely <= high
+        inside.append(low <= len(shown) <= high)
+        narrower.append(high - low < before[2] - before[0])
+    assert sum(inside) >= 0.7 * len(inside) >= 30
+    assert sum(narrower) >= 0.8 * len(narrower)
+
+
 @pytest.mark.parametrize("keep_rate", [0.0, 1.0])
 @pytest.mark.parametrize("left", [0, 3])
 def test_terms_that_make_no_sense_have_a_number_too(keep_rate, left):
     for seen in (-1, 0, 1, 10**400):
-        low, likely, high = certificate_tests(1.0, keep_rate, left, 0, seen)
-        assert 0 <= low <= likely <= high
+        for made in (
+            None,
+            Made(-3, (9, 2), [(10**400, 10**400)] * 9),
+            Made(10**6, (-1, -1)),
+            Made(5, (0, 5), [(5, 5)]),
+        ):
+            low, likely, high = certificate_tests(1.0, keep_rate, left, 0, seen, made)
+            assert 0 <= low <= likely <= high
 
 
 def test_a_rough_run_has_its_certificate():
     asked = load_scenario(DATA / "wall.yaml").reduction.model_copy(update={"baseline_runs": 10, "keep_rate": 0.8})
     kept, printed = rough_run(43, asked), rough_run(43, asked.model_copy(update=PRINTED))
     assert kept.certificate == printed.certificate == certificate_tests(10.5 / 11, 0.8, 3, 10)
-    assert kept.tests[1] == kept.search[1] + kept.certificate[1]
+    assert kept.tests[1] == 10 + kept.search[1] + kept.certificate[1]
     assert kept.search[1] < printed.search[1]
     assert rough_run(1, asked).certificate[1] < kept.certificate[1]
     assert rough_run(0, asked).tests[0] >= 10
+
+
+def test_slices_leave_little_of_a_large_world_to_test():
+    asked = load_scenario(DATA / "wall.yaml").reduction
+    sliced, whole = rough_run(5000, asked), rough_run(5000, asked, slices=False)
+    assert rough_run(43, asked) == sliced
+    assert rough_run(5000, asked.model_copy(update={"slice": False})) == whole
+    assert all(few < many for few, many in zip(sliced.search, whole.search, strict=True))
+    # Tests with few models are shorter than those of the whole world, but for the baseline.
+    assert all(asked.baseline_runs < time < tests for time, tests in zip(sliced.worlds, sliced.tests, strict=True))
+    assert whole.worlds == pytest.approx(whole.tests)
 
 
 def test_each_test_leaves_one_less(run):
@@ -151,15 +198,17 @@ def test_a_certificate_takes_the_tests_that_it_has_not_made(run):
         run.write("test_started", test=test, **place, run=number, seed=number)
         run.finish(test, "similar", 0.1)
 
-    make(10_000)
-    assert left(run).tests == (low - 1, likely - 1, high - 1)
-    for number in range(1, high - 1):
-        make(10_000 + number)
-    # The two tests that run are left at least.
-    assert left(run).tests == (2, 2, 2)
-    assert left(run, at_work=False).tests == (0, 0, 1)
-    make(20_000)
-    assert left(run) is None
+    for made in range(1, 60):
+        make(10_000 + made)
+        expected = certificate_tests(0.99, 0.8, 6, 4, 4, Made(made, (made, made)))
+        assert left(run, at_work=False).tests == tuple(each - made for each in expected)
+    # All of them showed f.
+    assert expected[2] < high
+    for made in range(60, 150):
+        make(10_000 + made)
+    # After more than were expected, some are left all the same, and the two tests that run are.
+    assert left(run).tests[0] == 2
+    assert left(run).tests[1] > 2
 
 
 def test_no_time_is_said_while_nothing_runs(run):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ddenv.amounts import count, duration
+from ddenv.amounts import about, count, duration
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pace
 from ddenv.errors import UserError
@@ -45,6 +45,7 @@ def note_slow(journal: Journal, paces: Iterable[Pace]) -> None:
 
 
 def _slow(state: RunState, rate: float) -> str:
+    """What a slow world will cost: its baseline in full, then what is left to test of it after the slice (`rough_run`)."""
     asked = Reduction.model_validate(state.scenario["reduction"])
     timeout = float(str(read(state.scenario, SETTINGS["timeout"])))
     if rate <= 0.0:
@@ -52,11 +53,11 @@ def _slow(state: RunState, rate: float) -> str:
     each = timeout / rate
     runs, jobs = asked.baseline_runs, max(1, state.jobs)
     baseline = duration(each * -(-runs // jobs))
-    low, _, high = (each * tests / jobs for tests in rough_run(len(state.elements), asked).tests)
+    whole = about(*(each * worlds / jobs for worlds in rough_run(len(state.elements), asked).worlds))
     return (
         f"this world is slow: {rate:.2g} s simulated in each second; at this rate a test of {timeout:g} s takes "
-        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run {duration(low)} to "
-        f"{duration(high)}; {HELPS}, more --jobs"
+        f"{duration(each)}, the baseline of {count(runs, 'run')} about {baseline}, the whole run about {whole}; "
+        f"{HELPS}, more --jobs"
     )
 
 

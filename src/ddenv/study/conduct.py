@@ -64,7 +64,7 @@ def _of_waiting(cell: Cell, others: Sequence[Work], worlds: dict[str, Size]) -> 
         one = [mean(costs)] if costs else []
     if not one:
         return None
-    return mean(one) * rough_run(size.models, cell.scenario.reduction).tests[1]
+    return mean(one) * rough_run(size.models, cell.scenario.reduction, slices=cell.scenario.oracle is None).tests[1]
 
 
 def _spent(state: RunState) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ddenv.amounts import about as about
 from ddenv.map.names import shortened
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
@@ -92,20 +93,6 @@ def brief(seconds: float) -> str:
 def simulated(seconds: float | None, timeout: float) -> str:
     """How far a running test is, in simulated time: beside real times it has to be told apart from them."""
     return "" if seconds is None else f" {seconds:.1f}/{timeout:g} s"
-
-
-def about(low: float, middle: float, high: float) -> str:
-    """A time in s with its interval, rounded to its uncertainty: 2 min (1 to 5)."""
-    unit, name = (1.0, "s") if middle < 90 else (60.0, "min") if middle < 5400 else (3600.0, "h")
-    low, middle, high = (_rounded(each / unit) for each in (low, middle, high))
-    interval = f" ({low} to {high})" if low < high else ""
-    return f"{middle} {name}{interval}"
-
-
-def _rounded(number: float) -> int:
-    """To the next five above ten, to the next ten above fifty."""
-    step = 1 if number < 10 else 5 if number < 50 else 10
-    return max(1, step * round(number / step))
 
 
 def metres(value: Any, digits: int = 1) -> str:

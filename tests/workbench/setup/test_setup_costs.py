@@ -40,18 +40,26 @@ def test_tests_and_time_are_told():
     known = Past(1, 3.0, 0.9)
     words = whole_cost(scenario(), 43, 2, known)
     assert words.startswith("about ")
-    assert "with 2 jobs; baseline 4, certificate 124; 3.0 s a test in earlier runs" in words
+    assert "with 2 jobs at 3.0 s a test, as before; baseline 4, certificate 100" in words
     unknown = whole_cost(scenario(), 43, 2, Past())
-    assert unknown.endswith(") if f always shows; baseline 4, certificate 124")
-    assert whole_cost(scenario(budget=9), 43, 1, known).startswith("9 tests at most, 27 s with 1 job")
+    assert unknown == "about 150 tests (70 to 350) if f always shows; baseline 4, certificate 100"
+    assert whole_cost(scenario(budget=9), 43, 1, known) == (
+        "9 tests at most, 25 s with 1 job at 3.0 s a test, as before; baseline 4"
+    )
 
 
 def test_more_iterations_and_more_models_cost_more():
     def tests(models, **reduction):
-        return int(whole_cost(scenario(**reduction), models, 2, Past()).split()[1])
+        return int(whole_cost(scenario(**reduction), models, 2, Past()).split()[1].replace(",", ""))
 
-    assert tests(43, iterations=0) < tests(43, iterations=8)
-    assert tests(10) < tests(300)
+    assert tests(43, accept_rate="first", iterations=0) < tests(43, accept_rate="first", iterations=8)
+    assert tests(10, slice=False) < tests(300, slice=False) < tests(5000, slice=False)
+
+
+def test_with_slices_the_size_of_the_world_matters_little():
+    assert whole_cost(scenario(), 43, 2, Past()) == whole_cost(scenario(), 5000, 2, Past())
+    theirs = scenario().model_copy(update={"oracle": object()})
+    assert whole_cost(theirs, 5000, 2, Past()) == whole_cost(scenario(slice=False), 5000, 2, Past())
 
 
 @pytest.mark.parametrize("field", form.ALL, ids=lambda field: field.id)

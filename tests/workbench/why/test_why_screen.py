@@ -68,7 +68,7 @@ async def test_while_the_run_goes_on_it_waits_and_fills_by_itself(run):
     fake_moments.certifying(run).hold()
     async with Attached(run) as session:
         screen = await opened(session)
-        assert "It is being made: 16 of usually" in words(screen, "#why-empty")
+        assert "It is being made: 16 of about" in words(screen, "#why-empty")
         run.certify_all(2, "crate_01", "ppp")
         run.finish_certificate((None, "kept", 6 * "s"), ("crate_00", "needed", "opp"), ("crate_01", "needed", "ppp"))
         run.write("finished", minimal=True, reason="no single model can be removed")

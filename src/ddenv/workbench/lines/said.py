@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from ddenv.amounts import rounded
 from ddenv.claims import drift
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs.fresh_runs import fresh_runs
@@ -29,7 +30,7 @@ def status(snapshot: Snapshot) -> Iterator[str]:
     left = remaining(state, snapshot.engine == "alive")
     if left is not None:
         time = f", about {about(*left.seconds)}" if left.seconds else ""
-        yield f"about {left.tests[1]} tests left{time}"
+        yield f"about {count(rounded(left.tests[1]), 'test')} left{time}"
     yield {"alive": "an engine is at work", "starting": "the engine starts"}.get(
         snapshot.engine, "no engine is running"
     )

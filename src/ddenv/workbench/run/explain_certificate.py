@@ -25,9 +25,10 @@ def certifying(snapshot: Snapshot) -> tuple[str, ...]:
         return ("The rounds are over.",)
     if certificate.claims:
         return (_after(certificate), *_now(snapshot, certificate))
+    made = fresh_runs_made(state, certificate)
     return (
         f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
-        f"That usually takes {usual_runs(state, certificate)}; {fresh_runs_made(state, certificate)} are made.",
+        f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
         *_so_far(state),
         *_now(snapshot, certificate),
     )

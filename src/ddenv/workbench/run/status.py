@@ -9,7 +9,7 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.amounts import percent
+from ddenv.amounts import between, percent, rounded
 from ddenv.claims import drift, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
@@ -248,7 +248,8 @@ def left_said(left: Remaining | None) -> tuple[str, ...]:
         return ("",)
     low, middle, high = left.tests
     if left.seconds is None:
-        return (f"about {middle} tests left ({low} to {high})", f"about {middle} tests left", "")
+        words = f"about {count(rounded(middle), 'test')} left"
+        return (f"{words} ({between(low, high)})" if rounded(low) < rounded(high) else words, words, "")
     words = about(*left.seconds)
     time, _, interval = words.partition(" (")
     return (f"about {time} left{f' ({interval}' if interval else ''}", f"about {time} left", "")

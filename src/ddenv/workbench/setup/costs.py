@@ -9,10 +9,11 @@ from pathlib import Path
 from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
+from ddenv.amounts import about, between, rounded
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
 from ddenv.runs.tests_left import rough_run
-from ddenv.workbench.wording import count, duration
+from ddenv.workbench.wording import count
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
@@ -75,13 +76,14 @@ def _positive(value: Any) -> float | None:
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
     """The line with the tests and the time of a whole reduction."""
     reduction = scenario.reduction
-    rough = rough_run(models, reduction, past.rate)
+    # Another simulator does not say what took part.
+    rough = rough_run(models, reduction, past.rate, slices=scenario.oracle is None)
     low, middle, high = rough.tests
     budget = getattr(reduction, "budget", None)
     if budget is not None:
         low, middle, high = (min(each, budget) for each in (low, middle, high))
-    words = f"about {count(middle, 'test')} ({low} to {high})"
-    parts = f"baseline {reduction.baseline_runs}, certificate {rough.certificate[1]}"
+    words = f"about {count(rounded(middle), 'test')} ({between(low, high)})"
+    parts = f"baseline {reduction.baseline_runs}, certificate {rounded(rough.certificate[1])}"
     if budget is not None and middle >= budget:
         # The certificate may not be reached.
         words, parts = f"{count(budget, 'test')} at most", f"baseline {reduction.baseline_runs}"
@@ -89,5 +91,5 @@ def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:
         words = f"{words} {UNKNOWN_RATE}"
     if past.seconds is None:
         return f"{words}; {parts}"
-    spent = duration(middle * past.seconds / jobs)
-    return f"{words}, {spent} with {count(jobs, 'job')}; {parts}; {past.seconds:.1f} s a test in earlier runs"
+    spent = about(*(each * past.seconds / jobs for each in (low, middle, high)))
+    return f"{words}, {spent} with {count(jobs, 'job')} at {past.seconds:.1f} s a test, as before; {parts}"
