@@ -29,7 +29,7 @@ def why_command(run: str, as_json: bool) -> int:
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
     from ddenv.runs.nearest import nearest
-    from ddenv.runs.reasons import parting_sentence, reasons, sentence
+    from ddenv.runs.reasons import no_reasons, parting_sentence, reasons, sentence
 
     with RunFile(find_run(run)) as file:
         state = fold(file.events())
@@ -45,6 +45,6 @@ def why_command(run: str, as_json: bool) -> int:
         print("\n".join(wrapped(words, columns, "- ")))
     if passing is not None:
         print("\n".join(wrapped(printable(passing.sentences), columns)))
-    if not found and passing is None:
-        print("nothing is left that could be left out")
+    if not found and (certificate := current(state)) is not None:
+        print("\n".join(wrapped(printable(no_reasons(certificate)), columns)))
     return 0

@@ -12,7 +12,7 @@ from ddenv.page.blocks import Block, Picture, Section, Table, plain, say
 from ddenv.report.report_map import CORNERS, two_ways
 from ddenv.report.run_data import Record
 from ddenv.runs.nearest import Nearest
-from ddenv.runs.reasons import Reason, parting_sentence, sentence
+from ddenv.runs.reasons import Reason, no_reasons, parting_sentence, sentence
 from ddenv.words import count, first_of
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ MOST_MODELS, MOST_MAPS = 200, 6
 
 def why(record: Record) -> Section | None:
     """The section on why the robot fails; None before a certificate or an isolation shows it."""
-    if not record.reasons and record.nearest is None:
+    found = current(record.state)
+    if found is None and record.nearest is None:
         return None
     drawn: tuple[Drawn, ...] = ()
     if record.world is not None:
@@ -32,8 +33,9 @@ def why(record: Record) -> Section | None:
 
         drawn = plan(record.world, CORNERS)
     blocks: list[Block] = []
-    found = current(record.state)
-    if found is not None and record.reasons:
+    if found is not None and len(found.claims) == 1:
+        blocks.append(say(plain(no_reasons(found))))
+    elif found is not None and record.reasons:
         left = count(len(record.state.environment), "model")
         blocks.append(say(f"With what is left ({left}): {rate(found.claims[0])}."))
     for number, reason in enumerate(record.reasons[:MOST_MODELS]):
@@ -42,7 +44,7 @@ def why(record: Record) -> Section | None:
             blocks.append(_map(record, drawn, reason, f"why{number}"))
     if record.nearest is not None:
         blocks += _passing(record, record.nearest, drawn)
-    return Section("Why it fails", tuple(blocks))
+    return Section("Why it fails", tuple(blocks)) if blocks else None
 
 
 def _passing(record: Record, found: Nearest, drawn: tuple[Drawn, ...]) -> list[Block]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.amounts import count, percent
-from ddenv.claims import current
+from ddenv.claims import current, verdict_on
 from ddenv.errors import UserError
 from ddenv.rates import wilson_interval
 from ddenv.runfile.progress import Certificate
@@ -101,6 +101,13 @@ def reasons(file: RunFile, state: RunState) -> tuple[Reason, ...]:
     left = {test.run: test for test in tests if test.without is None and test.outcome == F}
     names = [claim.without for claim in certificate.claims if claim.without is not None]
     return tuple(_reason(file, state, certificate, name, tests, left) for name in names)
+
+
+def no_reasons(certificate: Certificate) -> str:
+    """Why a finished certificate left out no model, in a sentence."""
+    if certificate.claims[0].verdict == "kept":
+        return "Nothing is left that could be left out: there is no model to look at."
+    return f"What the robot does without each model is not known, because none was left out: {verdict_on(certificate)}."
 
 
 def _fresh(state: RunState, certificate: Certificate) -> Iterator[Test]:

@@ -6,8 +6,11 @@ import fake_moments
 import fake_run
 import pytest
 from attached import Attached, starts
+from click.testing import CliRunner
 from textual.widgets import OptionList
 
+from ddenv.cli.command_line import app as command_line
+from ddenv.report.report import write_report
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import parting_sentence, reasons, sentence
@@ -91,6 +94,20 @@ async def test_where_all_could_stay_away_there_is_nothing_to_look_at(run):
     run.finish_certificate((None, "kept", 6 * "s"))
     async with Attached(run) as session:
         assert "Nothing is left that could be left out" in words(await opened(session), "#why-empty")
+
+
+async def test_where_the_rate_is_lost_it_is_said_that_no_model_was_left_out(run):
+    fake_moments._rounds(run).start_certificate()
+    run.certify_all(2, None, 6 * "so")
+    run.finish_certificate((None, "lost", 6 * "so"))
+    async with Attached(run) as session:
+        said = words(await opened(session), "#why-empty")
+    assert "none was left out: f is rarer in what is left" in said and "f in 6 of 12 fresh runs" in said
+    assert (
+        CliRunner().invoke(command_line, ["why", str(run.path)], standalone_mode=False).output.split() == said.split()
+    )
+    write_report(run.path, run.path.with_suffix(".md"))
+    assert "none was left out: f is rarer in what is left" in run.path.with_suffix(".md").read_text()
 
 
 async def test_damaged_trajectories_are_told_and_the_rest_is_shown(run):

@@ -9,6 +9,7 @@ from rich.text import Text
 from ddenv.claims import current, in_the_making, made_of_usual, rate
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
+from ddenv.runs.reasons import no_reasons
 from ddenv.words import isolating
 from ddenv.workbench.why.entries import NEAREST, Entry
 from ddenv.workbench.wording import CLAIM, percent, plain
@@ -63,8 +64,8 @@ def nothing_yet(state: RunState, works: bool, run: str) -> str:
     """Why there is nothing to show, and what to do; `works`: an engine does. `run` is what a shell calls the run."""
     shows = "Full runs of what is left, and of that without each of its models, show why it fails: the certificate makes them."
     making, command = in_the_making(state), remedy(state, works, run)
-    if current(state) is not None:
-        return "Nothing is left that could be left out: there is no model to look at."
+    if (certificate := current(state)) is not None:
+        return no_reasons(certificate)
     if command:
         return f"{shows}\n\nWhat is left has none. Make one, and come back: {command}   (c copies that)"
     if making is not None:
