@@ -14,7 +14,7 @@ from ddenv.errors import UserError
 from ddenv.robot.external import pose_log, process
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
-from tests.conftest import DATA
+from tests.conftest import DATA, ROOT
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 
 EVERYTHING = frozenset({"deck", "wall", "far_box", "post", "ball", "beam"})
@@ -216,6 +216,25 @@ def test_a_lack_of_room_for_temporary_files_is_reported(simulator_of, monkeypatc
         patch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
         with pytest.raises(UserError, match=r"no temporary file can be written .*; set TMPDIR"):
             simulator.run(EVERYTHING, 0)
+
+
+# A worker that is killed, as a pool does it, once it has written the world's file.
+KILLED = """
+import os, pathlib, sys
+from ddenv.robot.external.simulator import ExternalSimulator
+from ddenv.runs.scenarios import load_parts
+from tests.robot.external.own import SLEEP, own_scenario
+written = pathlib.Path.write_bytes
+pathlib.Path.write_bytes = lambda file, text: (written(file, text), os.kill(os.getpid(), 9))
+scenario = own_scenario(pathlib.Path(sys.argv[1]), SLEEP)
+ExternalSimulator(load_parts(scenario)[0], scenario).run(frozenset(), 0)
+"""
+
+
+def test_a_worker_that_is_killed_while_it_writes_the_files_leaves_nothing(tmp_path):
+    environment = os.environ | {"TMPDIR": tempfile.gettempdir()}
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], env=environment, cwd=ROOT, capture_output=True)
+    assert done.returncode == -9, done.stderr
 
 
 def test_a_model_that_is_not_there_is_refused(simulator_of):

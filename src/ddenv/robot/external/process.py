@@ -82,13 +82,25 @@ class Running:
     stdout: IO[bytes]
     stderr: IO[bytes]
 
+    def begin(self) -> None:
+        """Starts the command: its files are written."""
+        self._say(b"+")
+
+    def end(self) -> None:
+        """Ends it early."""
+        self._say(b".")
+
+    def _say(self, word: bytes) -> None:
+        with contextlib.suppress(OSError):
+            self.line.send(word)
+
 
 @contextlib.contextmanager
 def running(words: Sequence[str], folder: Path, environment: Mapping[str, str], temporary: Path) -> Iterator[Running]:
-    """Starts the command `words` in `folder`.
+    """The command `words`, which starts in `folder` at its `begin`.
 
-    At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed.
-    Raises OSError if no program can be started.
+    At the end, nothing that the command started is left, and the folder `temporary` is removed, even if this process is killed
+    while it writes there. Raises OSError if no program can be started.
     """
     ours, theirs = socket.socketpair()
     start = [sys.executable, "-I", "-S", str(SUPERVISOR), str(temporary), *words]
@@ -140,7 +152,7 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
             said = _look(selector, command)
             late = f"took longer than {seconds:g} s of wall clock" if clock.look() > limit else ""
             if said is None and not why and (why := late or too_much()):
-                _ask_to_end(command)
+                command.end()
                 limit, clock = STOP_WAIT, Stopwatch(LONGEST_LOOK)
             elif said is None and late:
                 # The supervisor itself was stopped, and will be killed.
@@ -163,11 +175,6 @@ def _look(selector: selectors.BaseSelector, command: Running) -> str | None:
         else:
             selector.unregister(key.fileobj)
     return None
-
-
-def _ask_to_end(command: Running) -> None:
-    with contextlib.suppress(OSError):
-        command.line.send(b".")
 
 
 def _drain(stream: IO[bytes], take: Callable[[bytes], None]) -> None:

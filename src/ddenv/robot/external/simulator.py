@@ -8,6 +8,7 @@ import os
 import shutil
 import tempfile
 import time
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -62,9 +63,7 @@ class ExternalSimulator:
             raise ValueError(f"no such model: {min(unknown)}")
         started = time.perf_counter()
         with _temporary_folder() as folder:
-            file = folder / self._scenario.world.name
-            _write(file, without(self._world, self._removable - keep))
-            ended, log = self._execute(file, seed, progress)
+            ended, log = self._execute(folder, keep, seed, progress)
         outcome, failure, trajectory = self._judged(ended, log)
         return RunResult(
             outcome=outcome,
@@ -76,12 +75,16 @@ class ExternalSimulator:
             seed=seed,
         )
 
-    def _execute(self, world: Path, seed: int, progress: Progress | None) -> tuple[Ended, PoseLog]:
-        """Runs the command on the file `world` to its end, and reads its pose log. Raises UserError if no file can be written."""
+    def _execute(
+        self, folder: Path, keep: frozenset[str], seed: int, progress: Progress | None
+    ) -> tuple[Ended, PoseLog]:
+        """Runs the command on the world with the models `keep` to its end, and reads its pose log; all its files are in the new
+        folder `folder`. Raises UserError if no file can be written.
+        """
+        world = folder / self._scenario.world.name
         file = world.with_name(f"{world.name}.poses.csv") if has_placeholder(self._words, "log") else None
         log = PoseLog(progress if file is None else None)
         whole = world.with_name(f"{world.name}.scenario.yaml")
-        _write(whole, self._scenario_in(world))
         values = {"world": str(world), "scenario": str(whole), "seed": str(seed), "log": str(file or "/dev/stdout")}
         words, environment = filled(self._words, values), self._environment(values)
 
@@ -94,7 +97,9 @@ class ExternalSimulator:
             return TOO_LARGE if size > MOST_BYTES else ""
 
         try:
-            with running(words, start_folder(self._scenario), environment, world.parent) as command:
+            with running(words, start_folder(self._scenario), environment, folder) as command:
+                _write(folder, {world: without(self._world, self._removable - keep), whole: self._scenario_in(world)})
+                command.begin()
                 ended = watch(command, self.limit, take, too_much)
                 # Reading a log that is too large would take longer than writing it did.
                 if file is not None and ended.reason != TOO_LARGE:
@@ -152,8 +157,9 @@ def _numbers(*values: float) -> str:
 
 @contextlib.contextmanager
 def _temporary_folder() -> Iterator[Path]:
+    """The name of a folder that is made with its files, once a supervisor is there that removes it if this process is killed."""
     try:
-        folder = Path(tempfile.mkdtemp(prefix="ddenv-"))
+        folder = Path(tempfile.gettempdir()) / f"ddenv-{uuid.uuid4().hex}"
     except OSError as error:
         raise _no_room(error) from None
     try:
@@ -162,9 +168,11 @@ def _temporary_folder() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _write(file: Path, text: bytes) -> None:
+def _write(folder: Path, files: dict[Path, bytes]) -> None:
     try:
-        file.write_bytes(text)
+        folder.mkdir(0o700)
+        for file, text in files.items():
+            file.write_bytes(text)
     except OSError as error:
         raise _no_room(error) from None
 

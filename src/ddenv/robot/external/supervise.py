@@ -1,7 +1,8 @@
 """Runs a command and ends it with everything that it started: `python -I -S supervise.py FOLDER PROGRAM [WORD...]`.
 
-Standard input is a socket to a worker. When the command has ended, one line is sent there: `exit 3`, `signal 9`, or `error 13` if
-it could not be started. A byte from the worker, or the worker's end, ends the command at once. At the end FOLDER is removed.
+Standard input is a socket to a worker. The command starts at a `+` from there. When it has ended, one line is sent back: `exit 3`,
+`signal 9`, or `error 13` if it could not be started. Another byte from the worker, or the worker's end, ends the command at once.
+At the end FOLDER is removed, also if the worker was killed before the command started.
 This is a program of its own because a worker that is killed cannot clean up.
 """
 
@@ -31,7 +32,9 @@ def main() -> None:
     # A worker ignores Ctrl-C, and programs inherit what is ignored.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     with contextlib.suppress(OSError):
-        worker.sendall(run(words, worker).encode())
+        # A worker that is killed while it writes the command's files says nothing.
+        if worker.recv(1) == b"+":
+            worker.sendall(run(words, worker).encode())
         while worker.recv(64):
             pass
     shutil.rmtree(folder, ignore_errors=True)
