@@ -183,6 +183,9 @@ async def test_a_finished_test_is_played_with_a_slider_steps_and_a_ghost(writer,
         await page.value(f"({slide})(4)")
         assert await page.value(place_of("'robot'")) == pytest.approx(1.55, abs=0.01)
         assert await page.value(place_of("'models', '003 board'")) == pytest.approx(0.25 - 1, abs=0.01)
+        # The edges of its partition go with it.
+        await page.value("said = { ...said, parts: [['B', '#f0a028', 1, -1.5, 0.25, '003 board']] }")
+        await shows(page, place_of("'parts', '003 board'") + " === " + place_of("'models', '003 board'"))
         await page.value("document.getElementById('on').click()")
         assert await page.value("document.getElementById('clock').value") == "4.1 s of 8.0 s"
         await page.value("document.dispatchEvent(new KeyboardEvent('keydown', {key: ',', bubbles: true}))")

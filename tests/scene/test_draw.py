@@ -12,7 +12,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runs.wanted import Wanted
 from ddenv.scene.camera import view
-from ddenv.scene.draw import Scenery, path_on_ground, safe_name
+from ddenv.scene.draw import MOST_LETTERS, Scenery, path_on_ground, safe_name
 from ddenv.scene.mesh import box, merge, sphere
 from ddenv.scene.painted import outline, paint
 from ddenv.scene.player import Player
@@ -152,8 +152,14 @@ def test_partitions_have_the_colours_and_letters_of_the_map(writer, screen):
     player.tick(20)
     assert [letter for letter, *_ in words["parts"]] == ["A", "A", "B", "B"]
     assert {color for _, color, *_ in words["parts"]} == {"#56b4e9", "#f0a028"}
-    assert words["parts"][1][2:] == pytest.approx((3, 0, 0.1))
-    assert {path for path in screen.things if path.startswith("/world/parts")} == {"/world/parts/0", "/world/parts/1"}
+    assert words["parts"][1][2:5] == pytest.approx((3, 0, 0.1))
+    assert {path for path in screen.things if path.startswith("/world/parts")} == {
+        "/world/parts/0",
+        "/world/parts/1",
+        "/world/parts/003 board",
+    }
+    # The board can move, and its letter with it.
+    assert [each[5] for each in words["parts"]] == ["", "", "003 board", ""]
     writer.reduce()
     player.tick(30)
     assert words["parts"] == [] and not any(path.startswith("/world/parts") for path in screen.things)
@@ -177,7 +183,7 @@ def test_a_large_world_is_a_few_objects(screen):
     assert "/world/models/still" in screen.things and "/world/left-out/all" not in screen.things
     hues = ((1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))
     places = scenery.parts((str(number), hues[number % 3], [f"m{number}"]) for number in range(400))
-    assert len(places) == 400 and sum(path.startswith("/world/parts") for path in screen.things) == 3
+    assert len(places) == MOST_LETTERS and sum(path.startswith("/world/parts") for path in screen.things) == 3
 
 
 def _boxed(number):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD
 # The robot of a second run, its path, and where the two runs part.
 GHOST, GHOST_TRAIL, PARTING = (*WORLD, "ghost"), (*WORLD, "ghost-trail"), (*WORLD, "parting")
 PARTS: Path = (*WORLD, "parts")
+MOST_LETTERS = 200  # of partitions
 # Points in one piece of a growing trail: only the last piece is sent again.
 PIECE = 24
 GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
@@ -44,6 +46,20 @@ def path_on_ground(samples: np.ndarray, lowest: float) -> np.ndarray:
     return samples[:, 1:4] + (lowest + ABOVE) * up
 
 
+class Letter(NamedTuple):
+    """The letter of a partition over a model: its colour as in CSS, where it belongs, m, and what the browser calls the model.
+
+    `key` is empty where the model cannot move.
+    """
+
+    letter: str
+    color: str
+    x: float
+    y: float
+    z: float
+    key: str
+
+
 class Scenery:
     """The objects of one run. Every element is drawn once; a change of environment only shows and hides elements.
 
@@ -58,6 +74,7 @@ class Scenery:
         self._placed: frozenset[str] = frozenset()
         self._pieces = 0
         elements = frozenset(elements)
+        self._movable = {model.name for model in world.models if not model.static and model.name in elements}
         self._crowd = Crowd(MODELS, LEFT_OUT, REMOVED) if len(elements) > MOST_SINGLE else None
         surfaces = [
             self._draw_model(number, model, model.name in elements) for number, model in enumerate(world.models)
@@ -122,18 +139,24 @@ class Scenery:
         objects = () if self._crowd is None else self._crowd.objects(shot)
         return [self._stage.drawn(path, thing) for path, thing in objects]
 
-    def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[tuple[str, str, float, float, float]]:
-        """Draws edges around the models of each partition: its letter, its colour, its models. Returns where letters belong.
+    def parts(self, groups: Iterable[tuple[str, Color, Iterable[str]]]) -> list[Letter]:
+        """Draws edges around the models of each partition: its letter, its colour, its models. Returns the first letters.
 
-        Each letter has its colour (as in CSS) and the top of a model, x, y, z in m.
+        They stand over the models where these start; the browser lets the letters and edges of models that can move follow them.
         """
         self._stage.delete(PARTS)
-        places, edges = [], dict[Color, list[np.ndarray]]()
+        places, edges = list[Letter](), dict[Color, list[np.ndarray]]()
         for letter, color, names in groups:
-            for low, high in [box for name in names if (box := self._boxes.get(name)) is not None]:
-                edges.setdefault(color, []).append(edges_of(low, high))
-                x, y = ((low + high) / 2)[:2]
-                places.append((letter, f"#{colors.hexadecimal(color):06x}", float(x), float(y), float(high[2])))
+            for name, (low, high) in [(name, box) for name in names if (box := self._boxes.get(name)) is not None]:
+                ends, (x, y), listed = edges_of(low, high), ((low + high) / 2)[:2], len(places) < MOST_LETTERS
+                key = self._keys[name] if listed and name in self._movable else ""
+                if key:
+                    self._stage.draw((*PARTS, key), lines(ends, color), shadow=False)
+                else:
+                    edges.setdefault(color, []).append(ends)
+                if listed:
+                    css = f"#{colors.hexadecimal(color):06x}"
+                    places.append(Letter(letter, css, float(x), float(y), float(high[2]), key))
         # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
         for number, (color, ends) in enumerate(edges.items()):
             self._stage.draw((*PARTS, str(number)), lines(np.concatenate(ends), color), shadow=False)

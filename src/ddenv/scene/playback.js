@@ -106,13 +106,25 @@ function frame(now) {
   write();
 }
 
-// The letters of partitions stand over the models, wherever the camera is.
+// Edges around a model go where it goes; returns where a point of it has gone.
+function follow(model, edges, point) {
+  if (!edges.position.equals(model.position) || !edges.quaternion.equals(model.quaternion)) {
+    edges.position.copy(model.position);
+    edges.quaternion.copy(model.quaternion);
+    viewer.set_dirty();
+  }
+  return point.applyQuaternion(model.quaternion).add(model.position);
+}
+
+// The letters of partitions stand over the models, wherever the camera is and the models go.
 function write() {
   const letters = place("letters"), shown = place("parts").checked ? said.parts || [] : [];
   while (letters.childElementCount > shown.length) letters.lastChild.remove();
-  shown.forEach(([letter, color, x, y, z], number) => {
+  shown.forEach(([letter, color, x, y, z, key], number) => {
     const span = letters.children[number] || letters.appendChild(document.createElement("span"));
-    const at = home().clone().set(x, y, z + 0.1);
+    const at = home().clone().set(x, y, z);
+    if (key) follow(node("models", key), node("parts", key), at);
+    at.z += 0.1;
     viewer.scene_tree.find(["world"]).object.localToWorld(at);
     at.project(viewer.camera);
     if (span.textContent !== letter) span.textContent = letter;

@@ -29,7 +29,6 @@ from ddenv.world.scenario import Goal, Spawn
 
 READ_EVERY = 0.1  # time between reads of the run file, s
 LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
-MOST_LETTERS = 200  # of partitions
 
 
 class Player:
@@ -177,7 +176,7 @@ class Player:
             (partition_letter(number), colors.of_bytes(HUES[number % len(HUES)]), names)
             for number, names in enumerate(parts)
         ]
-        self._letters = self._scenery.parts(groups)[:MOST_LETTERS]
+        self._letters = self._scenery.parts(groups)
         if self._shot is not None:
             self._caption(self._shot, "")
 
