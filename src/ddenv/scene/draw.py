@@ -158,8 +158,8 @@ class Scenery:
                     css = f"#{colors.hexadecimal(color):06x}"
                     places.append(Letter(letter, css, float(x), float(y), float(high[2]), key))
         # One object for each colour: of thousands of partitions, a browser would take minutes to make one each.
-        for number, (color, ends) in enumerate(edges.items()):
-            self._stage.draw((*PARTS, str(number)), lines(np.concatenate(ends), color), shadow=False)
+        for number, (color, all_ends) in enumerate(edges.items()):
+            self._stage.draw((*PARTS, str(number)), lines(np.concatenate(all_ends), color), shadow=False)
         return places
 
     def evidence(self, samples: np.ndarray | None) -> None:
