@@ -106,11 +106,17 @@ def in_few_lines(run: Recent) -> Text:
     )
 
 
+def left_of(total: int, left: int) -> str:
+    """How many models are left, in a column of 10 cells where they are thousands, too."""
+    words = f"{left} of {total}" if total else ""
+    return words if len(words) <= 10 else f"{left}/{total}"
+
+
 # All columns but the name, which takes the rest: title, width, whether it is a number, and its text.
 _Column = tuple[str, int, bool, Callable[[Recent], str]]
 FIRST: tuple[_Column, ...] = (
     ("state", 16, False, lambda run: f"{run.sign} {run.state_words}"),
-    ("left", 10, True, lambda run: f"{len(run.kept)} of {run.total}" if run.total else ""),
+    ("left", 10, True, lambda run: left_of(run.total, len(run.kept))),
     ("tests", 6, True, lambda run: str(run.tests) if run.total else ""),
     ("cost", 7, True, lambda run: brief(run.computed) if run.total else ""),
 )
