@@ -130,6 +130,10 @@ def engine(scenario: Scenario, path: Path, tests: int, jobs: int) -> Measured:
     with RunFile(path) as file:
         events = [event for event in file.events() if event.kind.startswith("test_")]
     ended = [event for event in events if event.kind == "test_finished"]
+    if len(ended) < 2:
+        raise SystemExit(
+            f"{len(ended)} of {tests} tests ended: too few to measure the time between them; see {path}.log"
+        )
     # The first test also waits for the worker to start.
     span = ended[-1].time - ended[0].time
     busy = sum(event.data["wall_seconds"] for event in ended[1:])

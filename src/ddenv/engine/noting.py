@@ -19,7 +19,7 @@ KNOWN_AFTER = 10.0
 # So many runs of the whole world may be too late before one has ended.
 MOST_LATE = 3
 SLOWNESS = "slow"
-HELPS = "what helps: fewer models that can move, a shorter --timeout, a larger simulation.time_step in the scenario"
+HELPS = "what helps: fewer models that can move, a shorter --timeout, another simulation.time_step in the scenario"
 
 
 def note(journal: Journal, about: str, words: str) -> None:
