@@ -4,7 +4,8 @@
 
 The real engine and its worker processes, with tests that take no time or only sleep. *Between tests* is the time from the end of a
 test in a worker to the start of its next one; *own work* the CPU time of the engine's process for each test, after its start. The
-times are p50 / mean / p95. `--robot` compares two workers with one on the scenario `friction`, which takes minutes.
+times are p50 / mean / p95. `--robot` compares two workers with one on the scenario `friction`, and two of Dask on this machine with
+two plain ones, which takes minutes.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ class Sleeper:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robot", action="store_true", help="two workers beside one, on friction")
+    parser.add_argument("--robot", action="store_true", help="one worker, two, and two of Dask, on friction")
     parser.add_argument("--long", type=int, default=10_000, help="tests of the long run")
     options = parser.parse_args()
     print("| tests of | models | workers | tests | between tests, ms | own work, ms |")
@@ -93,9 +94,19 @@ def main() -> None:
             print(row(Path(folder), seconds, models, jobs, more), flush=True)
     print(f"\n| tests in the run | resumed after, s |\n|---|---|\n| {options.long:,} | {resumed(options.long):.2f} |")
     if options.robot:
-        one, two = speed(1), speed(2)
-        print(f"\n| friction | tests a minute |\n|---|---|\n| 1 worker | {one:.1f} |\n| 2 workers | {two:.1f} |")
-        print(f"| ratio | {two / one:.2f} |")
+        robot()
+
+
+def robot() -> None:
+    """Prints how many tests of friction are made in a minute. A LocalCluster wants the guard of `__main__` that this file has."""
+    from distributed import LocalCluster
+
+    one, two = speed(1), speed(2)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        dask = speed(2, cluster=cluster.scheduler_address)
+    print("\n| friction | tests a minute | ratio |\n|---|---|---|")
+    print(f"| 1 worker | {one:.1f} | |\n| 2 workers | {two:.1f} | {two / one:.2f} times one |")
+    print(f"| 2 workers of Dask | {dask:.1f} | {dask / two:.2f} times two plain ones |")
 
 
 @dataclass
@@ -148,12 +159,12 @@ def resumed(tests: int) -> float:
         return time.perf_counter() - began
 
 
-def speed(jobs: int, tests: int = 24) -> float:
-    """Tests of friction in a minute."""
+def speed(jobs: int, tests: int = 48, **options: str) -> float:
+    """Tests of friction in a minute; `options` are the engine's."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run.ddenv"
         create_run(with_options(load_scenario(SCENARIOS / "friction.yaml"), budget=tests), run)
-        start_engine(run, jobs).wait()
+        start_engine(run, jobs, **options).wait()
         with RunFile(run) as file:
             ended = [event.time for event in file.events() if event.kind == "test_finished"]
     # The first one of each worker also waits for the worker to start.
