@@ -86,8 +86,9 @@ class Journal:
         self._again: tuple[tuple[str, ...], ...] = ()
         # Of thousands of models, a set that is made anew takes a while to be found in the ledger.
         self._whole: tuple[tuple[str, ...], Keep] = (), frozenset()
-        for event in uncollected(file.events()):
-            self._take(event)
+        with uncollected():
+            for event in file.events():
+                self._take(event)
 
     def record(self, kind: str, motions: Motions | None = None, **data: Any) -> None:
         """Writes an event."""

@@ -30,7 +30,8 @@ from ddenv.runfile.store import Event, uncollected
 
 def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
     """The state after `events`, from the beginning or from an earlier `state`. Raises UserError for invalid events."""
-    return reduce(apply, uncollected(events), state or RunState())
+    with uncollected():
+        return reduce(apply, events, state or RunState())
 
 
 def apply(state: RunState, event: Event) -> RunState:

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -122,12 +122,13 @@ class NoRoom(UserError):
     """The disk takes no more: what was to be written is not there, and nothing else has changed."""
 
 
-def uncollected(events: Iterable[Event]) -> Iterator[Event]:
-    """`events`, without looking for garbage between them: all that is made of them stays."""
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Does not look for garbage while many events are read: all that is made of them stays."""
     looks = gc.isenabled()
     gc.disable()
     try:
-        yield from events
+        yield
     finally:
         if looks:
             gc.enable()
@@ -203,7 +204,8 @@ class RunFile:
 
     def events(self, after: int = 0, most: int = -1) -> list[Event]:
         """All events with an id above `after`, in order; at most `most` unless that is negative."""
-        return self._entries("event", after, most)
+        with uncollected():
+            return self._entries("event", after, most)
 
     def commands(self, after: int = 0) -> list[Event]:
         """The requests of viewers with an id above `after`, in order."""
