@@ -66,8 +66,7 @@ class Journal:
         self.state = RunState()
         self.ledger: dict[tuple[Keep, int, bool], int] = {}
         self.decisions: dict[tuple[int, int], str] = {}
-        self.refused = Refused()
-        self.refusals = 0
+        self.refused, self.refusals = Refused(), 0
         self.steered = False
         self.leg: Leg | None = None
         self.command: int | None = None
