@@ -50,7 +50,8 @@ class Rows:
         begun = {data["test"]: data for kind, data in events if kind == "test_started"}
         ended = [begun[data["test"]] | data for kind, data in events if kind == "test_finished"]
         fresh = [one for one in ended if one["phase"] == "certify" and one["run"] >= first and one["end_pose"]]
-        node = fresh[-1]["node"]
+        # Runs of the whole world belong to its own node.
+        node = next((one["node"] for one in reversed(fresh) if one.get("without") is not None), fresh[-1]["node"])
         self.all = [one for one in fresh if one["node"] == node and one["outcome"] in ("similar", "other", "pass")]
 
     def without(self, name: str | None) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ddenv.amounts import count
 from ddenv.engine.auditing import audit_is_due, compare
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
@@ -201,7 +202,7 @@ class Bench:
         if state.budget is None or state.made + self._pool.busy < state.budget:
             return False
         if self._pool.busy == 0:
-            raise Stopped(f"the budget of {state.budget} tests is used up")
+            raise Stopped(f"the budget of {count(state.budget, 'test')} is used up")
         return True
 
     def tick(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from ddenv.amounts import count
 from ddenv.guiding.situation import FINISHED, Situation, Words
 from ddenv.runfile.state import RunState
 
@@ -99,7 +100,7 @@ class StartEngine:
         if state.status == "finished":
             return FINISHED
         spent = state.budget is not None and state.made >= state.budget
-        return f"the budget of {state.budget} tests is used up; c raises it" if spent else ""
+        return f"the budget of {count(state.budget, 'test')} is used up; c raises it" if spent else ""
 
 
 @dataclass(frozen=True, slots=True)
