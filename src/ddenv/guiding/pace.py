@@ -100,7 +100,7 @@ class StartEngine:
         if state.status == "finished":
             return FINISHED
         spent = state.budget is not None and state.made >= state.budget
-        return f"the budget of {count(state.budget, 'test')} is used up; c raises it" if spent else ""
+        return f"the budget of {count(state.budget or 0, 'test')} is used up; c raises it" if spent else ""
 
 
 @dataclass(frozen=True, slots=True)
