@@ -66,10 +66,11 @@ class Commands(click.Group):
 
 
 def _can_be_opened(word: str) -> bool:
-    """Whether a word names a file, a run or a bundled scenario."""
+    """Whether a word names a file, there or not, a run or a bundled scenario."""
     from ddenv.runs.folder import find_run
 
-    return Path(word).exists() or find_run(word).is_file() or word in bundled()
+    path = Path(word)
+    return bool(path.suffix) or len(path.parts) > 1 or path.exists() or find_run(word).is_file() or word in bundled()
 
 
 def bundled() -> list[str]:

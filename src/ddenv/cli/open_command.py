@@ -36,6 +36,8 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     if is_folder(Path(run)):
         raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
     file = _scenario_or_world(run)
+    if file is None and Path(run).suffix.lower() in FILES:
+        raise UserError(f"{run}: no such file")
     if file is None:
         raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
     if watch or lines:

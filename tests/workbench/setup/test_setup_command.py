@@ -72,14 +72,15 @@ def test_every_setting_has_an_option(scenarios, asked_by):
     assert path.name == "it's <mine>.ddenv"
 
 
-def test_a_limit_can_be_taken_back(scenarios, asked_by):
+@pytest.mark.parametrize("typed", ["", " none"])
+def test_a_limit_can_be_taken_back(scenarios, asked_by, typed):
     from ddenv.world.load import load_scenario
 
     data = fake_run.scenario()
     data["reduction"]["budget"] = 50
     (scenarios / "crates.yaml").write_text(yaml.safe_dump(data))
     own = load_scenario(scenarios / "crates.yaml")
-    asked = form.asked_of(own, form.texts_of(own) | {"budget": ""}, "timeseg/random", "ddmin")
+    asked = form.asked_of(own, form.texts_of(own) | {"budget": typed}, "timeseg/random", "ddmin")
     assert asked.reduction.budget is None
     scenario, _ = asked_by(command("crates", own, asked, standard=own, jobs=4, reading={}))
     assert scenario == asked

@@ -20,8 +20,8 @@ class Field:
     """`id` is the field's name on the screen, `label` the text before it, `kind` int, float, str or bool.
 
     `key` is the scenario's key for it, "" if a scenario has none. `choices` are the allowed words, if there are few. A field
-    with `empty` may be empty, and then shows it. `meaning` is a sentence. `setting` is the field's setting, if any. Without one, a
-    number is at most `most` from 0.
+    with `empty` may be empty, and then shows it; the word can be typed, too. `meaning` is a sentence. `setting` is the field's
+    setting, if any. Without one, a number is at most `most` from 0.
     """
 
     id: str
@@ -98,7 +98,7 @@ def value(field: Field, text: str) -> Value:
     text = text.strip()
     if field.kind is bool:
         return text == ON
-    if not text and field.empty:
+    if field.empty and text in ("", field.empty):
         return None
     if not text:
         raise FieldError(field.id, f"{field.label}: is missing; {_wanted(field)}")
