@@ -17,7 +17,7 @@ from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import read_parts
 from ddenv.workbench.map import map_drawing
-from ddenv.workbench.map.place import LAYERS, Place, place_of_run
+from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.poll import Poll, Snapshot
 
@@ -339,6 +339,21 @@ async def test_worlds_of_few_models(count):
         assert world.selection == frozenset()
         if not count:
             assert subtitle(world) == "this world has no models"
+
+
+@pytest.mark.parametrize("reach", [10, 200])
+async def test_two_ways_fill_the_map_of_a_large_world(reach):
+    prints = tuple(Footprint(f"m{x}", (), (x, 0.0), (x + 1.0, 1.0)) for x in range(-reach, reach, 5))
+    ways = tuple(Way(name, np.linspace((0, 0), (6, y), 20)) for name, y in (("with", 0.5), ("without", -0.5)))
+    async with Shown() as (pilot, world):
+        world.set_place(Place(prints, (0.0, 0.0, 0.0), (6.0, 0.0), frozenset(each.name for each in prints)))
+        world.show_ways(ways, None, None, world.place.prints)
+        await pilot.pause()
+        view = world.viewport.view
+        shown = sum(view.cell(*each.center) is not None for each in prints)
+        assert (shown == len(prints)) == (reach == 10)
+        assert all(view.cell(x, y) is not None for x in (0, 6) for y in (0.5, -0.5))
+        assert view.cell(6, 0)[1] - view.cell(0, 0)[1] > (30 if reach == 200 else 10)
 
 
 @pytest.mark.parametrize("theme", ["textual-light", "solarized-light", "textual-dark", "ansi-dark", "ansi-light"])

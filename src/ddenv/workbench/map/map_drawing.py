@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 # Dots of the original path, or of the second way, and of the gaps in it.
 DASH = 5
+# In a world that is so many times as wide as the ways of the tests that are shown, the map fits these alone.
+LARGE = 4
 
 
 class Remembered(Generic[T]):
@@ -80,12 +82,14 @@ class MapDrawing:
         self._moved: MovedPrints | None = None
 
     def fitting(self, shown: Shown, columns: int, rows: int) -> View:
-        """A view of all important places."""
+        """A view of all important places; in a large world, of the ways of finished tests."""
         path = _path(self._evidence, shown.snapshot.evidence)
         points = path[np.isfinite(path).all(axis=1)].tolist()
         points += [point for way in shown.ways for point in way.points.tolist()]
         points += [point for point in (shown.start, shown.place.goal, shown.failure) if point]
-        return fit(shown.place.prints, points, columns, rows, margin=0.4)
+        whole = fit(shown.place.prints, points, columns, rows, margin=0.4)
+        ways = fit((), points, columns, rows, margin=2.0) if shown.ways else whole
+        return ways if whole.scale > LARGE * ways.scale else whole
 
     def follow(self, snapshot: Snapshot) -> None:
         """Adds to the paths behind the robots that drive now."""
