@@ -2,15 +2,17 @@
 
 import json
 import shlex
+from pathlib import Path
 
 import pytest
 from textual.widgets import Input, Static
 
+from ddenv.errors import UserError
 from ddenv.runs.remembered import state_file
 from ddenv.runs.scenarios import load_parts
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_list import AskRemedy, MissingList
-from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remember_remedies, remembered
+from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered
 from ddenv.world.model import Box, Cylinder
 from tests.workbench.setup.setup_session import Opened
 
@@ -44,6 +46,17 @@ def shape(session, name):
 
 def place(session):
     session.fill(spawn_x="0", spawn_y="0", spawn_z="0.2", spawn_yaw="0", goal_x="8", goal_y="0")
+
+
+@pytest.mark.parametrize("typed", ["shelves", "shelves/", "./shelves", "inside/../shelves/"])
+def test_a_folder_may_be_named_from_here(tmp_path, monkeypatch, typed):
+    monkeypatch.chdir(tmp_path)
+    for name in ("shelves", "inside", "none"):
+        (tmp_path / name).mkdir()
+    assert Path(remedy(typed)).samefile("shelves") and Path(remedy(typed)).is_absolute()
+    assert remedy("none") == "none"
+    with pytest.raises(UserError, match=f"no folder {tmp_path}/away"):
+        remedy("away/")
 
 
 async def test_missing_files_are_rows_with_a_guess_that_is_on_the_map(depot, started):
@@ -91,7 +104,12 @@ async def test_remedies_are_used_the_next_time_and_in_other_worlds(depot, tmp_pa
     async with Opened() as session:
         await session.open(depot)
         await session.press("m", "a")
-        assert [row[0] for row in rows(session)] == ["✓", "✓"]
+        guessed = rows(session)
+        assert [row[0] for row in guessed] == ["✓", "✓"]
+        await session.press("m", "w")
+        assert sum("left out" in row for row in rows(session)) == 1
+        await session.press("m", "a")
+        assert rows(session) == guessed
     other = tmp_path / "other.world"
     other.write_bytes(depot.read_bytes())
     async with Opened() as session:

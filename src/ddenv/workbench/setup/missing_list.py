@@ -35,7 +35,13 @@ class MissingList(OptionList):
         Binding(
             "enter", "select", "remedy", id="missing.choose", tooltip="choose a folder or a shape, or leave it out"
         ),
-        Binding("a", "guess", "guess", id="missing.guess", tooltip="take the guessed shape wherever nothing is chosen"),
+        Binding(
+            "a",
+            "guess",
+            "guess",
+            id="missing.guess",
+            tooltip="take the guessed shape wherever nothing is chosen, or else for this one",
+        ),
         Binding("w", "without", "without", id="missing.without", tooltip="leave this one out"),
     ]
 
@@ -79,9 +85,10 @@ class MissingList(OptionList):
             self.post_message(self.Chosen({uri: text}))
 
     def action_guess(self) -> None:
-        chosen = {row.uri: "auto" for row in self._rows if not row.remedy}
-        if chosen:
-            self.post_message(self.Chosen(chosen))
+        undecided = [row.uri for row in self._rows if not row.remedy]
+        if not undecided and self.highlighted is not None:
+            undecided = [self._rows[self.highlighted].uri]
+        self.post_message(self.Chosen(dict.fromkeys(undecided, "auto")))
 
     def action_without(self) -> None:
         if self.highlighted is not None:

@@ -52,7 +52,8 @@ def remedy(text: str) -> str:
     from ddenv.world.sdf.standin import AUTO, NONE, parse_stand_in
 
     text = text.strip()
-    if text.startswith(("/", "~", ".")):
+    names_folder = text not in ("", AUTO, NONE) and is_folder(Path(text))
+    if "/" in text or text.startswith(("~", ".")) or names_folder:
         folder = without_tilde(text).absolute()
         if not is_folder(folder):
             raise UserError(f"{folder} is a file; name a folder" if folder.exists() else f"there is no folder {folder}")
