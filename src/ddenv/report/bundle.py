@@ -96,7 +96,7 @@ def write_test(run: Path, folder: Path) -> list[Path]:
         if path.exists():
             raise UserError(f"{path}: exists already; choose another folder")
     if not folder.is_dir():
-        raise UserError(f"{folder}: is no folder; make it first")
+        raise UserError(f"{folder}: is not a folder; make it first")
     with tempfile.TemporaryDirectory(prefix=".ddenv-test-", dir=folder) as temporary:
         made = Path(temporary) / copy.name
         _copy_run(run, made, record)
