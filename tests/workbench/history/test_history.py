@@ -1,5 +1,7 @@
 """The history of a run: its tree, going back in it, and two of its environments side by side."""
 
+from dataclasses import replace
+
 import fake_moments
 import fake_run
 import pytest
@@ -43,6 +45,7 @@ def test_what_a_node_is_has_a_sign_and_words(run):
     assert told == [("○", ""), ("○", ""), ("✗", "taken back"), ("●", "here")]
     state = fold(fake_moments.finished(fake_run.FakeRun(run.path.with_name("other.ddenv"))).file.events())
     assert branches.words(state.nodes[-1], 0) == "minimal"
+    assert branches.words(replace(state.nodes[-1], rejected=True), 0) == "was minimal"
 
 
 def test_two_environments_are_compared_by_name(run):

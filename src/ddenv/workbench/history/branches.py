@@ -64,10 +64,11 @@ def sign(node: Node, here: int) -> str:
 def words(node: Node, here: int) -> str:
     """What a node is, in words."""
     found = ["here"] if node.number == here else []
-    if node.minimal:
-        found.append("minimal")
     if node.rejected:
-        found.append("taken back")
+        # The column has no room for both, and "minimal" alone would hide that it is refused.
+        found.append("was minimal" if node.minimal else "taken back")
+    elif node.minimal:
+        found.append("minimal")
     if node.lost_rate:
         found.append("f too rare")
     return ", ".join(found)
