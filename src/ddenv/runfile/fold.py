@@ -87,6 +87,7 @@ def _noted(state: RunState, data: Data, _: float) -> Changes:
 def _test_started(state: RunState, data: Data, _: float) -> Changes:
     round, candidate = data["round"], data["candidate"]
     without = data.get("without")
+    tried = fold_ahead.tried(state, data) if round is None else _tried(state, candidate)
     test = Test(
         id=whole(data["test"]),
         phase=str(data["phase"]),
@@ -99,7 +100,7 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
         removal=fold_isolation.removal_of(state, data),
         audits=data.get("audits"),
         node=data.get("node", state.node),
-        tried=fold_ahead.tried(state, data),
+        tried=tried,
     )
     # Raises IndexError if there is none.
     here(state, test.node)
@@ -109,13 +110,11 @@ def _test_started(state: RunState, data: Data, _: float) -> Changes:
     changes = {"tests": state.tests.added(test), **counts(state, None, test), **more}
     if test.trial is not None:
         return changes | {"trials": _with_test_of_trial(state, test)}
-    if round is None:
+    if round is None or tried is None:
         return changes
     if round != _current(state).number:
         raise ValueError(round)
-    one = _tried(state, candidate)
-    changes["tests"] = state.tests.added(replace(test, tried=one))
-    return changes | _with_candidate(state, replace(one, tests=(*one.tests, test.id)))
+    return changes | _with_candidate(state, replace(tried, tests=(*tried.tests, test.id)))
 
 
 def _test_finished(state: RunState, data: Data, _: float) -> Changes:
