@@ -72,13 +72,13 @@ def main() -> None:
             done = reduced(scenario, path, options.jobs, options.search_only)
             print(row(scenario, done), flush=True)
             slices.setdefault(scenario.name, []).append((scenario, sliced(done.state)))
-    if options.models:
-        print("\n| scenario | models | a test after the slice, CPU s |\n|---|---|---|")
-        for worlds in slices.values():
-            # The same models everywhere: those that the small world's slice has.
-            keep = worlds[0][1]
-            for scenario, _ in worlds:
-                print(f"| {scenario.name} | {scenario.world.stem} | {cost(scenario, keep):.2f} |", flush=True)
+        if options.models:
+            print("\n| scenario | models | a test after the slice, CPU s |\n|---|---|---|")
+            for worlds in slices.values():
+                # The same models everywhere: those that the small world's slice has.
+                keep = worlds[0][1]
+                for scenario, _ in worlds:
+                    print(f"| {scenario.name} | {scenario.world.stem} | {cost(scenario, keep):.2f} |", flush=True)
 
 
 def scenarios(options: argparse.Namespace, folder: Path) -> Iterator[Scenario]:
