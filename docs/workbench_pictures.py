@@ -271,13 +271,18 @@ async def take_dialogs(pilot: Pilot[int]) -> None:
 
 async def other_failures(pilot: Pilot[int]) -> None:
     """A candidate that fell is not similar. Early, since later rounds of this run may meet no other failure."""
-    while not (rows := others(state(pilot))):
+    while True:
+        if others(state(pilot)):
+            await pause(pilot, True)
+            # A test that still runs can end the round.
+            await until(pilot, lambda: not run_screen(pilot).snapshot.live)
+            if rows := others(state(pilot)):
+                break
         if state(pilot).certificate is not None:
             raise RuntimeError("the rounds are over, and none met another failure")
         await pause(pilot, False)
         await accept_if_waiting(pilot)
         await pilot.pause(0.05)
-    await pause(pilot, True)
     await press(pilot, "2", "home", *["down"] * rows[0], "a")
     await take(pilot, "other")
     await press(pilot, "n", "f")
