@@ -15,7 +15,7 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.baseline import fix_failure
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult

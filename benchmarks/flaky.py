@@ -19,9 +19,9 @@ from statistics import fmean
 import numpy as np
 
 import ddenv
-from ddenv.reduction.acceptance import estimated_rate
+from ddenv.reduction.verdict import estimated_rate
 from ddenv.reduction.calls import Calls
-from ddenv.reduction.certificate import Terms, error_of
+from ddenv.evidence.certificate import Terms, error_of
 from ddenv.reduction.rate_claims import certified
 
 KEEP_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 3, 10

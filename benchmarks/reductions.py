@@ -33,7 +33,7 @@ from ddenv.runs.programs import start_engine
 from ddenv.runs.scenarios import load_parts, with_options
 from ddenv.settings import SETTINGS
 from ddenv.study.plan import PAIRS
-from ddenv.took_part import simulated
+from ddenv.evidence.took_part import simulated
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.scenario import Scenario
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from ddenv.claims import never_left_out, promise, verdict_on
+from ddenv.evidence.claims import never_left_out, promise, verdict_on
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.page.markdown import markdown
 from ddenv.report.report import content

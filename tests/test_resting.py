@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.resting import dropped
+from ddenv.runfile.supports import dropped
 
 NAMES = tuple("abcdefgh")
 SOME = st.sets(st.sampled_from(NAMES))

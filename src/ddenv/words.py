@@ -9,7 +9,7 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import (
+from ddenv.evidence.claims import (
     in_the_making,
     made_of_usual,
     missed,
@@ -21,10 +21,10 @@ from ddenv.claims import (
 )
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.removals import Removal
+from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
-from ddenv.took_part import implied_words, refuted_words, slice_words
+from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
 
 SETTLING = "finding what rests on what"
 ISOLATING = "finding the nearest world that passes"

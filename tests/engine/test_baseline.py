@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ddenv.engine.baseline import fix_failure
-from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile

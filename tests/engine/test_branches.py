@@ -2,7 +2,7 @@
 
 import random
 
-from ddenv.claims import ended, meaning, smaller_known
+from ddenv.evidence.claims import ended, meaning, smaller_known
 from ddenv.runfile.atlas import atlas, models_of
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.guided import Guided, at_once, guided, numbers, until  # noqa: F401

@@ -12,7 +12,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
 from ddenv.engine.settle import note_start
 from ddenv.errors import UserError
-from ddenv.resting import stacks
+from ddenv.runfile.supports import stacks
 from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile

@@ -14,7 +14,7 @@ from ddenv.learn.recorded_oracle import read_oracle
 from ddenv.learn.score import Score, data_of, score_of, summary
 from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import purpose

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.acceptance import MOST_RUNS, Acceptance, estimated_rate
+from ddenv.reduction.verdict import MOST_RUNS, Acceptance, estimated_rate
 from tests.tiers import slow
 
 keeping = st.builds(Acceptance, st.integers(1, 12), st.floats(0.05, 1), st.floats(0.3, 0.95), st.integers(0, 3))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.certificate import (
+from ddenv.evidence.certificate import (
     ERROR,
     MOST_BROKEN,
     MOST_PAIRS,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.acceptance import estimated_rate
-from ddenv.reduction.certificate import settle
+from ddenv.reduction.verdict import estimated_rate
+from ddenv.evidence.certificate import settle
 from ddenv.reduction.isolation import MOST_RUNS, Passing, isolating, passes
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import standing

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.rates import iterations_needed, miss_chance, shows_at, wilson_interval
+from ddenv.evidence.rates import iterations_needed, miss_chance, shows_at, wilson_interval
 
 
 def test_wilson_interval_matches_the_textbook():

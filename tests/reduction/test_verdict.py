@@ -5,7 +5,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.acceptance import Acceptance
+from ddenv.reduction.verdict import Acceptance
 from ddenv.reduction.verdict import decided_by, standing
 
 firsts = st.builds(Acceptance, st.integers(1, 4))

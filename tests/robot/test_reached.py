@@ -15,7 +15,7 @@ from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.slices import Ties
+from ddenv.evidence.slices import Ties
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of

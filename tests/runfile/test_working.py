@@ -4,7 +4,7 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import Event
-from ddenv.runfile.working import spent
+from ddenv.runfile.fold import spent
 from tests.workbench import fake_moments, fake_run
 
 ENGINE = {"pid": 1, "jobs": 1, "version": "1", "simulator": "x"}

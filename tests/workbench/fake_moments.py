@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import is_minimal, verdict_on
+from ddenv.evidence.claims import is_minimal, verdict_on
 from tests.workbench.fake_run import FakeRun
 
 

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState

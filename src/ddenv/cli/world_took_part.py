@@ -13,7 +13,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import read_parts
 from ddenv.runs.nearest import removed_in_passing
-from ddenv.took_part import in_whole_world
+from ddenv.evidence.took_part import in_whole_world
 
 
 def took_part_map(path: Path, columns: int, rows: int, *, color: bool) -> str:

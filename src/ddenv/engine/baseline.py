@@ -11,8 +11,8 @@ import numpy as np
 from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import end_of, rows_of
-from ddenv.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
+from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
 from ddenv.runfile.failures import SeenFailure, grouped
 from ddenv.runfile.state import BROKEN, Test

@@ -13,8 +13,8 @@ from ddenv.engine.bench import Bench, Wanted
 from ddenv.engine.control import Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.subjects import Asked, Keep
-from ddenv.rates import wilson_interval
-from ddenv.reduction.certificate import Claim, Procedure, Terms, Verdict, error_of, falls, good_enough, keeps, settle
+from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.certificate import Claim, Procedure, Terms, Verdict, error_of, falls, good_enough, keeps, settle
 from ddenv.reduction.chances_ahead import certificate_ahead, not_needed
 from ddenv.reduction.stepping_back import groups_again, last_good
 from ddenv.reduction.verdict import Shown

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import islice
 
-from ddenv.claims import current, is_minimal, verdict_on
+from ddenv.evidence.claims import current, is_minimal, verdict_on
 from ddenv.engine.ahead import Ahead, Now
 from ddenv.engine.announcing import announce
 from ddenv.engine.auditing import compare
@@ -24,7 +24,7 @@ from ddenv.engine.sight import Sight
 from ddenv.engine.slicing import audit_slice, slice_environment
 from ddenv.engine.subjects import Asked, Keep
 from ddenv.engine.wall_limit import limit_after
-from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
+from ddenv.reduction.verdict import MOST_RUNS, Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment
 from ddenv.reduction.guide import Guide, Search, make_guide, search

@@ -13,16 +13,16 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.sight import Sight
 from ddenv.engine.subjects import HELD, Keep
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.reduction.algorithms import by_chunks
-from ddenv.reduction.certificate import ERROR, Claim, Procedure, Terms, error_of, falls, settle
+from ddenv.evidence.certificate import ERROR, Claim, Procedure, Terms, error_of, falls, settle
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.guide import Search
 from ddenv.reduction.isolation import Passing, isolating, passes
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import Shown, decided_by, standing
-from ddenv.runfile.removals import Check, Isolation
+from ddenv.runfile.progress import Check, Isolation
 from ddenv.runfile.state import BROKEN, FRESH_RUNS, ISOLATE
 from ddenv.runfile.supports import stacks_of
 from ddenv.world.model import World

@@ -8,7 +8,7 @@ from typing import Any
 
 from ddenv.engine.known_tests import KnownTests
 from ddenv.engine.subjects import Asked, Keep, Keeps, current_round
-from ddenv.reduction.acceptance import Acceptance, estimated_rate
+from ddenv.reduction.verdict import Acceptance, estimated_rate
 from ddenv.reduction.stepping_back import Refused
 from ddenv.reduction.verdict import Shown, decided_by
 from ddenv.runfile.fold import apply

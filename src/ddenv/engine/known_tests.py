@@ -7,7 +7,7 @@ from collections import defaultdict
 from ddenv.engine.subjects import Keep
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.settings import SETTINGS, read
-from ddenv.slices import Ties, implies
+from ddenv.evidence.slices import Ties, implies
 
 
 class KnownTests:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from ddenv.claims import current
+from ddenv.evidence.claims import current
 from ddenv.engine.judging import rows_of
 from ddenv.engine.ros_messages import DEFINITIONS, nanoseconds
 from ddenv.engine.single_test import Subject, plan, subject_of_run

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count
-from ddenv.claims import current
+from ddenv.evidence.claims import current
 from ddenv.engine.single_test import Subject, in_folder, plan, run_trials, subject_of_run
 from ddenv.errors import UserError
-from ddenv.rates import shows_at
+from ddenv.evidence.rates import shows_at
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile

@@ -9,7 +9,7 @@ from ddenv.engine.subjects import Keep
 from ddenv.reduction.stacks import Stacks
 from ddenv.runfile.state import BROKEN, Test
 from ddenv.runfile.supports import stacks_of
-from ddenv.slices import fresh_chance
+from ddenv.evidence.slices import fresh_chance
 
 
 def slice_environment(journal: Journal) -> bool:

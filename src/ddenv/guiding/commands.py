@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, get_args
 
-from ddenv.claims import fresh_runs_made, in_the_making
+from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.errors import UserError
 from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
 from ddenv.guiding.pace import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop

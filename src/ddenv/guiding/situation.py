@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ddenv.claims import fresh_runs_made, in_the_making
+from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose

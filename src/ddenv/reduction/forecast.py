@@ -12,7 +12,7 @@ from random import Random
 import numpy as np
 
 from ddenv import schemas
-from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
+from ddenv.reduction.verdict import MOST_RUNS, Acceptance
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.evidence import Evidence, Partition
 from ddenv.reduction.guide import Guide, Search, search

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from ddenv.claims import current, rate
+from ddenv.evidence.claims import current, rate
 from ddenv.errors import UserError, printable
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run

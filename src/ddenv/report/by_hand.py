@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ddenv.claims import seen
+from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Section, Table, moment, plain, say
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import Node, RunState, Trial

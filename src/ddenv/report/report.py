@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ddenv.claims import ended
+from ddenv.evidence.claims import ended
 from ddenv.errors import UserError
 from ddenv.page.blocks import (
     Paragraph,
@@ -35,7 +35,7 @@ from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed, vector
 from ddenv.runfile.failures import Place
 from ddenv.runfile.state import RunState
-from ddenv.runfile.working import spent
+from ddenv.runfile.fold import spent
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddenv.claims import current
+from ddenv.evidence.claims import current
 from ddenv.errors import UserError
 from ddenv.page.blocks import section
 from ddenv.runfile.fold import apply

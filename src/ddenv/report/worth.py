@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import current, drift, meaning, missing, never_left_out, promise, verdict_on
+from ddenv.evidence.claims import current, drift, meaning, missing, never_left_out, promise, verdict_on
 from ddenv.page.blocks import Block, Cell, Name, Section, Table, percent, plain, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.progress import Certificate

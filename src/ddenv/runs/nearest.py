@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.amounts import first_of
-from ddenv.claims import is_nearest, of_passing
+from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.errors import UserError
-from ddenv.runfile.removals import Isolation
+from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import FRESH, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parted, parting_unknown, where_they_part

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.amounts import count, percent
-from ddenv.claims import current, verdict_on
+from ddenv.evidence.claims import current, verdict_on
 from ddenv.errors import UserError
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile

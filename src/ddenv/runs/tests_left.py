@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.certificate_cost import certificate_tests
-from ddenv.claims import expected_fresh_runs, fresh_runs_made
+from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.settings import SETTINGS, Reduction, read

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ddenv.claims import current, is_minimal
+from ddenv.evidence.claims import current, is_minimal
 from ddenv.errors import UserError
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.fold import apply

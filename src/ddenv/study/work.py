@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ddenv.claims import current
+from ddenv.evidence.claims import current
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from ddenv.amounts import rounded
-from ddenv.claims import drift
+from ddenv.evidence.claims import drift
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining

@@ -13,7 +13,7 @@ from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
-from ddenv.took_part import in_last
+from ddenv.evidence.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks

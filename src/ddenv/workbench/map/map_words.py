@@ -13,7 +13,7 @@ from ddenv.map.names import shortened
 from ddenv.runfile.events import Names
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import drops
-from ddenv.took_part import in_last
+from ddenv.evidence.took_part import in_last
 from ddenv.workbench.map.place import Shown
 from ddenv.workbench.wording import DROPS, count, dropping
 

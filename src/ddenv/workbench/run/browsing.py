@@ -10,7 +10,7 @@ from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import OF_TESTS, pointed, purpose
-from ddenv.runfile.working import spent
+from ddenv.runfile.fold import spent
 from ddenv.words import news
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.wording import count, outcome, plain

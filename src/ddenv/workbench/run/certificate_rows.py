@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ddenv.claims import fresh_runs_made, in_the_making, made_of_usual, short
+from ddenv.evidence.claims import fresh_runs_made, in_the_making, made_of_usual, short
 from ddenv.map.names import shortened
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.claims import current, ended, missed, of_runs, promise
+from ddenv.evidence.claims import current, ended, missed, of_runs, promise
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_rates import seen
 from ddenv.runfile.run_settings import Settings, settings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import fresh_runs_made, of_runs, terms, usual_runs
+from ddenv.evidence.claims import fresh_runs_made, of_runs, terms, usual_runs
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import drift, has_dropped
+from ddenv.evidence.claims import drift, has_dropped
 from ddenv.guiding.situation import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ddenv.runfile.state import RunState
-from ddenv.took_part import TEACHING, refuted_words, slice_words
+from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
 from ddenv.workbench.wording import plain
 
 

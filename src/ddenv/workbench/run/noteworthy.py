@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import ended
+from ddenv.evidence.claims import ended
 from ddenv.runs.tests_left import remaining
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import STATUS, count, plain, shorten

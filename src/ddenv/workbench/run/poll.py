@@ -16,7 +16,7 @@ from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive, suspended_engine
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.runfile.working import spent
+from ddenv.runfile.fold import spent
 from ddenv.version import __version__
 from ddenv.workbench.run.observed import Busy, Gone, Observed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ddenv.claims import current, meaning, rate
+from ddenv.evidence.claims import current, meaning, rate
 from ddenv.runfile.events import Names
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from ddenv.claims import current, in_the_making, made_of_usual, rate
+from ddenv.evidence.claims import current, in_the_making, made_of_usual, rate
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
 from ddenv.runs.reasons import no_reasons

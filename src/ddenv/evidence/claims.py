@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from ddenv.amounts import between, count, first_of, percent
-from ddenv.certificate_cost import Made, certificate_tests
-from ddenv.rates import miss_chance, wilson_interval
+from ddenv.evidence.certificate_cost import Made, certificate_tests
+from ddenv.evidence.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
 from ddenv.runfile.progress import Certificate, Claim
-from ddenv.runfile.removals import Isolation, Returned
+from ddenv.runfile.progress import Isolation, Returned
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, Node, RunState, Trial
 from ddenv.runfile.supports import stack_with

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from ddenv.amounts import count, first_of, percent
 from ddenv.runfile.state import BROKEN, FRESH, ISOLATE, Node, RunState
-from ddenv.slices import Models, fresh_chance, reasons
+from ddenv.evidence.slices import Models, fresh_chance, reasons
 
 # The maximum number of tests that a word on a candidate names.
 NAMED = 2

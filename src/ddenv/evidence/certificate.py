@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from ddenv.reduction.acceptance import HIGHEST_RATE
-from ddenv.reduction.verdict import Shown
+from ddenv.environment import Environment
+from ddenv.evidence.rates import HIGHEST_RATE, Shown
 
-Subject = frozenset[str]
 Verdict = Literal["", "kept", "lost", "needed", "not needed", "passes", "fails", "not shown", "unknown"]
 # Asks for a run of each of these subjects with the next seed, is sent whether each showed f, and returns a verdict.
-Procedure = Generator[tuple[Subject, ...], tuple[bool, ...], Verdict]
+Procedure = Generator[tuple[Environment, ...], tuple[bool, ...], Verdict]
 
 # The chance that any claim of a run is wrong, over all its certificates; half of it is for rates kept, half for removals.
 ERROR = 0.05
@@ -67,18 +66,18 @@ class Claim:
 
     verdict: Verdict
     runs: int
-    wanted: tuple[tuple[Subject, int], ...] = ()
-    rests_on: tuple[tuple[Subject, int], ...] = ()
+    wanted: tuple[tuple[Environment, int], ...] = ()
+    rests_on: tuple[tuple[Environment, int], ...] = ()
 
 
-def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: int = 1) -> Claim:
+def settle(procedure: Procedure, shown: Callable[[Environment, int], Shown], ahead: int = 1) -> Claim:
     """Carries a procedure as far as the finished runs go. It follows from their outcomes in order alone.
 
     Looks `ahead` for this many runs of each subject, so that idle workers have something to do. A run that broke for one
     of its subjects counts for none.
     """
     run = broken = 0
-    tests: list[tuple[Subject, int]] = []
+    tests: list[tuple[Environment, int]] = []
     # Every procedure asks for a run.
     subjects = next(procedure)
     while True:
@@ -99,7 +98,7 @@ def settle(procedure: Procedure, shown: Callable[[Subject, int], Shown], ahead: 
             return Claim(end.value, run, rests_on=tuple(tests))
 
 
-def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
+def keeps(left: Environment, whole: Environment, terms: Terms) -> Procedure:
     """Whether `left` shows f at `keep_rate` of the rate of `whole` or more: "kept", "lost" or "not shown".
 
     "kept" is wrong with a probability of at most the terms' error. "lost" is no such claim: f is seen to be rarer than in
@@ -136,7 +135,7 @@ def keeps(left: Subject, whole: Subject, terms: Terms) -> Procedure:
     return "not shown" if shown_left >= _likely_kept(terms) * shown_whole else "lost"
 
 
-def _of_whole(whole: Subject, runs: int) -> Procedure:
+def _of_whole(whole: Environment, runs: int) -> Procedure:
     """The whole world keeps its own rate, if f shows in it at all."""
     shown = 0
     for _ in range(runs):
@@ -150,7 +149,7 @@ def _likely_kept(terms: Terms) -> float:
     return max(terms.keep_rate, min(HIGH_SHARE, terms.keep_rate + SOMEWHAT_ABOVE))
 
 
-def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
+def falls(without: Environment, whole: Environment, terms: Terms) -> Procedure:
     """Whether `without` shows f at less than `keep_rate` of the rate of `whole`: "needed", "not needed" or "not shown".
 
     "needed" is wrong with a probability of at most the terms' error. "not needed" says that f shows about as often; the next
@@ -174,7 +173,7 @@ def falls(without: Subject, whole: Subject, terms: Terms) -> Procedure:
     return "not needed" if shown_without and shown_without >= _likely_kept(terms) * shown_whole else "not shown"
 
 
-def good_enough(earlier: Subject, rate: float, keep_rate: float, lost_rate: float) -> Procedure:
+def good_enough(earlier: Environment, rate: float, keep_rate: float, lost_rate: float) -> Procedure:
     """Whether an earlier environment still shows f at `rate`, and not nearer to `lost_rate`: "kept" or "lost"."""
     good = min(rate, HIGHEST_RATE)
     bad = min(max(0.02, min(keep_rate * good, (good + lost_rate) / 2.0)), keep_rate * good)
@@ -187,7 +186,7 @@ def good_enough(earlier: Subject, rate: float, keep_rate: float, lost_rate: floa
     return "kept" if ratio > 0 else "lost"
 
 
-def _at_least(more: int, subjects: tuple[Subject, ...], verdict: Verdict) -> Procedure:
+def _at_least(more: int, subjects: tuple[Environment, ...], verdict: Verdict) -> Procedure:
     """`verdict`, after so many more runs: its interval has to say something."""
     for _ in range(more):
         yield subjects

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Literal
 
 Z_95 = 1.959963984540054
+# Few runs never show that f is certain.
+HIGHEST_RATE = 0.985
+# The rate of f where something that it needs is missing: another failure may end in the same place by chance.
+SPURIOUS = 0.03
+# Whether a run showed f. A broken one says nothing; None is a run that is not finished.
+Shown = bool | Literal["broken"] | None
 
 
 def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tuple[float, float]:
@@ -54,3 +61,8 @@ def leans_to(hits: int, misses: int, rate: float, other: float, error: float) ->
     rate = min(rate, 0.99)
     ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
     return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None
+
+
+def estimated_rate(shown: int, runs: int) -> float:
+    """The rate of a failure that `shown` of `runs` showed, never 0 or 1."""
+    return (shown + 0.5) / (runs + 1)

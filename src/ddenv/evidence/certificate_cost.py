@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 
 # It takes so many times the expected number, if the rates are right. From the rate `SURE` on, what is left first runs alone.
 SHORTER, LONGER, SURE = 0.5, 2.2, 0.93
@@ -88,7 +88,7 @@ def _ends(rate: float, runs: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Expected:
-    """As `ddenv.reduction.certificate` goes: wealth grows as the square of the mean gain of a pair over twice its second moment."""
+    """As `ddenv.evidence.certificate` goes: wealth grows as the square of the mean gain of a pair over twice its second moment."""
 
     keep_rate: float
     at_least: int
