@@ -325,7 +325,7 @@ class _Caller:
         rate = self.rate() if self._keep_rate else 0.0
         rule = Acceptance(self._most_misses, rate, self._keep_rate, len(self._lost))
         free = {element: Environment.of((element,)) for element in self._chain[-1]}
-        return Leg(self.rounds + 1, self._chain, NOTHING, free, rule, again=again)
+        return Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, again=again)
 
     def _go(self, chain: tuple[Environment, ...]) -> None:
         self._chain = chain

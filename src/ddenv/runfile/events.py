@@ -270,13 +270,12 @@ class LegStarted:
     """A search starts from the current environment, with round number `round`.
 
     Its first round has `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f
-    decides. The groups `again` are left out first.
+    decides.
     """
 
     round: Number
     n_partitions: Number | None = None
     rate: Share = 0.0
-    again: tuple[tuple[Natural, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
