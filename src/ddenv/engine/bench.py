@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -255,7 +256,7 @@ class Bench:
             environment = journal.state.environments[started.environment]
             self._started.discard((environment, started.run, journal.is_full(started.phase)))
         took_part = data.pop("took_part", None)
-        noticed = {
+        noticed: dict[str, Any] = {
             "first_sensed": journal.in_order(data.pop("first_sensed")),
             "first_touched": journal.in_order(data.pop("first_touched")),
             "took_part": None if took_part is None else journal.models(took_part),

@@ -1,4 +1,4 @@
-"""Carries a run through: drives the procedure with workers and a run file. What to test, and what follows, is the procedure's to say."""
+"""Carries a run through: drives the procedure with workers and a run file, and records what it finds."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Driver:
                 return end.value
             answer = changed = None
             try:
-                answer = self._answers[type(step)](self, step)
+                answer = _ANSWERS[type(step)](self, step)
             except Steered:
                 slice_environment(self._journal)
                 changed = steps.Changed(self._next_leg())
@@ -455,21 +455,6 @@ class Driver:
         while True:
             self._bench.tick()
 
-    _answers: dict[type, Callable[[Driver, Any], object]] = {
-        steps.Wants: _wants,
-        steps.BaselineRan: _baseline_ran,
-        steps.FailureFixed: _failure_fixed,
-        steps.RoundBegan: _round_began,
-        steps.Judged: _judged,
-        steps.Similar: _similar,
-        steps.RoundEnded: _round_ended,
-        steps.SearchEnded: _search_ended,
-        steps.CertificateDue: _certificate_due,
-        steps.Certified: _certified,
-        steps.SteppedBack: _stepped_back,
-        steps.LeftOut: _left_out,
-    }
-
     # The end.
 
     def _conclude(self) -> None:
@@ -502,3 +487,20 @@ def other_way(round: int) -> str:
         f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
         "package of schemas; continue with those, or start a new run"
     )
+
+
+# Each is recorded, and answered as the step says.
+_ANSWERS: dict[type, Callable[[Driver, Any], object]] = {
+    steps.Wants: Driver._wants,
+    steps.BaselineRan: Driver._baseline_ran,
+    steps.FailureFixed: Driver._failure_fixed,
+    steps.RoundBegan: Driver._round_began,
+    steps.Judged: Driver._judged,
+    steps.Similar: Driver._similar,
+    steps.RoundEnded: Driver._round_ended,
+    steps.SearchEnded: Driver._search_ended,
+    steps.CertificateDue: Driver._certificate_due,
+    steps.Certified: Driver._certified,
+    steps.SteppedBack: Driver._stepped_back,
+    steps.LeftOut: Driver._left_out,
+}

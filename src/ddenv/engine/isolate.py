@@ -1,8 +1,8 @@
-"""Carries isolation through with workers and a run file: the nearest world that passes. What to test is `reduction.isolation`'s to say."""
+"""Carries isolation through with workers and a run file: finds the nearest world that passes, as `reduction.isolation` says."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import cast
 
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Stopped
@@ -10,7 +10,7 @@ from ddenv.engine.journal import FRESH_RUNS, Journal
 from ddenv.engine.judging import known_failure, rows_of
 from ddenv.engine.sight import Sight
 from ddenv.environment import Environment
-from ddenv.evidence.certificate import ERROR, Claim
+from ddenv.evidence.certificate import ERROR, Claim, Verdict
 from ddenv.evidence.rates import Shown, wilson_interval
 from ddenv.reduction.chance import distances_to_failure
 from ddenv.reduction.isolation import MOST_CHECKS, Asked, Checked, Passing, isolation
@@ -33,11 +33,7 @@ from ddenv.world.scenario import Reduction
 FIRST_RUN = 100_000_000
 # So many fresh runs of the world that passes, at least: their interval has to say something.
 FEWEST_RUNS = 20
-VERDICTS: dict[str, Literal["passes", "fails", "unknown"]] = {
-    "similar": "passes",
-    "dissimilar": "fails",
-    "unknown": "unknown",
-}
+VERDICTS = {"similar": "passes", "dissimilar": "fails", "unknown": "unknown"}
 CHANGED = "a decision of the user, or a slice that was wrong, ended the isolation; resume the run to go on from there"
 
 
@@ -210,6 +206,6 @@ class _Isolator:
             claims = []
             for one in check.claims:
                 model = None if one.back is None else next(iter(journal.models([one.back])))
-                claims.append(NamedClaim(model, passing, Claim(one.verdict, one.runs)))
+                claims.append(NamedClaim(model, passing, Claim(cast(Verdict, one.verdict), one.runs)))
             checks.append(Checked(self._whole - passing, tuple(claims)))
         return checks

@@ -189,8 +189,8 @@ class _Memo:
     """The finished tests of a run by (environment, run, full). A test in it is never made again, but one that broke is made twice,
     and again by the next engine where a verdict needs it.
 
-    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only changes
-    runs that it cuts.
+    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
+    changes runs that it cuts.
     """
 
     def __init__(self, state: RunState) -> None:

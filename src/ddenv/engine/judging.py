@@ -12,7 +12,7 @@ from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import Outcome, Outcomes
+from ddenv.runfile.events import Outcomes
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
@@ -92,7 +92,7 @@ def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> 
 
 def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> Outcomes:
     """The outcomes of all failed tests so far, judged by `failures`."""
-    outcomes: dict[int, Outcome] = {}
+    outcomes: dict[int, str] = {}
     distances: dict[int, float] = {}
     for test in state.tests:
         if test.outcome not in ("similar", "other"):

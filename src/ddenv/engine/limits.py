@@ -1,9 +1,9 @@
 """What one test may take: real time, and memory.
 
-The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and all later tests a multiple
-of what these took: so a slow world or machine is not taken for a hanging one. The baseline's event holds it: a resumed engine uses
-the same. Without a size, the workers share most of what this process may use: no test may take the memory of others, or bring the
-kernel to kill the engine.
+The user's own numbers hold for all tests. Without a time, the runs of the whole world get a long one, and all later tests a
+multiple of what these took: so a slow world or machine is not taken for a hanging one. The baseline's event holds it: a resumed
+engine uses the same. Without a size, the workers share most of what this process may use: no test may take the memory of others, or
+bring the kernel to kill the engine.
 """
 
 from __future__ import annotations

@@ -75,9 +75,9 @@ class Checked:
 
 @dataclass(frozen=True)
 class Asked:
-    """An isolation: of `whole`, the suspects may go, first to last, at first `size` of them; `stacks` has what goes with each.
+    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each.
 
-    The claims of each check are wrong with the error of its number. Its fresh runs begin `block` runs after those of the one before.
+    Each check has the error of its number, and begins `block` runs after the one before.
     """
 
     whole: Environment
