@@ -30,7 +30,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.runs.scenarios import load_parts, with_options
+from ddenv.runs.subject import load_parts, with_options
 from ddenv.settings import SETTINGS
 from ddenv.study.plan import PAIRS
 from ddenv.took_part import simulated

@@ -29,7 +29,7 @@ from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.slices import Ties
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World

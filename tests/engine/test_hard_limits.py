@@ -9,7 +9,7 @@ from ddenv.engine.memory_limit import memory_limit
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
 from tests.engine.test_pool import EVERYTHING, parts, result

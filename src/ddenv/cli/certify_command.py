@@ -33,9 +33,10 @@ def certify_command(run: str, runs: int | None, jobs: int, cluster: str | None, 
     from ddenv.runs.programs import start_engine
 
     path = find_run(run)
-    allow_run(path, trust, cluster)
-    with RunFile(path) as file, engine_lock(path):
-        state = fold(file.events())
+    with RunFile(path) as file:
+        allow_run(file, trust, cluster)
+        with engine_lock(path):
+            state = fold(file.events())
     if state.baseline is None:
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"

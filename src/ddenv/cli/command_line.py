@@ -67,10 +67,12 @@ class Commands(click.Group):
 
 def _can_be_opened(word: str) -> bool:
     """Whether a word names a file, there or not, a run or a bundled scenario."""
-    from ddenv.runs.folder import find_run
-
     path = Path(word)
-    return bool(path.suffix) or len(path.parts) > 1 or path.exists() or find_run(word).is_file() or word in bundled()
+    if path.suffix or len(path.parts) > 1 or path.exists():
+        return True
+    from ddenv.runs.subject import named
+
+    return named(word) is not None
 
 
 def bundled() -> list[str]:

@@ -46,9 +46,10 @@ def isolate_command(
     from ddenv.runs.programs import start_engine
 
     path = find_run(run)
-    allow_run(path, trust, cluster)
-    with RunFile(path) as file, engine_lock(path):
-        state = fold(file.events())
+    with RunFile(path) as file:
+        allow_run(file, trust, cluster)
+        with engine_lock(path):
+            state = fold(file.events())
     if give_up:
         if state.isolating is None:
             raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")

@@ -55,7 +55,7 @@ def _evidence(lesson: Lesson) -> dict[str, Any]:
     from ddenv.engine.sight import traits_of, trajectory_of
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import COLUMNS
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
     from ddenv.world.extent import center
 
     with RunFile(lesson.run) as content:

@@ -11,6 +11,7 @@ import click
 from ddenv.errors import printable
 
 if TYPE_CHECKING:
+    from ddenv.runfile.store import RunFile
     from ddenv.world.scenario import Scenario
 
 
@@ -40,13 +41,15 @@ def allow_named(scenario: Scenario, name: str, trust: bool) -> None:
     allow(scenario, name, trust)
 
 
-def allow_run(path: Path, trust: bool, cluster: str | None = None) -> None:
-    """As `allow`, for a run file; the user has typed another `cluster`, if any. Raises UserError for a damaged one, too."""
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.clusters import check_cluster, made_here
-    from ddenv.runs.creation import read_scenario
+def allow_run(file: RunFile, trust: bool, cluster: str | None = None) -> Scenario:
+    """As `allow`, for a run, whose scenario it returns; the user has typed another `cluster`, if any.
 
-    with RunFile(path) as file:
-        scenario = read_scenario(file)
+    Raises UserError for a damaged file, too.
+    """
+    from ddenv.runs.clusters import check_cluster, made_here
+    from ddenv.runs.subject import read_scenario
+
+    scenario = read_scenario(file)
     check_cluster(cluster or scenario.reduction.cluster)
-    allow(made_here(scenario) if cluster else scenario, path, trust)
+    allow(made_here(scenario) if cluster else scenario, file.path, trust)
+    return scenario

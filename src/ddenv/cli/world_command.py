@@ -116,13 +116,13 @@ def _read(file: Path, reading: dict[str, Any]) -> World:
 
 def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     """The same, and how it was read."""
-    from ddenv.runs.scenarios import reading_of
-    from ddenv.world.load import bundled_names, find_scenario, load_scenario
+    from ddenv.runs.subject import named_file, reading_of
+    from ddenv.world.load import load_scenario
     from ddenv.world.read import read_world
+    from ddenv.world.scenario import PLAIN
 
-    if file.suffix.lower() in (".yaml", ".yml") or (str(file) in bundled_names() and not file.exists()):
-        scenario = load_scenario(find_scenario(str(file)))
-        file, read_as = scenario.world, reading_of(scenario.reading, **reading)
-    else:
-        read_as = reading_of(**reading)
+    kind, path = named_file(str(file)) or ("world", file)
+    scenario = load_scenario(path) if kind == "scenario" else None
+    file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
+    read_as = reading_of(own, **reading)
     return read_world(file, read_as, announce), read_as

@@ -21,7 +21,7 @@ def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     check_drake()
     from ddenv.robot.drake.template import Variants
     from ddenv.robot.settled import moved, notes_on
-    from ddenv.runs.scenarios import scenario_for_world
+    from ddenv.runs.subject import scenario_for_world
     from ddenv.world.files.access import write_file
     from ddenv.world.inside import note_inside
     from ddenv.world.moved import with_places

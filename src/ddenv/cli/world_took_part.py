@@ -11,8 +11,8 @@ from ddenv.cli.world_show import terminal_map
 from ddenv.errors import UserError, printable
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
 from ddenv.runs.nearest import removed_in_passing
+from ddenv.runs.subject import read_parts
 from ddenv.took_part import in_whole_world
 
 

@@ -13,7 +13,7 @@ from mcap_ros2.writer import Writer
 from ddenv.claims import current
 from ddenv.engine.judging import rows_of
 from ddenv.engine.ros_messages import DEFINITIONS, nanoseconds
-from ddenv.engine.single_test import Subject, plan, subject_of_run
+from ddenv.engine.single_test import plan
 from ddenv.engine.streams import Chosen, Streams, messages
 from ddenv.errors import UserError
 from ddenv.robot.drake.template import Variants
@@ -22,6 +22,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, F, reasons
+from ddenv.runs.subject import Subject, read_subject
 from ddenv.world.files.access import write_file
 
 
@@ -35,7 +36,7 @@ def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) 
     if target.exists():
         raise UserError(f"{target}: exists already; choose another name")
     with RunFile(run) as file:
-        subject = subject_of_run(file)
+        subject = read_subject(file)
         if subject.scenario.oracle is not None:
             raise UserError(f"{run}: a simulator of your own made it; only runs on Drake have streams to write")
         chosen = [_named(subject, name, test) for name, test in _chosen(file)]

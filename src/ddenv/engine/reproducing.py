@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count
 from ddenv.claims import current
-from ddenv.engine.single_test import Subject, in_folder, plan, run_trials, subject_of_run
+from ddenv.engine.single_test import plan, run_trials
 from ddenv.errors import UserError
 from ddenv.rates import shows_at
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
+from ddenv.runs.subject import Subject, read_subject
 from ddenv.runs.trust import check_trusted, program_of, trust
 
 # Far from all seeds of a reduction and of its certificates.
@@ -46,8 +47,10 @@ class Reproduction:
 def subject_in(run: Path, folder: Path | None) -> Subject:
     """The world of a run; the user's own controller or simulator is that in `folder`, if given. Raises UserError."""
     with RunFile(run) as file:
-        subject = subject_of_run(file)
-    return subject if folder is None else in_folder(subject, folder)
+        subject = read_subject(file)
+    if folder is None:
+        return subject
+    return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
 
 
 def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool) -> Reproduction:

@@ -24,11 +24,11 @@ from ddenv.engine.ros_messages import (
     twist,
     vector,
 )
-from ddenv.engine.single_test import Subject
 from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.runs.subject import Subject
 from ddenv.world import scenario
 from ddenv.world.model import Link, Model, Shape
 from ddenv.world.pose import Pose

@@ -109,7 +109,7 @@ def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
 
 
 def _world(file: RunFile, troubles: list[str]) -> World | None:
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     try:
         return read_parts(file)[1]
