@@ -18,7 +18,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
 from ddenv.schemas import nearest
-from ddenv.settings import SETTINGS, Ignorable, Value, put
+from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
 from ddenv.world.command import command_words
 from ddenv.world.files.access import read_bytes, write_file
 from ddenv.world.files.resources import Stored
@@ -169,8 +169,10 @@ def with_options(
     """
     given = {name: value for name, value in values.items() if value is not None}
     for name, value in given.items():
-        if name in SETTINGS and (value or not SETTINGS[name].none):
-            SETTINGS[name].check(value)
+        one = SETTINGS.get(name)
+        # 0 takes back a limit; words are checked with the scenario.
+        if one and not isinstance(value, bool | str) and (value or not one.none) and not one.allows(value):
+            raise UserError(f"{one.option or one.key}: expected {one.range}, found {number_text(value)}")
     chosen = with_values(scenario.model_dump(mode="json"), given)
     if spawn is not None:
         chosen["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
