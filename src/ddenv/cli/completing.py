@@ -50,4 +50,4 @@ def _runs() -> list[str]:
 def _scenarios() -> list[str]:
     from ddenv.world.load import bundled_names
 
-    return list(bundled_names())
+    return bundled_names()

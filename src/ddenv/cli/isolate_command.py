@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -73,7 +72,7 @@ def isolate_command(
 
 def _print(path: Path, as_json: bool) -> int:
     """Prints what was found; returns the exit code."""
-    from ddenv.cli.wrapping import wrapped
+    from ddenv.cli.wrapping import terminal_columns, wrapped
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.nearest import nearest
@@ -84,7 +83,7 @@ def _print(path: Path, as_json: bool) -> int:
     if found is None:
         # The engine was stopped from elsewhere.
         raise UserError(f"{path}: {state.reason}")
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_columns()
     print(
         json.dumps({"nearest": asdict(found)}) if as_json else "\n".join(wrapped(printable(found.sentences), columns))
     )
