@@ -53,7 +53,9 @@ class Commands(click.Group):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
         if not ctx.resilient_parsing and not _can_be_opened(word):
-            known = [*self.list_commands(ctx), *bundled()]
+            from ddenv.world.load import bundled_names
+
+            known = [*self.list_commands(ctx), *bundled_names()]
             raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
         return open_command.name, open_command, args
 
@@ -73,13 +75,6 @@ def _can_be_opened(word: str) -> bool:
     from ddenv.runs.subject import named
 
     return named(word) is not None
-
-
-def bundled() -> list[str]:
-    """The names of the bundled scenarios."""
-    from ddenv.world.load import bundled_names
-
-    return bundled_names()
 
 
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})

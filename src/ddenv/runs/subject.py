@@ -108,19 +108,19 @@ def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | Non
     """
     reading = {option: given[option] for option in READING}
     others = {option: value for option, value in given.items() if option not in READING}
+    spawn, goal = given["spawn"], given["goal"]
     if Path(name).suffix.lower() not in WORLD_FILES:
         scenario = load_scenario(find_scenario(name))
-        return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
-    spawn, goal, world = (others.pop(option) for option in ("spawn", "goal", "world"))
-    if spawn is None or goal is None:
+    elif spawn is None or goal is None:
         # A file that is no world needs no places either.
         read_world(Path(name), reading_of(**reading), announce)
         example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
         raise UserError(f"{name}: an SDF world needs a start and a goal, such as {example}")
-    if world is not None:
+    elif given["world"] is not None:
         raise UserError(f"--world: only for a scenario; {name} is a world")
-    scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
-    return with_options(scenario, reading=reading_of(**reading), **others)
+    else:
+        scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
+    return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
 
 
 def reading_of(
