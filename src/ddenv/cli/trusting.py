@@ -17,13 +17,11 @@ if TYPE_CHECKING:
 
 def allow(scenario: Scenario, where: Path | str, trust: bool) -> None:
     """Returns if what `scenario` starts is trusted; asks on a terminal, unless `trust` says yes. Raises UserError if it is not."""
-    from ddenv.runs.trust import check_trusted, is_trusted, program_of
+    from ddenv.runs.trust import check_trusted, untrusted
     from ddenv.runs.trust import trust as remember
 
-    program = program_of(scenario)
-    if program is None or is_trusted(program):
-        return
-    if trust or _says_yes(f"{where} starts {program.words}. Do you trust it?"):
+    program = untrusted(scenario)
+    if program and (trust or _says_yes(f"{where} starts {program.words}. Do you trust it?")):
         remember(program)
     check_trusted(scenario, where)
 

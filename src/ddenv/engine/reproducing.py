@@ -16,7 +16,7 @@ from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import Subject, read_subject
-from ddenv.runs.trust import check_trusted, program_of, trust
+from ddenv.runs.trust import check_trusted, trust, untrusted
 
 # Far from all seeds of a reduction and of its certificates.
 FIRST_SEED = 1_000_000_000
@@ -56,7 +56,7 @@ def subject_in(run: Path, folder: Path | None) -> Subject:
 def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool) -> Reproduction:
     """What all runs of `reproduce` show together. Raises UserError, also for a program that is not trusted."""
     subject = subject_in(run, folder)
-    if trusted and (program := program_of(subject.scenario)) is not None:
+    if trusted and (program := untrusted(subject.scenario)):
         trust(program)
     check_trusted(subject.scenario, run)
     *_, (_, found) = reproduce(subject, expected(subject, run).low, most, jobs)
