@@ -35,20 +35,12 @@ def isolate_command(
     robot to reach its goal. It changes nothing else.
     """
     from ddenv.cli.follow import Interrupted, follow
-    from ddenv.cli.trusting import allow_run
+    from ddenv.cli.trusting import idle_run
     from ddenv.guiding.pace import Isolate
     from ddenv.guiding.situation import Situation
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.lock import engine_lock
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
     from ddenv.runs.programs import start_engine
 
-    path = find_run(run)
-    with RunFile(path) as file:
-        allow_run(file, trust, cluster)
-        with engine_lock(path):
-            state = fold(file.events())
+    path, state = idle_run(run, trust, cluster)
     if give_up:
         if state.isolating is None:
             raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")

@@ -11,6 +11,7 @@ import click
 from ddenv.errors import printable
 
 if TYPE_CHECKING:
+    from ddenv.runfile.state import RunState
     from ddenv.runfile.store import RunFile
     from ddenv.world.scenario import Scenario
 
@@ -51,3 +52,17 @@ def allow_run(file: RunFile, trust: bool, cluster: str | None = None) -> Scenari
     check_cluster(cluster or scenario.reduction.cluster)
     allow(made_here(scenario) if cluster else scenario, file.path, trust)
     return scenario
+
+
+def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
+    """The file and the state of a run that no engine works on, and that may start what it brings along. Raises UserError."""
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.lock import engine_lock
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+
+    path = find_run(run)
+    with RunFile(path) as file:
+        allow_run(file, trust, cluster)
+        with engine_lock(path):
+            return path, fold(file.events())
