@@ -17,12 +17,12 @@ from multiprocessing import get_context
 from statistics import fmean
 
 import numpy as np
+from ddenv.reduction.calls import Calls
+from ddenv.reduction.rate_claims import certified
 
 import ddenv
-from ddenv.reduction.verdict import estimated_rate
-from ddenv.reduction.calls import Calls
 from ddenv.evidence.certificate import Terms, error_of
-from ddenv.reduction.rate_claims import certified
+from ddenv.reduction.verdict import estimated_rate
 
 KEEP_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 3, 10
 # Rates that are products must not fall below a limit by rounding.

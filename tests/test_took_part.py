@@ -6,12 +6,12 @@ import re
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
+from ddenv.evidence.took_part import slice_in_short, why_sliced
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.evidence.took_part import slice_in_short, why_sliced
 from ddenv.words import news
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.verdict import estimated_rate
 from ddenv.evidence.certificate import settle
 from ddenv.reduction.isolation import MOST_RUNS, Passing, isolating, passes
 from ddenv.reduction.stacks import Stacks
-from ddenv.reduction.verdict import standing
+from ddenv.reduction.verdict import estimated_rate, standing
 from tests.tiers import examples
 
 NAMES = tuple(f"m{number}" for number in range(12))

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.algorithms import sweep
 from ddenv.evidence.certificate import good_enough, settle
+from ddenv.reduction.algorithms import sweep
 from ddenv.reduction.stepping_back import Refused, groups_again, last_good, tried_again
 
 CHAIN = [frozenset(ascii_lowercase[:length]) for length in range(12, 0, -1)]

@@ -5,8 +5,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.verdict import Acceptance
-from ddenv.reduction.verdict import decided_by, standing
+from ddenv.reduction.verdict import Acceptance, decided_by, standing
 
 firsts = st.builds(Acceptance, st.integers(1, 4))
 keeping = st.builds(Acceptance, st.integers(1, 12), st.floats(0.05, 1), st.floats(0.3, 0.95), st.integers(0, 3))

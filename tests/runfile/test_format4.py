@@ -15,8 +15,8 @@ import pytest
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
 from ddenv.runs.export import export_world
+from ddenv.runs.subject import read_parts
 
 RECORDED = Path(__file__).parents[1] / "data" / "format4.ddenv"
 

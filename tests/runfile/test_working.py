@@ -2,9 +2,8 @@
 
 import pytest
 
-from ddenv.runfile.fold import fold
+from ddenv.runfile.fold import fold, spent
 from ddenv.runfile.store import Event
-from ddenv.runfile.fold import spent
 from tests.workbench import fake_moments, fake_run
 
 ENGINE = {"pid": 1, "jobs": 1, "version": "1", "simulator": "x"}

@@ -12,11 +12,10 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import apply, spent
 from ddenv.runfile.lock import engine_is_alive, suspended_engine
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.runfile.fold import spent
 from ddenv.version import __version__
 from ddenv.workbench.run.observed import Busy, Gone, Observed
 
