@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ddenv
-from ddenv.reduction.walk import Step
+from ddenv.reduction.reduce import Step
 from ddenv.schemas import names
 from tests.conftest import ROOT
 from tests.tiers import examples

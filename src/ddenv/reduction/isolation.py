@@ -77,7 +77,8 @@ class Checked:
 class Asked:
     """An isolation: of `whole`, the suspects may go, first to last, at first `size` of them; `stacks` has what goes with each.
 
-    The claims of each check are wrong with the error of its number. Its fresh runs begin `block` runs after those of the one before.
+    The claims of each check are wrong with the error of its number. Its fresh runs begin `block` runs after those of the check
+    before.
     """
 
     whole: Environment

@@ -138,8 +138,8 @@ class Certified:
 class SteppedBack:
     """What is left lost the rate. The search goes back to place number `place` of the chain.
 
-    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on fresh `tests`, as (environment, run). The
-    answer is the next leg.
+    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
+    fresh `tests`, as (environment, run). The answer is the next leg.
     """
 
     place: int
@@ -176,8 +176,8 @@ class Leg:
     """Where a search begins: `chain` leads from the world in which f was seen to the environment that is searched.
 
     `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
-    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the usual
-    number. The groups `again` are left out first.
+    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
+    usual number. The groups `again` are left out first.
     """
 
     first_round: int
@@ -416,15 +416,15 @@ def onward(
     if not driver.goes_on():
         return None
     left, *removals = certified.claims
-    after: Leg | None = None
     if left.claim.verdict == "lost":
         if leg.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
-            after = yield from _step_back(driver, chain, certified)
-        return after
-    spare = next((claim for claim in removals if claim.claim.verdict == "not needed"), None)
-    if spare is not None and spare.model is not None and not driver.refused(spare.environment):
-        after = yield LeftOut(spare.model, spare.environment)
-    return after
+            return (yield from _step_back(driver, chain, certified))
+        return None
+    for claim in removals:
+        if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
+            after: Leg = yield LeftOut(claim.model, claim.environment)
+            return after
+    return None
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
