@@ -7,15 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.verdict import estimated_rate
+from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import settle
+from ddenv.evidence.rates import estimated_rate
 from ddenv.reduction.isolation import MOST_RUNS, Passing, isolating, passes
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import standing
 from tests.tiers import examples
 
-NAMES = tuple(f"m{number}" for number in range(12))
-groups = st.lists(st.frozensets(st.sampled_from(NAMES), min_size=1, max_size=4), min_size=1, max_size=4)
+MODELS = tuple(range(12))
+groups = st.lists(st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(Environment.of), min_size=1, max_size=4)
 
 
 def search(searching, passing):
@@ -39,47 +40,46 @@ def hits(groups):
     return lambda removed: all(not group.isdisjoint(removed) for group in groups)
 
 
-@given(groups=groups, first=st.integers(0, 14), order=st.permutations(NAMES))
+@given(groups=groups, first=st.integers(0, 14), order=st.permutations(MODELS))
 @examples(3)
 def test_what_goes_lets_the_robot_pass_and_not_with_any_one_model_put_back(groups, first, order):
     passing = hits(groups)
     removed, tried = search(isolating(tuple(order), first), passing)
     assert passing(removed)
-    assert not any(passing(removed - {name}) for name in removed)
+    put_back = {removed - Environment.of((model,)) for model in removed}
+    assert not any(map(passing, put_back))
     # Tests showed it: each of these was tried, unless nothing would be removed.
     assert removed in tried
-    assert {removed - {name} for name in removed} - {frozenset()} <= set(tried)
+    assert put_back - {NOTHING} <= set(tried)
 
 
 @given(
-    passing=st.sets(st.frozensets(st.sampled_from(NAMES[:5]), min_size=1)),
+    passing=st.sets(st.integers(1, 31).map(Environment)),
     first=st.integers(1, 5),
 )
 @examples(3)
 def test_it_is_one_minimal_whatever_passes(passing, first):
     """Also where a larger removal fails again."""
-    removed, _ = search(isolating(NAMES[:5], first), lambda each: each in passing)
+    removed, _ = search(isolating(MODELS[:5], first), passing.__contains__)
     if removed:
         assert removed in passing
-        assert not any(removed - {name} in passing for name in removed)
+        assert not any(removed - Environment.of((model,)) in passing for model in removed)
     else:
-        assert frozenset(NAMES[:5]) not in passing
+        assert Environment.whole(5) not in passing
 
 
 def test_what_the_reduction_left_goes_first_and_then_twice_as_many():
-    _, tried = search(isolating(NAMES, 2), lambda _: False)
+    _, tried = search(isolating(MODELS, 2), lambda _: False)
     assert [len(each) for each in tried] == [2, 4, 8, 12]
     assert all(few < many for few, many in pairwise(tried))
-    assert search(isolating((), 3), lambda _: True) == (frozenset(), [])
+    assert search(isolating((), 3), lambda _: True) == (NOTHING, [])
 
 
 def test_a_stack_goes_or_stays_as_a_whole():
-    stacks = Stacks.of([("m0",), ("m1", "m2", "m3"), ("m4", "m5")])
-    removed, tried = search(stacks.expand(isolating(stacks.representatives, 1)), hits([frozenset({"m2", "m9"})]))
-    assert removed == {"m1", "m2", "m3"}
-    assert all(
-        each & stack in (frozenset(), stack) for each in tried for stack in map(frozenset, stacks.by_first.values())
-    )
+    stacks = Stacks.of(map(Environment.of, ([0], [1, 2, 3], [4, 5])))
+    removed, tried = search(stacks.expand(isolating(stacks.representatives, 1)), hits([Environment.of((2, 9))]))
+    assert removed == Environment.of((1, 2, 3))
+    assert all(each & stack in (NOTHING, stack) for each in tried for stack in stacks.by_first.values())
 
 
 @pytest.mark.parametrize(("reached", "runs"), [(0, 5), (3, 10), (8, 10), (55, 60)])
@@ -105,7 +105,7 @@ def test_the_rule_is_seldom_wrong_at_either_of_its_rates():
 
 
 def test_fresh_runs_that_do_not_decide_show_nothing():
-    rule, world = Passing(0.9, 0.45, 0.01), frozenset({"m0"})
+    rule, world = Passing(0.9, 0.45, 0.01), Environment.of((0,))
     every = settle(passes(world, rule, 20), lambda *_: True)
     assert (every.verdict, every.runs) == ("passes", 20)
     assert settle(passes(world, rule, 20), lambda *_: False).verdict == "fails"
