@@ -1,6 +1,6 @@
 """An engine that is killed at a moment, and what is to be the same when another one goes on."""
 
-from ddenv.engine.journal import Journal
+from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 
 
@@ -22,10 +22,10 @@ def kill_after(file, after):
 
 
 def finished_tests(path):
-    """Each finished test as (models, run)."""
+    """Each finished test as (environment, run)."""
     with RunFile(path) as file:
-        journal = Journal(file)
-        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
+        state = fold(file.events())
+        return [(test.environment, test.run) for test in state.finished_tests]
 
 
 def story(state):

@@ -3,6 +3,7 @@
 import tempfile
 import threading
 import time
+from dataclasses import asdict
 from pathlib import Path
 from zlib import crc32
 
@@ -166,7 +167,7 @@ def test_tests_that_break_leave_a_candidate_unknown_and_no_model_is_called_neede
     assert "tests broke without wall" in state.reason
     assert state.lower_bound == 0
     with RunFile(path) as file:
-        judged = [event.data["verdict"] for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event)["verdict"] for event in file.events() if event.kind == "candidate_judged"]
         journal = Journal(file)
     assert "unknown" in judged
     # Each was made again once.
@@ -334,7 +335,7 @@ def test_what_a_certificate_rests_on_does_not_depend_on_the_workers(tmp_path):
         state = drive(path, FakePool(oracle, jobs))
         with RunFile(path) as file:
             named = [
-                event.data["tests"] for event in file.events() if event.kind in ("certificate_finished", "rate_lost")
+                asdict(event.event)["tests"] for event in file.events() if event.kind in ("certificate_finished", "rate_lost")
             ]
         tests = [[state.tests[number - 1] for number in tests] for tests in named]
         assert all(test.phase == "certify" for certificate in tests for test in certificate)

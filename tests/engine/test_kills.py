@@ -7,6 +7,7 @@ import signal
 import time
 from collections import Counter
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -100,7 +101,7 @@ def lives(run: Path, dice: random.Random, most: int) -> int:
 def what_became(run: Path):
     with RunFile(run) as file:
         journal = Journal(file)
-        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
     verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in judged]
     sound = [test for test in journal.state.finished_tests if test.outcome not in BROKEN]
     made = Counter((journal.keep_of_test(test.id), test.run) for test in sound)

@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,7 @@ def share(path, pool, found=None):
 def events(path):
     """The finished tests of a run as they are written down."""
     with RunFile(path) as file:
-        return [event.data for event in file.events() if event.kind == "test_finished"]
+        return [asdict(event.event) for event in file.events() if event.kind == "test_finished"]
 
 
 @pytest.fixture(scope="module")

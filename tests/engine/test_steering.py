@@ -1,6 +1,7 @@
 """A reduction that the user guides by hand: on a simulator that costs nothing."""
 
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,7 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert state.minimal
     assert state.reason.endswith("; 1 pinned model was never left out")
     leg = next(event.id for event in events(path) if event.kind == "leg_started")
-    started = [event.data["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
+    started = [asdict(event.event)["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
     with RunFile(path) as file:
         journal = Journal(file)
     assert all("ball" in journal.keep_of_test(test) for test in started)

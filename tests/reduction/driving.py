@@ -109,7 +109,7 @@ class Driver:
         return environment in self.vetoed or any(environment <= lost for lost in self.now.lost)
 
     def rate(self):
-        shown = [self.known.outcomes[self.now.chain[0], run] for run in self.now.of_whole]
+        shown = [self.known.outcomes[self.world.whole, run] for run in self.now.of_whole]
         sound = [one for one in shown if one != "broken"]
         return estimated_rate(sum(sound), len(sound))
 
@@ -147,7 +147,7 @@ class Driver:
         rate = self.rate() if self.world.keeps_rate else 0.0
         rule = Acceptance(1 + self.world.iterations, rate, 0.8, len(self.now.lost))
         n_partitions = self.now.n_partitions.get(self.now.chain[-1])
-        leg = Leg(self.now.round + 1, self.now.chain, pinned, free, rule, n_partitions, tuple(again))
+        leg = Leg(self.now.round + 1, self.world.whole, self.now.chain, pinned, free, rule, n_partitions, tuple(again))
         self.legs.append((leg, deepcopy(self.now), len(self.facts)))
         return leg
 
@@ -170,7 +170,7 @@ class Driver:
         return None
 
     def _work(self, wanted):
-        """Makes tests until one has ended."""
+        """Makes tests until some have ended."""
         assert wanted
         assert len(set(wanted)) == len(wanted)
         for test in wanted:
@@ -179,16 +179,17 @@ class Driver:
                 candidate = self._round.candidates[test.candidate]
                 assert test.environment == candidate.models | self.legs[-1][0].pinned
         self._running += [test for test in wanted if test not in self._running][: self.workers - len(self._running)]
-        test = self._running.pop(self._order.randrange(len(self._running)))
-        self.made.append(test)
-        self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
+        for _ in range(self._order.randint(1, len(self._running))):
+            test = self._running.pop(self._order.randrange(len(self._running)))
+            self.made.append(test)
+            self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
 
     def _answer(self, step):
         now, chain = self.now, self.now.chain
         match step:
             case steps.BaselineRan():
                 now.of_whole |= set(range(step.runs))
-                return sum(self.known.outcomes[now.chain[0], run] is True for run in range(step.runs)) or None
+                return sum(self.known.outcomes[self.world.whole, run] is True for run in range(step.runs)) or None
             case steps.FailureFixed():
                 return self.leg()
             case steps.RoundBegan():
@@ -213,7 +214,7 @@ class Driver:
             case steps.Certified():
                 first = step.certificate.first_run
                 tests = {test for claim in step.claims for test in claim.claim.rests_on}
-                now.of_whole |= {first + run for environment, run in tests if environment == chain[0]}
+                now.of_whole |= {first + run for environment, run in tests if environment == self.world.whole}
             case steps.SteppedBack():
                 now.lost.append(chain[step.place + 1])
                 now.chain = chain[: step.place + 1]

@@ -220,7 +220,8 @@ def certified_alone(world, vetoed=()):
     driver = Driver(world)
     driver.algorithm = lambda leg: nothing(leg.chain[-1], None)
     driver.vetoed = {world.whole - Environment.of([model]) for model in vetoed}
-    leg = Leg(1, (world.whole,), Environment(), {model: Environment.of([model]) for model in world.whole}, Acceptance(1))
+    free = {model: Environment.of([model]) for model in world.whole}
+    leg = Leg(1, world.whole, (world.whole,), Environment(), free, Acceptance(1))
     driver.drive(begun(driver, leg), most=2000)
     return [fact for fact in driver.facts if isinstance(fact, LeftOut)]
 

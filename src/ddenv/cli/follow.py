@@ -81,7 +81,7 @@ def _interrupt(*_: object) -> None:
 
 
 def _update(file: RunFile, state: RunState, view: _Line | _Plain) -> RunState:
-    for event in file.events(state.revision):
+    for event in file.read(state.revision):
         before, state = state, apply(state, event)
         view.happened(event.kind, before, state)
     view.now(state, max((live.time for live in file.live()), default=None))

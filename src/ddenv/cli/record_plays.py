@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ddenv import schemas
 from ddenv.errors import UserError
@@ -12,11 +12,13 @@ from ddenv.learn.lesson import Lesson
 from ddenv.learn.reading import read_lesson
 from ddenv.learn.recorded_oracle import Oracle, read_oracle
 from ddenv.learn.run_places import Places
-from ddenv.reduction.round import Round
 from ddenv.runfile.position import position_in
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import RunFile
 from ddenv.world.files.access import write_file
+
+if TYPE_CHECKING:
+    from ddenv.reduction.reduce import NamedRound
 
 
 def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:
@@ -79,7 +81,7 @@ def _evidence(lesson: Lesson) -> dict[str, Any]:
 def _play(name: str, oracle: Oracle, known: dict[str, Any]) -> list[dict[str, Any]]:
     from ddenv.reduction.reduce import reduce
 
-    rounds: list[tuple[Round, list[frozenset[str]]]] = []
+    rounds: list[tuple[NamedRound, list[frozenset[str]]]] = []
 
     def test(models: frozenset[str]) -> bool:
         rounds[-1][1].append(models)
@@ -93,9 +95,10 @@ def _play(name: str, oracle: Oracle, known: dict[str, Any]) -> list[dict[str, An
     return [_recorded(round, tested) for round, tested in rounds if tested]
 
 
-def _recorded(round: Round, tested: list[frozenset[str]]) -> dict[str, Any]:
-    labels = {
-        one.models: f"{'part' if one.kind == 'partition' else 'without'} {partition_letter(one.partition)}"
-        for one in round.candidates
-    }
+def _recorded(round: NamedRound, tested: list[frozenset[str]]) -> dict[str, Any]:
+    whole, labels = frozenset(round.environment), dict[frozenset[str], str]()
+    for kind, number in round.candidates:
+        part, letter = frozenset(round.partitions[number]), partition_letter(number)
+        models, label = (part, f"part {letter}") if kind == "partition" else (whole - part, f"without {letter}")
+        labels[models] = label
     return {"parts": [" ".join(part) for part in round.partitions], "tested": [labels[models] for models in tested]}

@@ -23,8 +23,8 @@ from ddenv.evidence.claims import (
 )
 from ddenv.errors import printable
 from ddenv.evidence.rates import wilson_interval
-from ddenv.runfile.progress import Claim
-from ddenv.runfile.state import BROKEN, Node, RunState
+from ddenv.runfile.progress import Claim, Node
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.evidence.took_part import simulated

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from ddenv.evidence.claims import current
 from ddenv.engine.judging import rows_of
 from ddenv.engine.ros_messages import DEFINITIONS, nanoseconds
 from ddenv.engine.single_test import Subject, plan, subject_of_run
 from ddenv.engine.streams import Chosen, Streams, messages
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.result import Progress
 from ddenv.runfile.fold import fold

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count
-from ddenv.evidence.claims import current
 from ddenv.engine.single_test import Subject, in_folder, plan, run_trials, subject_of_run
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.evidence.rates import shows_at
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN

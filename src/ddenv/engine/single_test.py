@@ -14,7 +14,6 @@ from ddenv.robot.oracle import Failure
 from ddenv.runfile.position import Position, position_in
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.tested import purpose
 from ddenv.runs.creation import read_parts
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Oracle, Scenario
@@ -112,11 +111,11 @@ def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
     """The models and the seed of a test of the run."""
     if subject.position is None:
         raise UserError("--test: needs a run; a scenario has no tests yet")
-    start = subject.position.start_of(number)
-    if start is None:
-        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(subject.position.end.tests)}")
-    test = start.after.tests[number - 1]
-    return purpose(start.after, test).models or (), test.seed
+    state = subject.position.end
+    if not 0 < number <= len(state.tests):
+        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(state.tests)}")
+    test = state.tests[number - 1]
+    return state.models_of(test), test.seed
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:

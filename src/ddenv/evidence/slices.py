@@ -18,74 +18,85 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-Models = frozenset[str]
+from ddenv.environment import NOTHING, Environment
 
 
 @dataclass(frozen=True)
 class Ties:
     """What each model is tied to: without one of these it would move by itself, so without a test it stays with them, or goes.
 
-    `of` has these models by name; `on` has, by name, the models that are tied to each.
+    `of` has these models by number; `on` has, by number, the models that are tied to each.
     """
 
-    of: Mapping[str, Models]
-    on: Mapping[str, Models]
+    of: Mapping[int, Environment]
+    on: Mapping[int, Environment]
 
     @classmethod
-    def among(cls, pairs: Iterable[tuple[str, str]]) -> Ties:
+    def among(cls, pairs: Iterable[tuple[int, int]]) -> Ties:
         """The ties `pairs` of a model and one that it is tied to."""
-        of, on = defaultdict(set), defaultdict(set)
-        for name, other in pairs:
-            of[name].add(other)
-            on[other].add(name)
-        both = ({name: frozenset(others) for name, others in each.items()} for each in (of, on))
+        of, on = defaultdict[int, set[int]](set), defaultdict[int, set[int]](set)
+        for model, other in pairs:
+            of[model].add(other)
+            on[other].add(model)
+        both = ({model: Environment.of(others) for model, others in each.items()} for each in (of, on))
         return cls(*both)
 
-    def breaks(self, there: Models, keep: Models) -> bool:
+    def breaks(self, there: Environment, keep: Environment) -> bool:
         """Whether a tie of the models `there` is broken where only `keep`, a part of them, stay."""
         removed = there - keep
         # Of thousands of models few stay, or few go.
         if len(keep) < len(removed):
-            return any(not removed.isdisjoint(self.of.get(name, ())) for name in keep)
-        return any(not keep.isdisjoint(self.on.get(name, ())) for name in removed)
+            return any(not removed.isdisjoint(self.of.get(model, NOTHING)) for model in keep)
+        return any(not keep.isdisjoint(self.on.get(model, NOTHING)) for model in removed)
 
-    def closed(self, models: Models, there: Models) -> Models:
+    def closed(self, models: Environment, there: Environment) -> Environment:
         """`models`, with all models `there` that they are tied to, directly or by others."""
-        found, new = set(models), set(models)
+        found, new = models, models
         while new:
-            new = {other for name in new for other in self.of.get(name, ()) if other in there} - found
+            tied = NOTHING
+            for model in new:
+                tied |= self.of.get(model, NOTHING)
+            new = (tied & there) - found
             found |= new
-        return frozenset(found)
+        return found
 
 
-def implies(took_part: Models, there: Models, keep: Models, ties: Ties) -> bool:
+def implies(took_part: Environment, there: Environment, keep: Environment, ties: Ties) -> bool:
     """Whether a run of the models `there` implies the run of `keep` with the same seed."""
     return took_part <= keep <= there and not ties.breaks(there, keep)
 
 
-def fresh_chance(met: Sequence[Models]) -> float:
+def fresh_chance(met: Sequence[Environment]) -> float:
     """The chance that a fresh run meets a model that none of these runs `met`, estimated by the models that only one of them met.
 
     Good, "The population frequencies of species and the estimation of population parameters", 1953.
     """
-    once: set[str] = set()
-    more: set[str] = set()
+    once, more = NOTHING, NOTHING
     for models in met:
         more |= once & models
         once = (once | models) - more
     return min(1.0, len(once) / len(met)) if met else 1.0
 
 
-def reasons(before: Models, after: Models, met: Sequence[Models], pinned: Models = frozenset()) -> dict[str, str]:
-    """Why each model of `before` stays in `after` or goes, where `met` took part in each of the runs known there."""
+def reasons(
+    elements: Sequence[str],
+    before: Environment,
+    after: Environment,
+    met: Sequence[Environment],
+    pinned: Environment = NOTHING,
+) -> dict[str, str]:
+    """Why each model of `before` stays in `after` or goes, by name in the order of `elements`, the names of all models.
+
+    `met` took part in each of the runs known there.
+    """
     one, runs = len(met) == 1, f"{len(met)} run{'s' * (len(met) != 1)}"
 
-    def why(name: str) -> str:
-        took_part = sum(name in models for models in met)
-        if name not in after:
+    def why(model: int) -> str:
+        took_part = sum(model in models for models in met)
+        if model not in after:
             return "took no part in the one run known" if one else f"took part in none of {runs}"
         if took_part:
             return f"took part in {took_part} of {runs}"
-        return "is pinned" if name in pinned else "one that took part is tied to it"
+        return "is pinned" if model in pinned else "one that took part is tied to it"
 
-    return {name: why(name) for name in before}
+    return {elements[model]: why(model) for model in before}

@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Iterable
 
 from ddenv.amounts import count, first_of, percent
-from ddenv.runfile.state import BROKEN, FRESH, ISOLATE, Node, RunState
-from ddenv.evidence.slices import Models, fresh_chance, reasons
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.slices import fresh_chance, reasons
+from ddenv.runfile.progress import Node
+from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, RunState
 
 # The maximum number of tests that a word on a candidate names.
 NAMED = 2
@@ -17,29 +19,29 @@ TEACHING = "What took no part in a run can go without changing a bit of it, so t
 def in_whole_world(state: RunState) -> Counter[str]:
     """In how many of the baseline runs each model took part; empty where that is unknown."""
     runs = [test for test in state.tests if test.phase == "baseline" and test.outcome not in BROKEN]
-    return Counter(name for test in runs for name in test.took_part or ())
+    return Counter(name for test in runs for name in (test.took_part or NOTHING).names(state.elements))
 
 
-def in_last(state: RunState) -> Models | None:
+def in_last(state: RunState) -> Environment | None:
     """The models that took part in the last similar run; None where that is unknown."""
     test = state.evidence_test
     return state.tests[test - 1].took_part if test is not None and 0 < test <= len(state.tests) else None
 
 
-def met_by(state: RunState, node: Node) -> list[Models]:
+def met_by(state: RunState, node: Node) -> list[Environment]:
     """What took part in each of the runs by which the environment of a node was cut down to its slice, by seed."""
-    met: dict[int, Models] = {}
+    met: dict[int, Environment] = {}
     for number in node.sliced_by:
         test = state.tests[number - 1]
-        met[test.run] = met.get(test.run, frozenset()) | (test.took_part or frozenset())
+        met[test.run] = met.get(test.run, NOTHING) | (test.took_part or NOTHING)
     return list(met.values())
 
 
 def why_sliced(state: RunState, node: Node) -> dict[str, str]:
     """Why each model of the environment before stays in a slice or goes, in the order of the world."""
-    before = () if node.parent is None else state.nodes[node.parent].environment
-    found = reasons(frozenset(before), frozenset(node.environment), met_by(state, node), state.pinned)
-    return {name: found[name] for name in before}
+    before = NOTHING if node.parent is None else state.environments[state.nodes[node.parent].id]
+    pinned = Environment.of(model for model, name in enumerate(state.elements) if name in state.pinned)
+    return reasons(state.elements, before, state.environments[node.id], met_by(state, node), pinned)
 
 
 def slice_words(state: RunState, node: Node) -> str:
@@ -61,7 +63,7 @@ def slice_in_short(state: RunState, node: Node) -> str:
     return f"none of {count(len(met), 'run')} met the other {gone}; a fresh run meets one: {_chance(met)}"
 
 
-def _chance(met: list[Models]) -> str:
+def _chance(met: list[Environment]) -> str:
     chance = fresh_chance(met)
     return f"at most about {percent(chance)}" if chance else f"probably below {percent(1 / len(met))}"
 
@@ -89,4 +91,4 @@ def implied_words(state: RunState, tests: Iterable[int]) -> str:
 def simulated(state: RunState) -> int:
     """How many tests of the search were simulated, the baseline included, certificates and isolation apart."""
     made = (test for test in state.tests if test.is_finished and test.implied_by is None)
-    return sum(test.phase not in (*FRESH, ISOLATE) for test in made)
+    return sum(test.phase not in (CERTIFY, ISOLATE) for test in made)

@@ -69,7 +69,7 @@ def label_of(state: RunState, test: Test) -> str:
     """What a test was made for, in words."""
     row = row_of(state, test)
     if row is None and test.round is None:
-        return purpose(state, test).words
+        return purpose(state, test)
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 

@@ -173,7 +173,9 @@ Step = (
 
 @dataclass(frozen=True)
 class Leg:
-    """Where a search begins: `chain` leads from the world in which f was seen to the environment that is searched.
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back.
+
+    What is left has to keep the rate of f in `whole`.
 
     `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
     them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
@@ -181,6 +183,7 @@ class Leg:
     """
 
     first_round: int
+    whole: Environment
     chain: tuple[Environment, ...]
     pinned: Environment
     free: dict[int, Environment]
@@ -207,11 +210,11 @@ class NamedClaim:
     claim: Claim
 
 
-class Driver(Protocol):
-    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
+class Runs(Protocol):
+    """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
-        """Whether a run showed f; None if it has not ended. With `full` only a run to its end counts."""
+        """Whether a run showed what is looked for; None if it has not ended. With `full` only a run to its end counts."""
 
     def refused(self, environment: Environment) -> bool:
         """Whether the environment is not taken: the user refused it, or it is part of what lost the rate."""
@@ -226,6 +229,10 @@ class Driver(Protocol):
     @property
     def workers(self) -> int:
         """How many tests can be made at the same time."""
+
+
+class Driver(Runs, Protocol):
+    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
 
     def rate(self) -> float:
         """The rate of f in the world in which it was seen, from all of its runs that decisions rest on."""
@@ -311,7 +318,7 @@ def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Generator[Ste
 
 
 def judge(
-    driver: Driver, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
+    driver: Runs, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
 ) -> Generator[Step, Any, int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
@@ -339,7 +346,7 @@ def judge(
         yield Wants(tuple(Test(environments[index], run, why, index) for index, run in now.wanted))
 
 
-def _judged(driver: Driver, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
+def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
     if driver.refused(environment):
         return Judged(index, environment, verdict, 0)
     # By these runs alone: more of them may have ended.
@@ -350,7 +357,7 @@ def _judged(driver: Driver, index: int, environment: Environment, verdict: str, 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
-    left, whole = chain[-1], chain[0]
+    left, whole = chain[-1], leg.whole
     certificate: Certificate = yield CertificateDue()
     terms = replace(certificate.terms, error=certificate.terms.error / 2)
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
@@ -371,7 +378,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
 
 
 def settled(
-    driver: Driver,
+    driver: Runs,
     claims: Callable[[], Iterable[tuple[int | None, Environment, Procedure]]],
     ends: Callable[[NamedClaim], bool],
     first_run: int,

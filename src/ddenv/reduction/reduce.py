@@ -338,7 +338,7 @@ class _Caller:
         rule = Acceptance(1 + self._iterations, rate, self._keep_rate, len(self._lost))
         free = {element: Environment.of((element,)) for element in self.left}
         n_partitions = self._n_partitions.get(self.left)
-        return Leg(self.rounds + 1, self._chain, NOTHING, free, rule, n_partitions, again)
+        return Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
 
     @property
     def left(self) -> Environment:

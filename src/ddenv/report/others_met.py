@@ -6,7 +6,7 @@ import math
 
 from ddenv.page.blocks import Cell, Name, Part, Section, Table, say, thousands
 from ddenv.report.run_data import Record
-from ddenv.runfile.atlas import OtherFailure, atlas, models_of
+from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.state import RunState
 from ddenv.words import count
 
@@ -32,7 +32,7 @@ def others_met(record: Record) -> Section | None:
 
 
 def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
-    models = models_of(state, state.tests[failure.smallest - 1])
+    models = state.models_of(state.tests[failure.smallest - 1])
     names: list[Part] = []
     for name in models[:MOST_NAMES]:
         names += [", ", Name(name)]

@@ -22,7 +22,7 @@ from ddenv.page.blocks import (
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.state import AHEAD, BROKEN, RunState
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.words import count, failed_in
 
@@ -62,12 +62,10 @@ MEANING = {
 PHASES = (
     ("baseline", "whole world"),
     ("round", "in rounds"),
-    (AHEAD, "ahead of their rounds"),
     ("hand", "by hand"),
     ("audit", "audits of slices"),
     ("certify", "fresh runs"),
     ("isolate", "isolation"),
-    ("confirm", "full runs at the end"),
 )
 
 

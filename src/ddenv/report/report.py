@@ -32,8 +32,9 @@ from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
 from ddenv.report.why import why
 from ddenv.report.worth import rate_of_left, worth
-from ddenv.runfile.events import DEEDS, deed, vector
+from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
+from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
 from ddenv.runfile.fold import spent
 from ddenv.version import __version__
@@ -128,7 +129,7 @@ def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
     try:
         x, y = vector((goal.get("x"), goal.get("y")), 2)
-    except (TypeError, ValueError, OverflowError):
+    except Invalid:
         return ""
     return f", {math.dist((x, y), position[:2]):.1f} m short of the goal at ({x:g}, {y:g})"
 

@@ -71,6 +71,7 @@ def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
         "nodes": with_node(state.nodes, replace(lost, lost_rate=True)),
         "lost": (*state.lost, (state.failures, state.environments[lost.id])),
         "steps_back": state.steps_back + 1,
+        "again": event.again,
         "node": node.number,
         "came_at": state.tests_done,
         "environment": node.environment,

@@ -223,7 +223,12 @@ class RunFile:
     def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
         """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
         with uncollected():
-            return [recorded(*row) for row in self._rows("event", after, most)]
+            return list(self.read(after, most))
+
+    def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
+        """The same, one after the other, so that those before a damaged one can be used."""
+        for row in self._rows("event", after, most):
+            yield recorded(*row)
 
     def commands(self, after: int = 0) -> list[Request]:
         """The requests of viewers with an id above `after`, in order. Raises UserError."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import as_it_was
+from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
@@ -38,7 +38,7 @@ def create_run(scenario: Scenario, path: Path, announce: Callable[[str], None] |
         "robot": read_bytes(scenario.robot.model),
     }
     elements = world.elements(frozenset(scenario.protected))
-    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+    create(path, documents, Created(scenario.model_dump(mode="json"), elements))
     return world
 
 
@@ -55,7 +55,7 @@ def create_like(run: Path, scenario: Scenario, path: Path) -> None:
     check_parts(scenario, world, robot)
     documents["scenario"] = scenario.model_dump_json().encode()
     elements = world.elements(frozenset(scenario.protected))
-    create(path, documents, {"scenario": scenario.model_dump(mode="json"), "elements": elements})
+    create(path, documents, Created(scenario.model_dump(mode="json"), elements))
 
 
 def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
@@ -85,6 +85,6 @@ def robot_file(run: RunFile, scenario: Scenario) -> Iterator[Path]:
 def read_scenario(run: RunFile) -> Scenario:
     """The scenario of a run file. Raises UserError."""
     try:
-        return Scenario.model_validate(as_it_was(json.loads(run.document("scenario"))))
+        return Scenario.model_validate(json.loads(run.document("scenario")))
     except ValueError:
         raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None

@@ -14,7 +14,7 @@ from ddenv.amounts import first_of
 from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.errors import UserError
 from ddenv.runfile.progress import Isolation
-from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.reasons import GOAL, F, Parting, parted, parting_unknown, where_they_part
 
@@ -87,18 +87,10 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
 def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | None:
     """A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not."""
     passing = {test.run: test for test in state.tests if test.removal == found and test.outcome == GOAL}
-    whole = [test for test in state.tests if test.run in passing and _is_whole(state, test)]
+    whole = [test for test in state.tests if test.run in passing and test.environment == 0]
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
     return None if chosen is None else (chosen, passing[chosen.run])
-
-
-def _is_whole(state: RunState, test: Test) -> bool:
-    if test.phase in FRESH:
-        return test.without is None and len(state.nodes[test.node].environment) == len(state.elements)
-    if test.removal is not None:
-        return not state.removals[test.removal - 1].models
-    return test.phase == "baseline"
 
 
 def _met(parting: Parting, first: str) -> str:

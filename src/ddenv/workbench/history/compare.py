@@ -15,7 +15,8 @@ from textual.widgets import Static
 
 from ddenv.guiding.course import place
 from ddenv.map.names import shortened
-from ddenv.runfile.state import Node, RunState
+from ddenv.runfile.progress import Node
+from ddenv.runfile.state import RunState
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches
 from ddenv.workbench.map.place import Place

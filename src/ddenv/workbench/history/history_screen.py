@@ -18,7 +18,7 @@ from ddenv.evidence.claims import of_runs, seen
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
-from ddenv.runfile.state import Decision, Node
+from ddenv.runfile.progress import Decision, Node
 from ddenv.evidence.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter

@@ -180,7 +180,7 @@ class MapDrawing:
                 pinned=who.pinned if "pinned" in layers else frozenset(),
                 selected=shown.selection,
                 sensed=sensed_order(state) if "sensed" in layers else {},
-                shown=who.shown if met is None else met,
+                shown=who.shown if met is None else frozenset(met.names(state.elements)),
             )
 
         return self._kept.get((*made_of, shown.selection, layers, place.elements), gather)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ddenv.map.footprints import Footprint
-from ddenv.runfile.events import Names
+from ddenv.runfile.supports import Names
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round, RunState, Split, Trial
 from ddenv.runs.playback import Played

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, ended, missed, of_runs, promise
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.fold_rates import seen
+from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.words import failed_in, other_failures

@@ -199,11 +199,11 @@ class Poll:
         begun, more = time.monotonic(), True
         try:
             while more:
-                events = self.file.events(state.revision, SOME_EVENTS)
-                for event in events:
+                count = 0
+                for count, event in enumerate(self.file.read(state.revision, SOME_EVENTS), 1):
                     before, state = state, apply(state, event)
                     self._on_event(event.kind, before, state)
-                more = len(events) == SOME_EVENTS
+                more = count == SOME_EVENTS
                 if time.monotonic() - begun > PATIENCE:
                     break
         except Busy:

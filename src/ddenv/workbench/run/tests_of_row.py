@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.workbench.run.candidate_rows import Item
 
@@ -38,5 +38,5 @@ def _tests(state: RunState, item: Item | None) -> list[Test]:
 
 def _fresh(state: RunState, node: int, without: str | None) -> list[Test]:
     first = 0 if state.certificate is None else state.certificate.first_run
-    own = (test for test in state.confirm_tests if test.phase in FRESH and test.run >= first)
+    own = (test for test in state.confirm_tests if test.phase == CERTIFY and test.run >= first)
     return [test for test in own if test.node == node and test.without == without]

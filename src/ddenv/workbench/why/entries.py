@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, meaning, rate
-from ddenv.runfile.events import Names
+from ddenv.runfile.supports import Names
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile

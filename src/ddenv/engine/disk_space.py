@@ -1,4 +1,4 @@
-"""A disk without room stops no reduction: no test starts until there is room, and none that has ended is lost."""
+"""A disk without space stops no reduction: no test starts until there is some, and none that has ended is lost."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import time
 from contextlib import suppress
 
 from ddenv.errors import UserError
+from ddenv.runfile import events
 from ddenv.runfile.store import NoRoom, RunFile
 
 # What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
@@ -17,7 +18,7 @@ NEEDED = 32_000_000
 PERIOD = 1.0
 
 
-class Room:
+class DiskSpace:
     """Watches the disk of a run file. `terminated` ends all waiting."""
 
     def __init__(self, file: RunFile, terminated: threading.Event) -> None:
@@ -53,7 +54,7 @@ class Room:
         # A small event may find room where a result does not.
         self._telling = True
         with suppress(UserError):
-            self._file.append("room", {"enough": enough, "needed": NEEDED, "free": free})
+            self._file.append(events.DiskSpace(enough, NEEDED, free))
         self._telling = False
 
     def _free(self) -> int:

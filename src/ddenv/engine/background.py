@@ -6,10 +6,10 @@ import time
 from collections.abc import Iterator
 
 # The part of all time that it may take; and besides that, s: at first, when most is unknown, and for each test that has ended.
-SHARE, FIRST, EACH = 0.01, 0.5, 0.002
+SHARE, FIRST, AFTER_TEST = 0.01, 0.5, 0.002
 
 
-class Thinking:
+class Background:
     """Advances `steps` of some milliseconds as long as there is time for them. What begins next takes the place of what is left."""
 
     def __init__(self) -> None:
@@ -18,9 +18,9 @@ class Thinking:
         self._spent = 0.0
         self._ended = 0
 
-    def begin(self, steps: Iterator[object] | None) -> None:
+    def begin(self, steps: Iterator[object]) -> None:
         """From now on advances `steps`."""
-        self._steps = iter(()) if steps is None else steps
+        self._steps = steps
 
     def test_ended(self) -> None:
         """A test has ended: some more time may be taken."""
@@ -29,7 +29,7 @@ class Thinking:
     def step(self) -> bool:
         """Makes one step; returns False where none is left, or no time for it."""
         began = time.monotonic()
-        if self._spent > FIRST + EACH * self._ended + SHARE * (began - self._began):
+        if self._spent > FIRST + AFTER_TEST * self._ended + SHARE * (began - self._began):
             return False
         made = next(self._steps, self) is not self
         self._spent += time.monotonic() - began
