@@ -85,13 +85,17 @@ class Now:
 
 
 class Driver:
-    """Makes the tests of `outcome` with so many workers; `order` says which of them ends first. `facts` are all steps but `Wants`."""
+    """Makes the tests of `outcome` with so many workers; `order` says which of them end first.
+
+    `facts` are all steps but `Wants`; `steps` counts all.
+    """
 
     def __init__(self, world: World, workers: int = 1, order: int = 0, known: Known | None = None) -> None:
         self.world, self.workers, self.refusals = world, workers, 0
         self.outcome: Callable[[Environment, int], bool | str] = world.outcome
         self.known, self.now = known or Known(), Now((world.whole,))
         self.facts: list[object] = []
+        self.steps = 0
         self.made: list[steps.Test] = []
         self.vetoed: set[Environment] = set()
         # Each search, with where it began and how many facts were before.
@@ -153,18 +157,19 @@ class Driver:
 
     def drive(self, procedure, most=None, thrown=None):
         """Carries it to its end, and returns what it returns; or through `most` steps. First `thrown` is thrown into it."""
-        go, made = partial(procedure.throw, thrown) if thrown else partial(procedure.send, None), 0
-        while most is None or made < most:
+        go = partial(procedure.throw, thrown) if thrown else partial(procedure.send, None)
+        while most is None or self.steps < most:
             try:
                 step = go()
             except StopIteration as end:
                 return end.value
-            made += 1
+            self.steps += 1
             answer = None
             if isinstance(step, steps.Wants):
                 self._work(step.tests)
             else:
                 self.facts.append(step)
+                self._note(step)
                 answer = self._answer(step)
             go = partial(procedure.send, answer)
         return None
@@ -184,45 +189,54 @@ class Driver:
             self.made.append(test)
             self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
 
-    def _answer(self, step):
-        now, chain = self.now, self.now.chain
+    def _note(self, step):
+        now = self.now
         match step:
             case steps.BaselineRan():
                 now.of_whole |= set(range(step.runs))
-                return sum(self.known.outcomes[self.world.whole, run] is True for run in range(step.runs)) or None
-            case steps.FailureFixed():
-                return self.leg()
-            case steps.RoundBegan():
-                now.round, self._round = step.number, step.round
-                now.n_partitions[chain[-1]] = step.round.n_partitions
-                if step.number in self.known.past:
-                    winner = self.known.past[step.number]
-                    if winner is not None:
-                        self._reach(step.round.candidates[winner].models | self.legs[-1][0].pinned)
-                    return Past(winner)
             case steps.Judged(verdict="unknown"):
                 self.known.unknown.add((now.round, step.environment))
-            case steps.Similar():
+            case steps.Similar() | steps.LeftOut():
                 self._reach(step.environment)
-                return True
             case steps.RoundEnded():
                 self.known.past[step.number] = step.winner
-            case steps.CertificateDue():
-                now.certificates += 1
-                terms = Terms(0.8, self.rate(), error_of(now.certificates), self.world.baseline_runs)
-                return Certificate(now.certificates, FIRST_FRESH + EACH_CERTIFICATE * now.certificates, terms)
             case steps.Certified():
                 first = step.certificate.first_run
                 tests = {test for claim in step.claims for test in claim.claim.rests_on}
                 now.of_whole |= {first + run for environment, run in tests if environment == self.world.whole}
             case steps.SteppedBack():
-                now.lost.append(chain[step.place + 1])
-                now.chain = chain[: step.place + 1]
-                return self.leg(step.again)
-            case steps.LeftOut():
-                self._reach(step.environment)
+                now.lost.append(now.chain[step.place + 1])
+                now.chain = now.chain[: step.place + 1]
+
+    def _answer(self, step):
+        match step:
+            case steps.BaselineRan():
+                return sum(self.shown(self.world.whole, run) is True for run in range(step.runs)) or None
+            case steps.FailureFixed() | steps.LeftOut():
                 return self.leg()
+            case steps.SteppedBack():
+                return self.leg(step.again)
+            case steps.RoundBegan():
+                return self._begin(step.number, step.round)
+            case steps.Similar():
+                return True
+            case steps.CertificateDue():
+                self.now.certificates += 1
+                number = self.now.certificates
+                terms = Terms(0.8, self.rate(), error_of(number), self.world.baseline_runs)
+                return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
         return None
+
+    def _begin(self, number, round):
+        """What is known of a round, if it is over."""
+        self.now.round, self._round = number, round
+        self.now.n_partitions[self.now.chain[-1]] = round.n_partitions
+        if number not in self.known.past:
+            return None
+        winner = self.known.past[number]
+        if winner is not None:
+            self._reach(round.candidates[winner].models | self.legs[-1][0].pinned)
+        return Past(winner)
 
     def _reach(self, environment):
         now = self.now

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from ddenv.environment import NOTHING, Environment
 from ddenv.evidence.certificate import settle
 from ddenv.evidence.rates import estimated_rate
-from ddenv.reduction.isolation import MOST_RUNS, Passing, isolating, passes
+from ddenv.reduction.isolation import MOST_RUNS, Asked, Checked, Passing, isolating, isolation, passes
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import standing
+from tests.reduction.driving import Driver, Known, World
 from tests.tiers import examples
 
 MODELS = tuple(range(12))
@@ -112,3 +113,60 @@ def test_fresh_runs_that_do_not_decide_show_nothing():
     some = settle(passes(world, rule, 20), lambda _, run: run % 7 not in (2, 5))
     assert (some.verdict, some.runs) == ("not shown", MOST_RUNS)
     assert settle(passes(world, rule, 20), lambda *_: "broken").verdict == "unknown"
+
+
+def isolated(world, passing, rates=(1.0, 0.0), checks=(), **options):
+    """A driver of the isolation of a world, and what has to go; runs reach the goal at one rate or the other."""
+    driver = Driver(world, **options)
+
+    def reached(environment, run):
+        draw = random.Random(f"{world.seed} {environment.bits} {run}")
+        return (
+            "broken" if draw.random() < world.breaks else draw.random() < rates[not passing(world.whole - environment)]
+        )
+
+    driver.outcome = reached
+    stacks = Stacks.of(world.stack(label) for label in dict.fromkeys(world.labels))
+    asked = Asked(world.whole, stacks.representatives[::-1], stacks, 1, Passing.of(0, 10), 0.8, 5, 10_000, 1_000)
+    return driver, driver.drive(isolation(driver, asked, checks)), stacks
+
+
+isolations = st.builds(
+    World,
+    labels=st.lists(st.integers(0, 5), min_size=1, max_size=7).map(tuple),
+    needed=st.just(NOTHING),
+    useful=st.just(NOTHING),
+    algorithm=st.just("ddmin"),
+    seed=st.integers(0, 10**6),
+    breaks=st.sampled_from([0.0, 0.02]),
+)
+causes = st.lists(st.sets(st.integers(0, 7), min_size=1, max_size=3).map(Environment.of), min_size=1, max_size=3)
+
+
+@given(world=isolations, causes=causes)
+def test_fresh_runs_show_that_what_goes_is_enough_and_each_of_it_needed(world, causes):
+    """Model 7 stands in no world: a cause of it alone cannot be taken away."""
+    passing = hits(causes)
+    driver, removed, stacks = isolated(world, passing)
+    if removed is None:
+        assert not passing(world.whole)
+        return
+    assert passing(removed)
+    gone = [stack for stack in stacks.by_first.values() if not stack.isdisjoint(removed)]
+    assert removed == Environment.of(model for stack in gone for model in stack)
+    assert not any(passing(removed - stack) for stack in gone)
+    passes, *backs = driver.facts[-1].claims
+    assert passes.claim.verdict == "passes"
+    assert [claim.claim.verdict for claim in backs] == ["needed"] * len(gone)
+
+
+@given(world=isolations, causes=causes, workers=st.integers(2, 9))
+def test_an_isolation_does_not_depend_on_what_ends_first_and_is_taken_up_again(world, causes, workers):
+    passing, rates = hits(causes), (0.97, 0.1)
+    alone, removed, _ = isolated(world, passing, rates)
+    together, same, _ = isolated(world, passing, rates, workers=workers, order=1)
+    assert (together.facts, same) == (alone.facts, removed)
+    checks = [fact for fact in alone.facts if isinstance(fact, Checked)]
+    for known in range(len(checks) + 1):
+        again, same, _ = isolated(world, passing, rates, checks[:known], known=Known(dict(alone.known.outcomes)))
+        assert (again.made, same) == ([], removed)

@@ -15,13 +15,11 @@ from ddenv.reduction.procedure import (
     Judged,
     LeftOut,
     Leg,
-    NamedClaim,
     RoundBegan,
     RoundEnded,
     SearchEnded,
     Similar,
     SteppedBack,
-    Test,
     judge,
     procedure,
 )
@@ -31,16 +29,16 @@ from tests.reduction.driving import Driver, Known, World
 from tests.reduction.worlds import ALGORITHMS
 from tests.tiers import examples
 
-some_models = st.sets(st.integers(0, 5), max_size=2).map(Environment.of)
+some_models = st.sets(st.integers(0, 4), max_size=2).map(Environment.of)
 worlds = st.builds(
     World,
-    labels=st.lists(st.integers(0, 5), min_size=1, max_size=6).map(tuple),
+    labels=st.lists(st.integers(0, 4), min_size=1, max_size=5).map(tuple),
     needed=some_models,
     useful=some_models,
     algorithm=st.sampled_from(ALGORITHMS),
     seed=st.integers(0, 10**6),
-    rate=st.sampled_from([1.0, 0.95, 0.8]),
-    factor=st.sampled_from([0.2, 0.5]),
+    rate=st.sampled_from([1.0, 0.95, 0.85]),
+    factor=st.sampled_from([0.2, 0.4]),
     breaks=st.sampled_from([0.0, 0.0, 0.02]),
     iterations=st.integers(0, 3),
     keeps_rate=st.booleans(),
@@ -60,7 +58,6 @@ def driven(world, **options):
 
 
 @given(world=worlds, workers=st.integers(2, 9), order=st.integers(0, 10**6))
-@examples(2)
 def test_whatever_ends_first_and_however_many_run_all_that_is_found_is_the_same(world, workers, order):
     alone, end = driven(world)
     together, same = driven(world, workers=workers, order=order)
@@ -69,7 +66,6 @@ def test_whatever_ends_first_and_however_many_run_all_that_is_found_is_the_same(
 
 
 @given(world=worlds)
-@examples(2)
 def test_a_single_worker_makes_no_test_that_nothing_rests_on(world):
     driver, _ = driven(world)
     assert {(test.environment, test.run) for test in driver.made} == rests_on(world, driver.facts)
@@ -96,11 +92,10 @@ def rests_on(world, facts):
 
 
 @given(world=worlds, part=st.floats(0, 1), workers=st.integers(1, 4))
-@examples(2)
 def test_driven_again_through_what_is_known_it_comes_to_the_same_end(world, part, workers):
     whole, end = driven(world, workers=workers)
     killed = Driver(world, workers, order=1)
-    killed.drive(begun(killed), most=int(part * (len(whole.facts) + len(whole.made))))
+    killed.drive(begun(killed), most=int(part * whole.steps))
     resumed, again = driven(world, known=deepcopy(killed.known))
     assert again == end
     assert rounds(resumed.facts) == rounds(whole.facts)
@@ -128,13 +123,13 @@ def test_where_all_is_known_no_test_is_made(world):
     assert (told.made, told.facts, same) == ([], whole.facts, end)
 
 
-@given(world=worlds, part=st.floats(0, 1), workers=st.integers(1, 4))
-@examples(2)
+@given(world=worlds, part=st.floats(0, 1), workers=st.integers(1, 9))
+@examples(0.5)
 def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, workers):
     whole, _ = driven(world, workers=workers)
     driver = Driver(world, workers)
     running = begun(driver)
-    driver.drive(running, most=int(part * (len(whole.facts) + len(whole.made) - 1)))
+    driver.drive(running, most=max(1, int(part * whole.steps)))
     if not driver.legs:
         # The baseline is no search.
         return
@@ -149,9 +144,9 @@ def test_where_a_decision_ends_a_search_it_goes_on_with_another(world, part, wor
 
 drifting = st.builds(
     World,
-    labels=st.integers(4, 6).map(lambda count: tuple(range(count))),
+    labels=st.integers(4, 5).map(lambda count: tuple(range(count))),
     needed=st.just(Environment.of([0])),
-    useful=st.sets(st.integers(1, 5), min_size=2, max_size=3).map(Environment.of),
+    useful=st.sets(st.integers(1, 3), min_size=2, max_size=2).map(Environment.of),
     algorithm=st.sampled_from(ALGORITHMS),
     seed=st.integers(0, 10**6),
     keeps_rate=st.booleans(),
@@ -160,9 +155,9 @@ drifting = st.builds(
 
 
 @given(world=drifting)
-@examples(2)
+@examples(0.5)
 def test_nothing_that_lost_the_rate_is_taken_again(world):
-    driver, end = driven(world)
+    driver, end = driven(world, workers=8)
     chain, lost, of_whole = [world.whole], [], {}
     for fact in driver.facts:
         match fact:
@@ -179,7 +174,9 @@ def test_nothing_that_lost_the_rate_is_taken_again(world):
                 runs = {first + run for environment, run in tests if environment == world.whole}
                 of_whole |= {run: world.outcome(world.whole, run) for run in runs}
             case SteppedBack():
-                assert fact.place == place(world, chain, certified, estimated_rate(sum(of_whole.values()), len(of_whole)))
+                assert fact.place == place(
+                    world, chain, certified, estimated_rate(sum(of_whole.values()), len(of_whole))
+                )
                 lost.append(chain[fact.place + 1])
                 del chain[fact.place + 1 :]
     assert end is None or end.claims[0].environment == chain[-1]
@@ -198,14 +195,13 @@ def place(world, chain, certified, rate):
 
 def test_the_worlds_of_these_tests_come_to_all_steps():
     """Else they would prove little."""
-    world = World(tuple(range(6)), Environment.of([0]), Environment.of([2, 4]), "ddenv", 0, factor=0.5, iterations=0)
     seen, ends = set(), set()
-    for seed in range(30):
-        for keeps_rate in (True, False):
-            driver, end = driven(World(**vars(world) | {"seed": seed, "keeps_rate": keeps_rate}))
-            seen |= {type(fact).__name__ for fact in driver.facts}
-            ends |= {claim.claim.verdict for claim in end.claims}
-    assert seen >= {"SteppedBack", "LeftOut", "Certified", "Judged", "RoundEnded"}
+    for seed in range(8):
+        world = World(tuple(range(5)), Environment.of([0]), Environment.of([2, 4]), "ddmin", seed, 0.8, iterations=0)
+        driver, end = driven(world, workers=8)
+        seen |= {type(fact) for fact in driver.facts}
+        ends |= {claim.claim.verdict for claim in end.claims} if end else set()
+    assert seen >= {RoundBegan, Judged, Similar, RoundEnded, SearchEnded, Certified, SteppedBack, LeftOut}
     assert ends >= {"kept", "needed"}
 
 
