@@ -14,8 +14,7 @@ from pathlib import Path
 
 from early_stop import fixed
 
-from ddenv.reduction.verdict import Acceptance
-from ddenv.reduction.verdict import standing
+from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
