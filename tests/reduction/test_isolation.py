@@ -1,6 +1,7 @@
 """Isolation as a pure search: what it removes lets the robot pass, and not with any one model of it put back."""
 
 import random
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -143,7 +144,7 @@ isolations = st.builds(
 causes = st.lists(st.sets(st.integers(0, 7), min_size=1, max_size=3).map(Environment.of), min_size=1, max_size=3)
 
 
-@given(world=isolations, causes=causes)
+@given(world=isolations.map(lambda world: replace(world, breaks=0.0)), causes=causes)
 def test_fresh_runs_show_that_what_goes_is_enough_and_each_of_it_needed(world, causes):
     """Model 7 stands in no world: a cause of it alone cannot be taken away."""
     passing = hits(causes)
