@@ -31,3 +31,8 @@ def finished_tests(path):
 def story(state):
     """What a run's rounds came to: all that must not depend on who worked on it."""
     return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
+
+
+def models_in(state, test):
+    """The models in the world of a test, given by its number."""
+    return frozenset(state.models_of(state.tests[test - 1]))

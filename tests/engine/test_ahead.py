@@ -48,7 +48,9 @@ def decided(path):
                 "certificate_finished",
                 "finished",
             ):
-                data = {key: value for key, value in asdict(event.event).items() if key not in ("known", "evidence_test")}
+                data = {
+                    key: value for key, value in asdict(event.event).items() if key not in ("known", "evidence_test")
+                }
                 if "tests" in data:
                     tests = [journal.state.tests[test - 1] for test in data["tests"]]
                     data["tests"] = sorted((sorted(journal.keep_of_test(one.id)), one.run) for one in tests)

@@ -170,7 +170,9 @@ def test_one_worker_makes_no_test_for_nothing(tmp_path):
     state = drive(new_run(tmp_path), pool := FakePool(flaky(1, "wall"), 1))
     assert len(pool.made) == len(set(pool.made)) == len(state.tests)
     with RunFile(path := Path(tmp_path / "run-0.ddenv")) as file:
-        judged = {test for event in file.events() if event.kind == "candidate_judged" for test in asdict(event.event)["tests"]}
+        judged = {
+            test for event in file.events() if event.kind == "candidate_judged" for test in asdict(event.event)["tests"]
+        }
     assert path.exists()
     assert judged == {test.id for test in state.tests if test.phase == "round"}
 
@@ -271,7 +273,11 @@ def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
     assert state.environment == ("wall",)
     with RunFile(path) as file:
         decided = [asdict(event.event)["decision"] for event in file.events() if event.kind == "decided"]
-        reduced = [(asdict(event.event)["round"], asdict(event.event)["candidate"]) for event in file.events() if event.kind == "reduced"]
+        reduced = [
+            (asdict(event.event)["round"], asdict(event.event)["candidate"])
+            for event in file.events()
+            if event.kind == "reduced"
+        ]
     assert decided[0] == "reject"
     assert asked[0] not in reduced
     assert reduced == asked[1:]

@@ -13,6 +13,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import read_parts
 from tests.engine.fake import drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
+from tests.engine.killing import models_in
 from tests.engine.test_pool import EVERYTHING, parts, result
 from tests.tiers import slow
 
@@ -79,10 +80,10 @@ def test_a_sub_environment_that_kills_its_worker_twice_is_unknown(tmp_path):
         judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
         journal = Journal(file)
     # What was made ahead of its round, and then not needed, is not made again.
-    times = Counter((journal.keep_of_test(test.id), test.run) for test in broke)
+    times = Counter((models_in(journal.state, test.id), test.run) for test in broke)
     assert set(times.values()) <= {1, 2}
     decisive = {test for data in judged if data["verdict"] == "unknown" for test in data["tests"]}
-    assert {times[journal.keep_of_test(test.id), test.run] for test in broke if test.id in decisive} == {2}
+    assert {times[models_in(journal.state, test.id), test.run] for test in broke if test.id in decisive} == {2}
     assert {"wall", "beam"} <= set(state.environment) and not state.minimal
 
 

@@ -200,7 +200,9 @@ def test_with_more_budget_the_search_goes_on_as_it_was(tmp_path):
         viewer.send("change", settings={"budget": 500})
     drive(path, FakePool(needs("wall", "beam"), 1))
     drive(undisturbed, FakePool(needs("wall", "beam"), 1))
-    rounds = [[asdict(event.event) for event in events(each) if event.kind == "round_started"] for each in (path, undisturbed)]
+    rounds = [
+        [asdict(event.event) for event in events(each) if event.kind == "round_started"] for each in (path, undisturbed)
+    ]
     assert rounds[0] == rounds[1]
 
 

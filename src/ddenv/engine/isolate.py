@@ -174,8 +174,8 @@ class _Isolator:
     def _judged(self, step: Judged) -> None:
         journal, number = self._journal, self._journal.number(step.environment)
         verdict = VERDICTS[step.verdict]
-        removal = next(one for one in journal.state.removals if one.environment == number)
-        if removal.verdict != verdict:
+        known = (removal.verdict for removal in journal.state.removals if removal.environment == number)
+        if next(known, "") != verdict:
             tests = journal.tests(step.environment, range(step.runs), full=True)
             journal.record(RemovalJudged(number, verdict, tests))
 

@@ -1,5 +1,5 @@
-"""Slices in a run: without a test, the environment is cut down to what took part in the runs known there. Some of what is implied is
-simulated all the same, and has to repeat the run that implies it to the last bit.
+"""Slices in a run: without a test, the environment is cut down to what took part in the runs known there. Some of what is implied
+is simulated all the same, and has to repeat the run that implies it to the last bit.
 """
 
 from __future__ import annotations

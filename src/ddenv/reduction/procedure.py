@@ -348,7 +348,7 @@ def judge(
 
 def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
     if driver.refused(environment):
-        return Judged(index, environment, verdict, 0)
+        return Judged(index, environment, "missed", 0)
     # By these runs alone: more of them may have ended.
     runs, hits = decided_by(lambda run: driver.shown(environment, run), rule)
     missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
