@@ -389,10 +389,14 @@ def settled(
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first_run + run, full=True)
 
+    # Hundreds of runs need not be looked at again once they have decided.
+    decided: dict[int | None, NamedClaim] = {}
     while True:
         named: list[NamedClaim] = []
         for model, environment, shows in claims():
-            named.append(NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            if named[-1].claim.verdict:
+                decided[model] = named[-1]
             if ends(named[-1]):
                 break
         tests = dict.fromkeys(
