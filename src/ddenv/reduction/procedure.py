@@ -389,10 +389,14 @@ def settled(
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first_run + run, full=True)
 
+    # Hundreds of runs need not be looked at again once they have decided.
+    decided: dict[int | None, NamedClaim] = {}
     while True:
         named: list[NamedClaim] = []
         for model, environment, shows in claims():
-            named.append(NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            if named[-1].claim.verdict:
+                decided[model] = named[-1]
             if ends(named[-1]):
                 break
         tests = dict.fromkeys(
@@ -423,15 +427,15 @@ def onward(
     if not driver.goes_on():
         return None
     left, *removals = certified.claims
-    after: Leg | None = None
     if left.claim.verdict == "lost":
         if leg.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
-            after = yield from _step_back(driver, chain, certified)
-        return after
-    spare = next((claim for claim in removals if claim.claim.verdict == "not needed"), None)
-    if spare is not None and spare.model is not None and not driver.refused(spare.environment):
-        after = yield LeftOut(spare.model, spare.environment)
-    return after
+            return (yield from _step_back(driver, chain, certified))
+        return None
+    for claim in removals:
+        if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
+            after: Leg = yield LeftOut(claim.model, claim.environment)
+            return after
+    return None
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:

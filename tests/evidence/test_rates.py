@@ -1,3 +1,5 @@
+"""What runs say of a rate: intervals, re-runs, and which of two rates they speak for."""
+
 import random
 
 import pytest

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
 from ddenv.evidence.certificate import (
     ERROR,
     MOST_BROKEN,
@@ -19,7 +20,7 @@ from ddenv.evidence.certificate import (
 )
 from tests.tiers import examples, slow
 
-WHOLE, LEFT = frozenset("abcdef"), frozenset("ab")
+WHOLE, LEFT = Environment.whole(6), Environment.whole(2)
 salts = st.integers(0, 10**6)
 chances = st.sampled_from([0.0, 0.4, 0.7, 0.9, 1.0])
 terms = st.builds(
