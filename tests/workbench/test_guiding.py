@@ -42,7 +42,7 @@ async def test_pausing_stepping_and_vetoing(run):
             ("step", {"unit": "round"}),
             ("accept_mode", {"mode": "ask"}),
         ]
-        run.write("accept_mode", mode="ask")
+        run.write("accept_mode_changed", mode="ask")
         await session.look()
         assert "accept: ask" in session.text("#status")
         await session.press("t", "a", "x")
