@@ -147,7 +147,7 @@ def isolated(run: FakeRun) -> FakeRun:
 
 
 def uncertified(run: FakeRun) -> FakeRun:
-    """A run of a file of format 4, which ended with two models and without a certificate."""
+    """A run that ended with two models and without a certificate."""
     _rounds(run).write("finished", minimal=True, reason="no single model can be removed")
     return run
 
