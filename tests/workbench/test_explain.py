@@ -10,6 +10,7 @@ from ddenv.runfile.fold import fold
 from ddenv.workbench.run.explain import baseline_sentence, explain
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.status import facts
+from tests.shorthand import raw
 
 
 def snapshot(run, engine="alive") -> Snapshot:
@@ -342,9 +343,9 @@ def test_settings_that_make_no_sense_do_no_harm(run, scenario):
 @pytest.mark.parametrize(
     ("kind", "data"),
     [
-        ("waiting", {"candidate": 99}),
-        ("waiting", {"candidate": -1}),
-        ("reduced", {"candidate": 99, "environment": [0], "evidence_test": 1}),
+        ("waiting", {"round": 1, "candidate": 99}),
+        ("waiting", {"round": 1, "candidate": -1}),
+        ("reduced", {"round": 1, "candidate": 99, "environment": 0, "evidence_test": 1}),
         ("test_started", {"test": 1}),
         ("created", {"scenario": 3, "elements": 4}),
     ],
@@ -352,7 +353,7 @@ def test_settings_that_make_no_sense_do_no_harm(run, scenario):
 def test_invalid_events_are_named_and_the_rest_is_shown(run, kind, data):
     run.created().baseline()
     run.start_round(2)
-    run.write(kind, **data)
+    raw(run.file, kind, data)
     poll = Poll(run.path)
     found = poll.look()
     poll.close()
