@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any
 
 from ddenv.environment import Environment
@@ -102,11 +103,9 @@ class Writing:
         if kind not in KINDS:
             raw(self._file, kind, data)
             return
-        try:
+        # A test may have damaged the file.
+        with suppress(UserError):
             self._state = fold(self._file.events(self._state.revision), self._state)
-        except UserError:
-            # A test has damaged the file.
-            pass
         command = data.get("command")
         for event in typed(self._state, kind, {key: data[key] for key in data if key != "command"}):
             self._file.append(event, motions, command)

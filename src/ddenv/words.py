@@ -19,12 +19,12 @@ from ddenv.evidence.claims import (
     usual_runs,
     verdict_on,
 )
+from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
-from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
 
 SETTLING = "finding what rests on what"
 ISOLATING = "finding the nearest world that passes"

@@ -176,9 +176,7 @@ def test_sensed_models_that_make_no_sense_are_told(key, pair):
 def test_full_runs_of_what_is_left_are_told_apart():
     whole, one = ({**started(test)[1], "phase": "certify", "without": left} for test, left in ((2, None), (3, 4)))
     terms = {"certificate": 1, "run": 0, "keep_rate": 0.8, "rate": 0.9, "error": 0.05, "at_least": 10}
-    state = state_after(
-        started(1), ("certificate_started", terms), ("test_started", whole), ("test_started", one)
-    )
+    state = state_after(started(1), ("certificate_started", terms), ("test_started", whole), ("test_started", one))
     assert state.confirming
     assert [(test.id, test.without) for test in state.confirm_tests] == [(2, None), (3, "box 4")]
     assert [len(state.models_of(test)) for test in state.confirm_tests] == [6, 5]
@@ -217,7 +215,7 @@ def test_the_tests_of_a_certificate_are_found_without_a_look_at_all_others():
 
 
 def test_an_outcome_that_nobody_knows_is_told():
-    with pytest.raises(UserError, match="outcome: expected one of similar, .*, found 'splendid'"):
+    with pytest.raises(UserError, match=r"outcome: expected one of similar, .*, found 'splendid'"):
         read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
 
 

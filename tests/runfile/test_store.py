@@ -16,7 +16,6 @@ from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import LOGS, ROBOT, SCHEMA_VERSION, Live, Recorded, RunFile, create, recorded
 
-
 CREATED = Created({}, ("Häuser",))
 TestFinished.__test__ = False
 

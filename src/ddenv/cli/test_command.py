@@ -93,8 +93,8 @@ def test_command(
 
 def _elsewhere(what: Subject, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the runs show of another simulator; [] without a certificate that it can be compared with."""
-    from ddenv.evidence.claims import current
     from ddenv.cli.test_summary import elsewhere
+    from ddenv.evidence.claims import current
 
     certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
     if certificate is None or oracle is None or not certificate.claims[0].low:

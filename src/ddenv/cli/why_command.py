@@ -22,9 +22,9 @@ def why_command(run: str, as_json: bool) -> int:
     The fresh runs of the certificate show it; no new test is made. After 'ddenv isolate RUN' it also says what the nearest world
     that passes lacks.
     """
-    from ddenv.evidence.claims import current
     from ddenv.cli.wrapping import wrapped
     from ddenv.errors import printable
+    from ddenv.evidence.claims import current
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run

@@ -9,11 +9,11 @@ from pathlib import Path
 from ddenv.amounts import count
 from ddenv.cli.world_show import terminal_map
 from ddenv.errors import UserError, printable
+from ddenv.evidence.took_part import in_whole_world
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import read_parts
 from ddenv.runs.nearest import removed_in_passing
-from ddenv.evidence.took_part import in_whole_world
 
 
 def took_part_map(path: Path, columns: int, rows: int, *, color: bool) -> str:

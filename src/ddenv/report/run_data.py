@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddenv.evidence.claims import current
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.runfile.events import Created, RoundStarted
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.amounts import first_of
-from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.errors import UserError
+from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.amounts import count, percent
-from ddenv.evidence.claims import current, verdict_on
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, verdict_on
 from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState, Test

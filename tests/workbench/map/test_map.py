@@ -11,8 +11,8 @@ from textual.app import App
 from textual.containers import Vertical
 from textual.events import MouseScrollUp
 
-from ddenv.map.footprints import Footprint
 from ddenv.environment import Environment
+from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
