@@ -3,7 +3,6 @@
 import pytest
 
 from ddenv.learn.variables import variables
-from ddenv.runfile.events import TestFinished, TestStarted
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
 from tests.learn.lessons import RUNS
@@ -22,11 +21,11 @@ def test_variables_say_what_is_so_and_what_changed(run):
         assert now["n_partitions"].value == ("" if state.round is None else str(state.round.n_partitions))
         if before is not None:
             assert now["E"].changed == (now["E"].value != before["E"].value)
-        event = moment.recorded.event
-        if isinstance(event, TestStarted) and event.phase == "round":
+        kind, event = moment.recorded.kind, moment.recorded.event
+        if kind == "test_started" and event.phase == "round":
             assert now["result"].value == "..." and now["result"].changed
             assert "[" in now["subenvironments"].value
-        if isinstance(event, TestFinished) and state.tests[event.test - 1].phase == "round":
+        if kind == "test_finished" and state.tests[event.test - 1].phase == "round":
             outcome = state.tests[event.test - 1].outcome
             wanted = {"similar": "f again", "pass": "the goal was reached", "other": "not f"}[outcome]
             assert now["result"].value.startswith(wanted)

@@ -212,5 +212,7 @@ def _models(value: Any) -> Environment:
 
 
 def _wrong(expected: str, value: Any) -> Invalid:
-    found = f"a list of {len(value)}" if type(value) is list else "an object" if type(value) is dict else ascii(value)[:40]
+    found = (
+        f"a list of {len(value)}" if type(value) is list else "an object" if type(value) is dict else ascii(value)[:40]
+    )
     return Invalid(f"expected {expected}, found {found}")
