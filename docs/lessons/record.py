@@ -166,7 +166,7 @@ def slim(run: Path, shown: bool, told: set[int]) -> None:
         events = file.events()
     if state.status != "finished":
         sys.exit(f"{run.name}: did not come to its end")
-    kept = {event.data["evidence_test"] for event in events if event.data.get("evidence_test")}
+    kept = {test for one in events if (test := getattr(one.event, "evidence_test", None))}
     kept |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
     made_for = {(test.round, test.candidate) for test in state.tests if test.id in told}
     kept |= {test.id for test in state.tests if (test.round, test.candidate) in made_for}

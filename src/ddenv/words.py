@@ -35,7 +35,6 @@ MOST_FAILURES = 3
 SAID = {
     "paused": "paused",
     "resumed": "resumed",
-    "confirm_started": CONFIRMING,
     "supports_started": SETTLING,
 }
 # Hints for readers who see only these lines.
@@ -145,9 +144,9 @@ def _night(kind: str, before: RunState, after: RunState) -> str:
     """What came to an engine from outside."""
     if kind == "clock_jumped":
         return "  the machine slept, or its clock was set: that time does not count"
-    if kind == "room" and after.needs_room:
+    if kind == "disk_space" and after.needs_room:
         return f"  no room on the disk: waits until {after.needs_room / 1e6:.0f} MB are free"
-    return "  there is room on the disk again" if kind == "room" and before.needs_room else ""
+    return "  there is room on the disk again" if kind == "disk_space" and before.needs_room else ""
 
 
 def _certificate(kind: str, after: RunState) -> str:

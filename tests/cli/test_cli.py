@@ -208,7 +208,7 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
 def _engines(run):
     """The processes of all engines so far."""
     with RunFile(run) as file:
-        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"]
+        return [one.event.pid for one in file.events() if one.kind == "engine_started"]
 
 
 def _finished(run):

@@ -198,11 +198,11 @@ class Poll:
         begun, more = time.monotonic(), True
         try:
             while more:
-                count = 0
-                for count, event in enumerate(self.file.read(state.revision, SOME_EVENTS), 1):
-                    before, state = state, apply(state, event)
+                room = SOME_EVENTS
+                for event in self.file.read(state.revision, room):
+                    before, state, room = state, apply(state, event), room - 1
                     self._on_event(event.kind, before, state)
-                more = count == SOME_EVENTS
+                more = not room
                 if time.monotonic() - begun > PATIENCE:
                     break
         except Busy:
