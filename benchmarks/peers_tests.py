@@ -16,9 +16,9 @@ from early_stop import fixed
 
 from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.verdict import standing
-from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation.template import Variants
 from ddenv.runs.scenarios import load_parts
 from ddenv.world.scenario import Scenario
 

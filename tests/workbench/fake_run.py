@@ -16,7 +16,7 @@ from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
 from ddenv.runfile.store import ROBOT, Live, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
 <collision name="body"><geometry><box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"""

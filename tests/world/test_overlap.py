@@ -14,7 +14,7 @@ from ddenv.world.load import SDF
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.overlap import Hull, distance, hull, overlap
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_model
+from ddenv.world.sdf.read import read_model
 
 turned = st.tuples(*[st.floats(-3, 3)] * 3)
 

@@ -15,17 +15,17 @@ import numpy as np
 from mjcf import Unsupported, mjcf, named
 
 from ddenv.errors import UserError
-from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import ControllerFailed, controllers
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import model_bounds
 from ddenv.world.load import load_scenario
 from ddenv.world.placement import spawn_pose
-from ddenv.world.read import read_model, read_world
+from ddenv.world.sdf.read import read_model, read_world
 
 STEP = 0.002  # MuJoCo's time step at most, s: its contacts need shorter ones than Drake's
 FALL = 2.0  # so far below everything the robot has fallen out of the world, m

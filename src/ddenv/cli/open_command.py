@@ -26,7 +26,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     'ddenv RUN_OR_FILE' does the same.
     """
     from ddenv.runs.folder import find_run
-    from ddenv.world.files.access import is_folder
+    from ddenv.world.access import is_folder
 
     path = find_run(run)
     if path.suffix.lower() not in FILES and path.is_file():

@@ -157,7 +157,7 @@ def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
     """The scenario of a name or a file with what the options above say. Raises UserError."""
     from ddenv.runs.scenarios import reading_of, scenario_for_world, with_options
     from ddenv.world.load import find_scenario, load_scenario
-    from ddenv.world.read import read_world
+    from ddenv.world.sdf.read import read_world
 
     reading = {option: given[option] for option in READING}
     others = {option: value for option, value in given.items() if option not in READING}

@@ -16,7 +16,7 @@ from ddenv.reduction.round import Round
 from ddenv.runfile.position import position_in
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import RunFile
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 
 def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:

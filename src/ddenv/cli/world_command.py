@@ -59,7 +59,7 @@ def show(
     """Draws the map of FILE, from above."""
     from ddenv.cli.world_show import terminal_map
     from ddenv.map.svg import svg_map
-    from ddenv.world.files.access import write_file
+    from ddenv.world.access import write_file
 
     columns, rows = shutil.get_terminal_size((100, 36))
     color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
@@ -118,7 +118,7 @@ def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     """The same, and how it was read."""
     from ddenv.runs.scenarios import reading_of
     from ddenv.world.load import bundled_names, find_scenario, load_scenario
-    from ddenv.world.read import read_world
+    from ddenv.world.sdf.read import read_world
 
     if file.suffix.lower() in (".yaml", ".yml") or (str(file) in bundled_names() and not file.exists()):
         scenario = load_scenario(find_scenario(str(file)))

@@ -16,16 +16,16 @@ MOST_NAMES = 5
 
 def settle_world(world: World, reading: Reading, output: Path) -> list[str]:
     """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
-    from ddenv.robot.drake_installed import check_drake
+    from ddenv.robot import check_drake
 
     check_drake()
-    from ddenv.robot.drake.template import Variants
     from ddenv.robot.settled import moved, notes_on
+    from ddenv.robot.simulation.template import Variants
     from ddenv.runs.scenarios import scenario_for_world
-    from ddenv.world.files.access import write_file
-    from ddenv.world.inside import note_inside
-    from ddenv.world.moved import with_places
-    from ddenv.world.read import read_model
+    from ddenv.world.access import write_file
+    from ddenv.world.placement import note_inside
+    from ddenv.world.sdf.moved import with_places
+    from ddenv.world.sdf.read import read_model
 
     if output.resolve() == world.path.resolve():
         raise UserError(f"{output}: is the world itself; choose another file")

@@ -16,13 +16,13 @@ from ddenv.engine.ros_messages import DEFINITIONS, nanoseconds
 from ddenv.engine.single_test import Subject, plan, subject_of_run
 from ddenv.engine.streams import Chosen, Streams, messages
 from ddenv.errors import UserError
-from ddenv.robot.drake.template import Variants
 from ddenv.robot.result import Progress
+from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, F, reasons
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 
 def write_mcap(run: Path, target: Path, progress: Callable[[str, float], None]) -> list[str]:

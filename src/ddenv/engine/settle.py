@@ -8,8 +8,8 @@ from ddenv.engine.noting import note
 from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import notes_on
-from ddenv.world.inside import notes_on_start
 from ddenv.world.model import Model, World
+from ddenv.world.placement import notes_on_start
 from ddenv.world.scenario import Scenario
 
 

@@ -25,10 +25,8 @@ from ddenv.engine.ros_messages import (
     vector,
 )
 from ddenv.engine.single_test import Subject
-from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import RunResult
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
 from ddenv.world import scenario
 from ddenv.world.model import Link, Model, Shape
 from ddenv.world.pose import Pose

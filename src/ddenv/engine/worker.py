@@ -153,7 +153,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
-    from ddenv.robot.drake.template import Variants
+    from ddenv.robot.simulation.template import Variants
 
     return Variants(world, robot, scenario)
 

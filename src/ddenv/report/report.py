@@ -38,7 +38,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.working import spent
 from ddenv.version import __version__
 from ddenv.words import count
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 
 def content(record: Record) -> Report:

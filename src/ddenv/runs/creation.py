@@ -14,11 +14,11 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
 from ddenv.runs.scenarios import check_parts, load_parts
-from ddenv.world.files.access import read_bytes, write_file
+from ddenv.world.access import read_bytes, write_file
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Model, World
-from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_model, parse_world
 
 # Prefix of the names of documents that hold other files.
 RESOURCE = "resource "

@@ -10,13 +10,13 @@ from typing import Any
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, put
+from ddenv.world.access import read_bytes
 from ddenv.world.command import command_words
-from ddenv.world.files.access import read_bytes
 from ddenv.world.load import SDF, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
-from ddenv.world.read import disk_of, parse_model, read_world
 from ddenv.world.scenario import PLAIN, Reading, Scenario
+from ddenv.world.sdf.read import disk_of, parse_model, read_world
 from ddenv.world.sdf.standin import parse_option
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import HERE, Pose, Vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -42,13 +44,24 @@ def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
     return half
 
 
-def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
-    """The box around all `collisions` except planes; None if there are none."""
-    boxes = [shape_bounds(one.shape, one.pose) for one in collisions if not isinstance(one.shape, Plane)]
-    if not boxes:
-        return None
-    lows, highs = zip(*boxes, strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+def stacked(boxes: Iterable[Bounds]) -> Bounds:
+    """The lowest and the highest corners, (N, 3) m each, of N boxes."""
+    pairs = list(boxes)
+    return np.array([low for low, _ in pairs]).reshape(-1, 3), np.array([high for _, high in pairs]).reshape(-1, 3)
+
+
+def around(boxes: Iterable[Bounds]) -> Bounds | None:
+    """The box around all `boxes`; None if there are none."""
+    low, high = stacked(boxes)
+    return (low.min(axis=0), high.max(axis=0)) if len(low) else None
+
+
+def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None:
+    """The box around all `collisions` except planes, along the axes of a frame in which the world is at `frame`.
+
+    None if there are none.
+    """
+    return around(shape_bounds(one.shape, frame @ one.pose) for one in collisions if not isinstance(one.shape, Plane))
 
 
 def center(model: Model) -> Vector:

@@ -16,7 +16,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
-from ddenv.world.files.access import is_folder, read_bytes
+from ddenv.world.access import is_folder, read_bytes
 from ddenv.world.scenario import Oracle, Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]

@@ -170,6 +170,21 @@ class Model:
         return tuple(collision for link in self.links for collision in link.collisions)
 
 
+def held_with(model: Model, name: str) -> frozenset[str]:
+    """The link `name` (or "world") and all that fixed joints hold together with it, directly or through others."""
+    held = {name}
+    pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
+    while new := {end for pair in pairs if pair & held for end in pair} - held:
+        held |= new
+    return frozenset(held)
+
+
+def still_links(model: Model) -> tuple[Link, ...]:
+    """The links of `model` that never move: all if it is static, else those that fixed joints hold to the world."""
+    held = held_with(model, "world")
+    return tuple(link for link in model.links if model.static or link.name in held)
+
+
 @dataclass(frozen=True, slots=True)
 class Note:
     """A part of the file that was replaced or ignored (`kind`).

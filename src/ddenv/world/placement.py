@@ -1,9 +1,14 @@
-"""Checks that the robot can start where a scenario says: no part of it may overlap a model."""
+"""How a world starts, without simulating it: whether the robot has room, how far it drops, which models are inside others."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
 import numpy as np
 
+from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.world.extent import Bounds, shape_bounds
 from ddenv.world.model import Collision, Mesh, Model, Plane, World
@@ -54,3 +59,111 @@ def _depth_inside(bodies: list[Hull], boxes: list[Bounds], collision: Collision)
         return 0.0
     obstacle = hull(collision)
     return max(overlap(body, obstacle) for body in near)
+
+
+# Models at rest in a saved world overlap by millimetres; this is more, m.
+INSIDE = 0.03
+# A robot that starts higher than this above the surface below it drops, m.
+DROP = 0.15
+# The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
+MOST_PAIRS = 500
+# Farther than anything in a world, m.
+FAR = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """The model `name` starts `depth` (m) deep inside `other`."""
+
+    name: str
+    other: str
+    depth: float
+
+
+def notes_on_start(world: World, robot: Model, spawn: Spawn) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the robot in `world`: a word and a sentence for each."""
+    height = drop(world, robot, spawn)
+    if height > DROP:
+        yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
+    yield from note_inside(world)
+
+
+def note_inside(world: World) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the models alone."""
+    pairs = inside(world)
+    if pairs:
+        deepest = max(pairs, key=lambda pair: pair.depth)
+        more = f", and {count(len(pairs) - 1, 'more pair')}" if len(pairs) > 1 else ""
+        yield (
+            "inside",
+            f"{deepest.name} starts {deepest.depth:.2f} m inside {deepest.other}{more}: they push each other apart",
+        )
+
+
+def inside(world: World) -> list[Inside]:
+    """Models of which one can move, and one starts deeper than `INSIDE` in the other."""
+    shapes = [(model, one) for model in world.models for one in model.collisions]
+    deepest: dict[tuple[str, str], float] = {}
+    for first, second in islice(_near(shapes), MOST_PAIRS):
+        (model, shape), (other, obstacle) = shapes[first], shapes[second]
+        # What cannot move, or has no end, is the obstacle.
+        if model.static or isinstance(shape.shape, Plane):
+            (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
+        depth = _depth(shape, obstacle)
+        if depth > INSIDE:
+            pair = model.name, other.name
+            deepest[pair] = max(depth, deepest.get(pair, 0.0))
+    return [Inside(*pair, depth) for pair, depth in deepest.items()]
+
+
+def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
+    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
+    boxes = [_box(one) for _, one in shapes]
+    low, high = (np.array([box[side] for box in boxes]).reshape(-1, 3) for side in (0, 1))
+    free = np.array([not model.static for model, _ in shapes], dtype=bool)
+    names = {id(model): number for number, (model, _) in enumerate(shapes)}
+    owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
+    if not free.any():
+        return
+    order = np.argsort(low[:, 0], kind="stable")
+    ends = np.searchsorted(low[order, 0], high[:, 0])
+    for place, number in enumerate(order.tolist()):
+        others = order[place + 1 : ends[number]]
+        deep = (np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE).all(axis=1)
+        able = (free[number] | free[others]) & (owners[number] != owners[others])
+        yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
+
+
+def _box(collision: Collision) -> Bounds:
+    """The box around a shape; a plane fills all below it, or everything if it leans."""
+    low, high = np.full(3, -FAR), np.full(3, FAR)
+    if not isinstance(collision.shape, Plane):
+        return shape_bounds(collision.shape, collision.pose)
+    up = collision.pose.rotate((0.0, 0.0, 1.0))
+    return (low, np.array([FAR, FAR, collision.pose.position[2]])) if up[2] > 1 - 1e-9 else (low, high)
+
+
+def _depth(shape: Collision, obstacle: Collision) -> float:
+    """How deep a shape is inside an obstacle, m."""
+    body = hull(shape)
+    if not isinstance(obstacle.shape, Plane):
+        return overlap(body, hull(obstacle))
+    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
+    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
+
+
+def drop(world: World, robot: Model, spawn: Spawn) -> float:
+    """How far the robot falls at least when it starts, m; 0 where nothing is below it: then the test says that it fell.
+
+    Everything is taken as large as the box around it.
+    """
+    place = spawn_pose(spawn) @ robot.pose.inverse()
+    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
+    heights = []
+    for collision in (one for model in world.models for one in model.collisions):
+        low, high = shape_bounds(collision.shape, collision.pose)
+        endless = isinstance(collision.shape, Plane)
+        below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
+        # What is above the robot does not stop its fall.
+        heights += [float(bottom[2] - high[2]) for bottom in below if low[2] <= bottom[2]]
+    return max(0.0, min(heights, default=0.0))

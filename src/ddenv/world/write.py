@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 from ddenv.world.ground import with_ground_boxes
 from ddenv.world.model import (
     Box,

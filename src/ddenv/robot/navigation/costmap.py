@@ -8,9 +8,7 @@ import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.robot.navigation.footprint import Footprint
-from ddenv.robot.protocol import Setup
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.protocol import Estimate, Imu, Scan, Setup
 
 # A beam clears a cell if it goes farther than the cell by this many cells.
 PASSED = 1.5

@@ -9,8 +9,8 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.robot.navigation.footprint import Footprint
 from ddenv.robot.navigation.route import Path
-from ddenv.robot.protocol import STOP, Setup, Twist
-from ddenv.robot.sensing.estimate import Estimate, wrap
+from ddenv.robot.protocol import STOP, Estimate, Setup, Twist
+from ddenv.world.pose import wrap
 
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)

@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.multibody.plant import ContactResults
 
 from ddenv.arrays import Booleans, Floats
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
-from ddenv.robot.drake.run_context import RunContext
 
 # A model at rest bears a change of its load up to this many times its own weight: it also carries others.
 BEARS = 3.0

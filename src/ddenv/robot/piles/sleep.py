@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
-from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.loads import Loads
-from ddenv.robot.piles.moving_links import NEAR, Links, Motion, gaps, spread, tight_gaps
-from ddenv.robot.piles.script import Script
-from ddenv.robot.piles.stillness import SLOW, Stillness
+from ddenv.robot.piles.motion import NEAR, SLOW, Links, Motion, Script, Stillness, gaps, spread, tight_gaps
 from ddenv.world.extent import Bounds
 
 NO_BOXES = np.empty((0, 3)), np.empty((0, 3))

@@ -14,8 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
-from ddenv.robot.sensing.crossing import Facets, Interval, ball, cube, pill, tube
-from ddenv.robot.sensing.obstacles import HULL, KINDS, PILL, Obstacles
+from ddenv.robot.sensing.obstacles import HULL, KINDS, PILL, Facets, Interval, Obstacles, ball, cube, pill, tube
 from ddenv.world.scenario import Lidar
 
 # A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.protocol import Scan
 from ddenv.robot.result import PoseRow
 from ddenv.robot.sensing.beams import SPARE, Ends, Fan, Shapes, cast
 from ddenv.robot.sensing.obstacles import Obstacles
-from ddenv.robot.sensing.sensors import Scan
 from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ddenv.world.files.access import Unusable, read
+from ddenv.world.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.hull import convex_hull

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason, without_tilde
+from ddenv.world.access import Missing, Unusable, is_folder, read, reason, without_tilde
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")

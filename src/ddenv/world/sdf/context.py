@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import MissingFiles, Unusable
+from ddenv.world.access import MissingFiles, Unusable
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading

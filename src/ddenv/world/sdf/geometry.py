@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import convex_hull, polygon_area
-from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse

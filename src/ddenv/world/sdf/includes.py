@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ddenv.world.files.access import Missing
-from ddenv.world.files.built_in import FOLDER
+from ddenv.world.access import Missing
+from ddenv.world.files.resources import FOLDER
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
-from ddenv.world.sdf.guess import guess
-from ddenv.world.sdf.standin import NONE, SIZES, StandIn
+from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
 
 # Intangible things that an included file may hold in place of a model.

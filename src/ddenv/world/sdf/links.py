@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.world.extent import shape_bounds
+from ddenv.world.extent import around, shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import Scope, pose_of
 from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies, scaled_stand_in
-from ddenv.world.sdf.guess import guess
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
-from ddenv.world.sdf.standin import AUTO, NONE
+from ddenv.world.sdf.standin import AUTO, NONE, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
@@ -152,10 +151,10 @@ def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed
 def _box_around(items: list[_Item]) -> Placed | None:
     """The box around the shapes of `items`, in the frame of their link; None if there are no shapes."""
     placed = [(item.shape, item.pose) for item in items if isinstance(item.shape, Placed)]
-    if not placed:
+    box = around(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed)
+    if box is None:
         return None
-    lows, highs = zip(*(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed), strict=True)
-    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    low, high = box
     return Placed(Box(vector(np.maximum(high - low, 1e-3))), Pose(vector((low + high) / 2)))
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.protocol import Drives, Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.protocol import Drives, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
-from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
+from ddenv.robot.sensing.sensors import SensorSuite, Truth
 from ddenv.world.drive import Drive, footprint
 from ddenv.world.model import Model
 from ddenv.world.scenario import Scenario, Sensors

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers, Objects
-from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
-from ddenv.robot.robot_hull import Hull
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Plane, World
+from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.world.extent import shape_bounds, stacked
+from ddenv.world.model import World, still_links
 from ddenv.world.pose import Pose
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
@@ -31,7 +30,7 @@ AROUND = 1.0
 class Solids:
     """The boxes around all S shapes of a world that never move: corners `low` and `high` (S, 3) m, and the number of each owner.
 
-    `names` (N,) are the models that have such shapes. A plane has an endless box.
+    `names` (N,) are the models that have such shapes. There are no planes.
     """
 
     names: Objects
@@ -41,25 +40,11 @@ class Solids:
 
     @classmethod
     def of(cls, world: World) -> Solids:
-        names: list[str] = []
-        owners, low, high = [], [], []
-        for model in world.models:
-            held = anchored(model)
-            links = [link for link in model.links if model.static or link.name in held]
-            for one in (collision for link in links for collision in link.collisions):
-                endless = isinstance(one.shape, Plane)
-                box = (np.full(3, -np.inf), np.full(3, np.inf)) if endless else shape_bounds(one.shape, one.pose)
-                if not names or names[-1] != model.name:
-                    names.append(model.name)
-                owners.append(len(names) - 1)
-                low.append(box[0])
-                high.append(box[1])
-        return cls(
-            np.array(names, dtype=object),
-            np.array(owners, dtype=int),
-            np.array(low, dtype=float).reshape(-1, 3),
-            np.array(high, dtype=float).reshape(-1, 3),
-        )
+        shapes = [(model.name, one) for model in world.models for link in still_links(model) for one in link.collisions]
+        number_of = {name: number for number, name in enumerate(dict.fromkeys(name for name, _ in shapes))}
+        owners = np.array([number_of[name] for name, _ in shapes], dtype=int)
+        low, high = stacked(shape_bounds(one.shape, one.pose) for _, one in shapes)
+        return cls(np.array([*number_of], dtype=object), owners, low, high)
 
 
 class Reached:

@@ -11,20 +11,20 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.region import Watch
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.notice import Notice
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.reached import Reached
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
+from ddenv.robot.simulation.autonomy import Autonomy
+from ddenv.robot.simulation.notice import Notice
+from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
 from ddenv.world.scenario import Controller, Scenario
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
@@ -11,27 +10,24 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ddenv.errors import UserError
-from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import BUILT_IN, controllers
+from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.listening import Heard, Listener
-from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
-from ddenv.robot.piles.settling import settled
+from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.piles.support import supports
-from ddenv.robot.reached import Reached, Solids
 from ddenv.robot.result import Progress, RunResult
-from ddenv.robot.robot_hull import Hull
-from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
-from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
+from ddenv.robot.simulation.autonomy import Autonomy, setup_of
+from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
+from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
+from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
+from ddenv.robot.simulation.taking_part import Reached, Solids
 from ddenv.world.drive import Drive, find_drive
 from ddenv.world.extent import shape_bounds
 from ddenv.world.ground import with_ground_boxes
@@ -39,6 +35,8 @@ from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 
+# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
+YIELD = 0.1
 # A robot this far below everything that it could stand on has fallen out of the world, m.
 FALL = 2.0
 
@@ -69,8 +67,8 @@ class Template:
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
-        self._reach = reach(robot) + YIELD
         self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
         self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
@@ -116,14 +114,14 @@ class Template:
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
         self._region = region
-        self._far = region.far(self._solid.models) if math.isfinite(self._reach) else frozenset()
+        self._far = region.far(self._solid.models) if self._reach < ENDLESS else frozenset()
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self._names = names
         built = _build(_part(self._solid, names - self._far), self._robot, self._drive, self._scenario)
         boxes = [box for box in self._boxes if box[0] in names]
-        self._surroundings = Surroundings.of(boxes, self._robot, built)
+        self._surroundings = Surroundings.of(boxes, self._reach, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)

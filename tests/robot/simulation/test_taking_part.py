@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.robot import reached
-from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
-from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.simulation import taking_part
+from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.slices import Ties
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
@@ -186,9 +186,9 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["carriers"], everything["carriers"])
     monkeypatch.setattr(Repertoire, "unusual", lambda *_: frozenset())
     assert not is_implied(worlds["unusual"], everything["unusual"], more["unusual"])
-    monkeypatch.setattr(reached.Reached, "_look_around_robot", lambda *_: None)
+    monkeypatch.setattr(taking_part.Reached, "_look_around_robot", lambda *_: None)
     assert not is_implied(worlds["robot"], everything["robot"])
-    monkeypatch.setattr(reached.Reached, "_look_around_models", lambda *_: None)
+    monkeypatch.setattr(taking_part.Reached, "_look_around_models", lambda *_: None)
     assert not is_implied(worlds["models"], everything["models"])
     monkeypatch.setattr(Lidar, "took_part", frozenset())
     assert not is_implied(worlds["lidar"], everything["lidar"])

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 from ddenv.world.files.resources import Disk, Resources
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Vector, vector
@@ -21,8 +21,8 @@ from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.standin import AUTO
+from ddenv.world.sdf.urdf import ROOT, massless, to_sdf, without_mass
 from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
-from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # Elements that add or join models in a way that is not supported, with the error message.
