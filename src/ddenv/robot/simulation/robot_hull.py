@@ -30,9 +30,9 @@ class Hull:
 
     @classmethod
     def of(cls, robot: Model) -> Hull:
-        boxes = list(_boxes(robot))
-        low, high = stacked(box for box, _ in boxes)
-        return cls((low + high) / 2, (high - low) / 2, max((reach for _, reach in boxes), default=0.0))
+        low, high = stacked(_boxes(robot))
+        centers, halves = (low + high) / 2, (high - low) / 2
+        return cls(centers, halves, float(np.linalg.norm(np.abs(centers) + halves, axis=1).max(initial=0.0)))
 
     def bounds(self, place: Pose) -> Bounds:
         """The corners (B, 3) m and (B, 3) m of boxes along the world's axes around the boxes, with the first link at `place`."""
@@ -42,8 +42,8 @@ class Hull:
         return centers - halves, centers + halves
 
 
-def _boxes(robot: Model) -> Iterator[tuple[Bounds, float]]:
-    """The box around each link, wherever its joints take it, and the distance of its farthest point from the first link, m."""
+def _boxes(robot: Model) -> Iterator[Bounds]:
+    """The box around each link, wherever its joints take it."""
     frame, first = robot.links[0].pose.inverse(), robot.links[0].pose.position
     rigid, reached = held_with(robot, robot.links[0].name), _chains(robot)
     joint_of = {joint.child: joint for joint in robot.joints}
@@ -51,9 +51,8 @@ def _boxes(robot: Model) -> Iterator[tuple[Bounds, float]]:
         box = bounds(link.collisions, frame if link.name in rigid else link.pose.inverse())
         if box is None:
             continue
-        corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         if link.name in rigid:
-            yield box, corner
+            yield box
             continue
         joint = joint_of.get(link.name)
         if joint is not None and joint.parent in rigid:
@@ -62,9 +61,10 @@ def _boxes(robot: Model) -> Iterator[tuple[Bounds, float]]:
             # Several joints in a row: a ball around the first link.
             center, far = first, reached[link.name][1] if link.name in reached else math.inf
         start = joint.pose.position if joint is not None else link.pose.position
+        corner = float(np.linalg.norm(np.abs(box).max(axis=0)))
         far = min(ENDLESS, far + math.dist(start, link.pose.position) + corner)
         middle = np.array((frame @ Pose(center)).position)
-        yield (middle - far, middle + far), float(np.linalg.norm(middle)) + far
+        yield middle - far, middle + far
 
 
 def _chains(robot: Model) -> dict[str, tuple[Vector, float]]:
