@@ -44,6 +44,16 @@ def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
     return half
 
 
+def filled_bounds(collision: Collision) -> Bounds:
+    """The box around what a shape fills: all that is below a plane, everything if that leans."""
+    if not isinstance(collision.shape, Plane):
+        return shape_bounds(collision.shape, collision.pose)
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    if collision.pose.rotation()[2, 2] > 1 - 1e-9:
+        high[2] = collision.pose.position[2]
+    return low, high
+
+
 def stacked(boxes: Iterable[Bounds]) -> Bounds:
     """The lowest and the highest corners, (N, 3) m each, of N boxes."""
     pairs = list(boxes)

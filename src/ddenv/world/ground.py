@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -22,26 +23,13 @@ def with_ground_boxes(world: World, places: Iterable[Vector] = ()) -> World:
     """`world` with a box for each plane, wide enough for all models and `places` (m, world frame)."""
     if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
         return world
-    points = _points(world, places)
+    boxes = [box for box in map(model_bounds, world.models) if box is not None]
+    corners = [corner for low, high in boxes for corner in product(*zip(low, high, strict=True))]
+    points = np.array([*corners, *places], dtype=float).reshape(-1, 3)
     return replace(world, models=tuple(_boxed(model, points) for model in world.models))
 
 
-def _points(world: World, places: Iterable[Vector]) -> np.ndarray:
-    """The corners of the boxes around all models, and `places`, shape (N, 3)."""
-    boxes = [box for box in map(model_bounds, world.models) if box is not None]
-    corners = [
-        (x, y, z)
-        for low, high in boxes
-        for x in (low[0], high[0])
-        for y in (low[1], high[1])
-        for z in (low[2], high[2])
-    ]
-    return np.array([*corners, *places], dtype=float).reshape(-1, 3)
-
-
 def _boxed(model: Model, points: np.ndarray) -> Model:
-    if not any(isinstance(one.shape, Plane) for one in model.collisions):
-        return model
     links = (replace(link, collisions=tuple(_box(one, points) for one in link.collisions)) for link in model.links)
     return replace(model, links=tuple(links))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ddenv.amounts import count
 from ddenv.errors import UserError
-from ddenv.world.extent import Bounds, shape_bounds
+from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked
 from ddenv.world.model import Collision, Mesh, Model, Plane, World
 from ddenv.world.overlap import Hull, hull, overlap
 from ddenv.world.pose import Pose
@@ -28,14 +28,14 @@ def spawn_pose(spawn: Spawn) -> Pose:
 def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground."""
     place = spawn_pose(spawn) @ robot.pose.inverse()
-    solid = [collision for collision in robot.collisions if not isinstance(collision.shape, Plane)]
-    if not solid:
+    box = bounds(robot.collisions, place)
+    if box is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
-    bodies = [hull(collision, place) for collision in solid]
-    boxes = [shape_bounds(collision.shape, place @ collision.pose) for collision in solid]
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
     where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
     for model in world.models:
-        depths = [(_depth_inside(bodies, boxes, collision), collision.shape) for collision in model.collisions]
+        near = [one for one in model.collisions if _meet(box, filled_bounds(one))]
+        depths = [(_depth(body, one), one.shape) for one in near for body in bodies]
         depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))
         if depth > TOLERANCE:
             # The hull of a hollow mesh fills space that looks free.
@@ -45,20 +45,17 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
             )
 
 
-def _depth_inside(bodies: list[Hull], boxes: list[Bounds], collision: Collision) -> float:
-    """How deep the robot's `bodies`, with `boxes` around them, overlap an obstacle, m."""
-    if isinstance(collision.shape, Plane):
-        up = np.array([collision.pose.rotate((0.0, 0.0, 1.0))])
-        height = float(up[0] @ collision.pose.position)
-        return max(height - float(body.span(up)[0][0]) for body in bodies)
-    low, high = shape_bounds(collision.shape, collision.pose)
-    near = [
-        body for body, (bottom, top) in zip(bodies, boxes, strict=True) if (bottom <= high).all() and (top >= low).all()
-    ]
-    if not near:
-        return 0.0
-    obstacle = hull(collision)
-    return max(overlap(body, obstacle) for body in near)
+def _meet(one: Bounds, other: Bounds) -> bool:
+    """Whether two boxes overlap."""
+    return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())
+
+
+def _depth(body: Hull, obstacle: Collision) -> float:
+    """How deep a body is inside an obstacle, m."""
+    if not isinstance(obstacle.shape, Plane):
+        return overlap(body, hull(obstacle))
+    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
+    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
 
 
 # Models at rest in a saved world overlap by millimetres; this is more, m.
@@ -67,8 +64,6 @@ INSIDE = 0.03
 DROP = 0.15
 # The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
 MOST_PAIRS = 500
-# Farther than anything in a world, m.
-FAR = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +104,7 @@ def inside(world: World) -> list[Inside]:
         # What cannot move, or has no end, is the obstacle.
         if model.static or isinstance(shape.shape, Plane):
             (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
-        depth = _depth(shape, obstacle)
+        depth = _depth(hull(shape), obstacle)
         if depth > INSIDE:
             pair = model.name, other.name
             deepest[pair] = max(depth, deepest.get(pair, 0.0))
@@ -118,8 +113,7 @@ def inside(world: World) -> list[Inside]:
 
 def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
     """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
-    boxes = [_box(one) for _, one in shapes]
-    low, high = (np.array([box[side] for box in boxes]).reshape(-1, 3) for side in (0, 1))
+    low, high = stacked(filled_bounds(one) for _, one in shapes)
     free = np.array([not model.static for model, _ in shapes], dtype=bool)
     names = {id(model): number for number, (model, _) in enumerate(shapes)}
     owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
@@ -132,24 +126,6 @@ def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]
         deep = (np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE).all(axis=1)
         able = (free[number] | free[others]) & (owners[number] != owners[others])
         yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
-
-
-def _box(collision: Collision) -> Bounds:
-    """The box around a shape; a plane fills all below it, or everything if it leans."""
-    low, high = np.full(3, -FAR), np.full(3, FAR)
-    if not isinstance(collision.shape, Plane):
-        return shape_bounds(collision.shape, collision.pose)
-    up = collision.pose.rotate((0.0, 0.0, 1.0))
-    return (low, np.array([FAR, FAR, collision.pose.position[2]])) if up[2] > 1 - 1e-9 else (low, high)
-
-
-def _depth(shape: Collision, obstacle: Collision) -> float:
-    """How deep a shape is inside an obstacle, m."""
-    body = hull(shape)
-    if not isinstance(obstacle.shape, Plane):
-        return overlap(body, hull(obstacle))
-    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
-    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
 
 
 def drop(world: World, robot: Model, spawn: Spawn) -> float:

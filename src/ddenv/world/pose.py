@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 Vector = tuple[float, float, float]
 
@@ -37,6 +39,9 @@ class Pose:
 
     def rotation(self) -> np.ndarray:
         """Rotation matrix, shape (3, 3)."""
+        # Loaded late: the first paint of the workbench does without it.
+        import numpy as np
+
         w, x, y, z = self.quaternion
         return np.array(
             [
@@ -59,8 +64,7 @@ class Pose:
 
     def yaw(self) -> float:
         """Heading about the vertical axis, rad in (-pi, pi]."""
-        w, x, y, z = self.quaternion
-        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return heading(self.quaternion)
 
     def rpy(self) -> Vector:
         """SDF's roll, pitch and yaw, rad. Where x points straight up or down, only yaw turns."""
@@ -91,6 +95,20 @@ class Pose:
         return Pose((x + px, y + py, z + pz), quaternion)
 
 
+def heading(quaternion: Sequence[float]) -> float:
+    """The yaw of a quaternion w, x, y, z: its turn about the vertical axis, rad in (-pi, pi]."""
+    w, x, y, z = quaternion
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def headings(quaternions: np.ndarray) -> np.ndarray:
+    """The yaws (N,) of quaternions (N, 4), as `heading`."""
+    import numpy as np
+
+    w, x, y, z = quaternions.T
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
 def wrap(angle: float) -> float:
     """`angle` (rad), wrapped into [-pi, pi]."""
     return math.remainder(angle, math.tau)
@@ -108,6 +126,8 @@ ONE: Vector = (1.0, 1.0, 1.0)
 
 def pose_at(samples: np.ndarray, time: float) -> Pose:
     """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
+    import numpy as np
+
     after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
     if len(samples) == 1:
         return pose_of(samples[0, 1:])

@@ -68,13 +68,13 @@ def guessed(world):
 
 @pytest.mark.parametrize("name", KNOWN_SIZES)
 def test_every_known_model_and_its_mesh_have_its_size(read, name):
-    known = KNOWN_SIZES[name]
-    scale = f"<scale>{' '.join(map(str, known.scale))}</scale>"
+    text, factors = KNOWN_SIZES[name]
+    scale = f"<scale>{' '.join(map(str, factors))}</scale>"
     whole = read(included(f"model://{name}"), stand_ins={"*": "auto"}).models[0]
     mesh, note = guessed(read(lost(f"model://{name}/meshes/x.dae", scale=scale), stand_ins={f"model://{name}": "auto"}))
     assert mesh.shape == whole.collisions[0].shape
     assert mesh.pose == whole.collisions[0].pose
-    assert f"by a guess, {known.text}: the size of Gazebo's model" in note
+    assert f"by a guess, {text}: the size of Gazebo's model" in note
     low, high = model_bounds(whole)
     assert all(0.03 < high[axis] - low[axis] <= 20 for axis in range(3))
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
+from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World, still_links
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
@@ -95,24 +96,10 @@ def _kind(shape: Shape) -> int:
 
 def _extent(shape: Shape) -> tuple[Vector, Vector]:
     """Of the box around `shape` along its own axes: the middle, and half the size, m."""
-    middle: Vector = (0.0, 0.0, 0.0)
-    match shape:
-        case Box((x, y, z)):
-            return middle, (x / 2, y / 2, z / 2)
-        case Plane():
-            return (0.0, 0.0, -PLANE / 2), (PLANE / 2, PLANE / 2, PLANE / 2)
-        case Sphere(radius):
-            return middle, (radius, radius, radius)
-        case Ellipsoid(radii):
-            return middle, radii
-        case Cylinder(radius, length):
-            return middle, (radius, radius, length / 2)
-        case Capsule(radius, length):
-            return middle, (radius, radius, length / 2 + radius)
-        case Mesh():
-            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
-            return tuple(((low + high) / 2).tolist()), tuple(((high - low) / 2).tolist())
-    raise TypeError(type(shape).__name__)
+    if isinstance(shape, Plane):
+        return (0.0, 0.0, -PLANE / 2), (PLANE / 2, PLANE / 2, PLANE / 2)
+    low, high = shape_bounds(shape, HERE)
+    return vector((low + high) / 2), vector((high - low) / 2)
 
 
 # Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.

@@ -13,8 +13,8 @@ from pydrake.systems.framework import Context, OutputPort
 from ddenv.arrays import Booleans, Floats, Integers, Objects
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.world.extent import Bounds, bounds, stacked
-from ddenv.world.model import Collision, Model, Plane, World, still_links
+from ddenv.world.extent import bounds, filled_bounds, stacked
+from ddenv.world.model import Model, Plane, World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -264,12 +264,4 @@ def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:
         yield *box, True
     for collision in collisions:
         if isinstance(collision.shape, Plane):
-            yield *_below(collision), False
-
-
-def _below(plane: Collision) -> Bounds:
-    """The box around everything below `plane`."""
-    low, high = np.full(3, -np.inf), np.full(3, np.inf)
-    if plane.pose.rotation()[2, 2] > 1 - 1e-9:
-        high[2] = plane.pose.position[2]
-    return low, high
+            yield *filled_bounds(collision), False

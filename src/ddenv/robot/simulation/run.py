@@ -26,6 +26,7 @@ from ddenv.robot.simulation.autonomy import Autonomy
 from ddenv.robot.simulation.notice import Notice
 from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
+from ddenv.world.pose import Pose
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.
@@ -225,14 +226,15 @@ class Observer:
 
     def truth(self, pose: PoseRow) -> Truth:
         """What the robot's sensors would measure without noise at its `pose`."""
-        _, _, _, qw, qx, qy, qz = pose
+        qw, qx, qy, qz = pose[3:]
+        roll, pitch, heading = Pose(pose[:3], pose[3:]).rpy()
         state, spin = self._state, self._spin
         # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here in the world frame.
         up_x, up_y, up_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
         return Truth(
-            heading=math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)),
-            roll=math.atan2(2 * (qy * qz + qw * qx), up_z),
-            pitch=math.asin(min(1.0, max(-1.0, 2 * (qw * qy - qx * qz)))),
+            heading=heading,
+            roll=roll,
+            pitch=pitch,
             yaw_rate=up_x * state[spin] + up_y * state[spin + 1] + up_z * state[spin + 2],
             wheels=tuple([sign * state[start] for start, sign in self._wheels]),
         )

@@ -134,12 +134,9 @@ class Template:
         full: bool = True,
         listener: Listener | None = None,
     ) -> RunResult:
-        """Runs the robot in the world with the models `keep`, and with protected models and grounds, which are always kept.
+        """As `Simulator.run`; `listener` hears the controller.
 
-        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
-        by name, of the models that can move, at each recorded sample. A run that is not `full` is cut short as soon as the robot is
-        stuck for good. `listener` hears the controller.
-        Raises ValueError for unknown names, and LeftRegion if something comes near what is not in the plant.
+        Raises LeftRegion if something comes near what is not in the plant.
         """
         unknown = keep - self._names
         if unknown:

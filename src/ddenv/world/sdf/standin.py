@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
+from ddenv.world.extent import shape_bounds
 from ddenv.world.files.resolve import model_named
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from ddenv.world.pose import ONE, Vector, vector
+from ddenv.world.pose import HERE, ONE, Vector, vector
 from ddenv.world.sdf.xml import Element, floats
 
 # The sizes (m) of each kind, as shown in error messages.
@@ -82,7 +83,9 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
     shape = _shape(kind, sizes)
-    middle = _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, _height(shape) / 2)
+    middle = (
+        _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
+    )
     return StandIn(shape, vector(middle))
 
 
@@ -107,21 +110,6 @@ def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
         case "capsule":
             return Capsule(*sizes)
     return Ellipsoid(vector(size / 2 for size in sizes))
-
-
-def _height(shape: Shape) -> float:
-    match shape:
-        case Box(size):
-            return size[2]
-        case Cylinder(_, length):
-            return length
-        case Sphere(radius):
-            return 2 * radius
-        case Capsule(radius, length):
-            return length + 2 * radius
-        case Ellipsoid(radii):
-            return 2 * radii[2]
-    raise TypeError(type(shape).__name__)
 
 
 def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
@@ -151,16 +139,12 @@ class Guess:
 
 def guess(uri: str, link: Element | None = None) -> Guess:
     """The shape for a missing model, or for a missing mesh of the `link`."""
-    known = known_size(uri)
-    if known is not None:
-        return _guess(known.text, "the size of Gazebo's model", known.scale)
-    box = None if link is None else _box_of_inertia(link)
-    if box is not None:
-        return _guess(box, "the box that has the link's inertia", ONE, at_mass=True)
-    return _guess(SOME, "nothing says how large it is", ONE)
-
-
-def _guess(text: str, why: str, scale: Vector, at_mass: bool = False) -> Guess:
+    text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
+    why, at_mass = "the size of Gazebo's model", False
+    if text == SOME:
+        box = None if link is None else _box_of_inertia(link)
+        text, at_mass = box or SOME, box is not None
+        why = "the box that has the link's inertia" if at_mass else "nothing says how large it is"
     return Guess(parse_stand_in(text, "guess"), text, why, scale, at_mass)
 
 
@@ -183,40 +167,28 @@ def _value(inertial: Element, path: str) -> float:
     return values[0] if len(values) == 1 else math.nan
 
 
-@dataclass(frozen=True)
-class Known:
-    """A stand-in's text, in the frame of the model as of its mesh; its mesh is drawn to that size with `scale`."""
-
-    text: str
-    scale: Vector = ONE
-
-
 # From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the cylinder. Of the barrel
 # without its flat foot, which has a radius of 0.51 m. Only models whose mesh has the frame of the model.
-KNOWN_SIZES = {
-    "asphalt_plane": Known("box:20,20,0.1@0,0,0"),
-    "beer": Known("cylinder:0.055,0.23@0,0,0"),
-    "bookshelf": Known("box:0.92,0.405,1.2@0,-0.1925,0.6"),
-    "brick_box_3x1x3": Known("box:3,1,3"),
-    "cabinet": Known("box:0.47,0.49,1.02@0.01,0,0.51"),
-    "cafe_table": Known("box:0.913,0.913,0.775"),
-    "cardboard_box": Known("box:0.5,0.4,0.3", (1.259, 1.007, 0.756)),
-    "cinder_block": Known("box:0.435,0.203,0.203"),
-    "cinder_block_2": Known("box:0.194,0.397,0.143"),
-    "cinder_block_wide": Known("box:0.387,0.387,0.143"),
-    "construction_barrel": Known("cylinder:0.296,1.315"),
-    "construction_cone": Known("cylinder:0.251,1.089", (10.0, 10.0, 10.0)),
-    "cricket_ball": Known("sphere:0.0375"),
-    "drc_practice_2x4": Known("box:1.219,0.038,0.089@0,0,0"),
-    "drc_practice_2x6": Known("box:1.219,0.038,0.14@0,0,0"),
-    "drc_practice_4x4x20": Known("box:0.508,0.089,0.089@0,0,0"),
-    "drc_practice_4x4x40": Known("box:1.016,0.089,0.089@0,0,0"),
-    "jersey_barrier": Known("box:4.065,0.811,1.143"),
-    "table": Known("box:1.5,0.8,1.015"),
-    "wood_cube_10cm": Known("box:0.1,0.1,0.1"),
+# The text of the stand-in, in the frame of the model as of its mesh; and the scale that draws the mesh in that size.
+KNOWN_SIZES: dict[str, tuple[str, Vector]] = {
+    "asphalt_plane": ("box:20,20,0.1@0,0,0", ONE),
+    "beer": ("cylinder:0.055,0.23@0,0,0", ONE),
+    "bookshelf": ("box:0.92,0.405,1.2@0,-0.1925,0.6", ONE),
+    "brick_box_3x1x3": ("box:3,1,3", ONE),
+    "cabinet": ("box:0.47,0.49,1.02@0.01,0,0.51", ONE),
+    "cafe_table": ("box:0.913,0.913,0.775", ONE),
+    "cardboard_box": ("box:0.5,0.4,0.3", (1.259, 1.007, 0.756)),
+    "cinder_block": ("box:0.435,0.203,0.203", ONE),
+    "cinder_block_2": ("box:0.194,0.397,0.143", ONE),
+    "cinder_block_wide": ("box:0.387,0.387,0.143", ONE),
+    "construction_barrel": ("cylinder:0.296,1.315", ONE),
+    "construction_cone": ("cylinder:0.251,1.089", (10.0, 10.0, 10.0)),
+    "cricket_ball": ("sphere:0.0375", ONE),
+    "drc_practice_2x4": ("box:1.219,0.038,0.089@0,0,0", ONE),
+    "drc_practice_2x6": ("box:1.219,0.038,0.14@0,0,0", ONE),
+    "drc_practice_4x4x20": ("box:0.508,0.089,0.089@0,0,0", ONE),
+    "drc_practice_4x4x40": ("box:1.016,0.089,0.089@0,0,0", ONE),
+    "jersey_barrier": ("box:4.065,0.811,1.143", ONE),
+    "table": ("box:1.5,0.8,1.015", ONE),
+    "wood_cube_10cm": ("box:0.1,0.1,0.1", ONE),
 }
-
-
-def known_size(uri: str) -> Known | None:
-    """The size of the model that `uri` names, or of its mesh."""
-    return KNOWN_SIZES.get(model_named(uri))
