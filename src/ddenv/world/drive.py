@@ -68,18 +68,14 @@ class Drive:
         `skid` is the ratio of the robot's turn rate to the one its wheels command. Raises ValueError for an unknown wheel.
         """
         if isinstance(command, WheelSpeeds):
-            return self._by_name(command)
+            unknown = set(command.speeds) - set(self.joints)
+            if unknown:
+                raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
+            return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
         difference = command.turn_rate / skid * self.track / 2
         left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
         sides = zip(self.left, self.signs, strict=True)
         return np.array([sign * (left if is_left else right) for is_left, sign in sides])
-
-    def _by_name(self, command: WheelSpeeds) -> Floats:
-        unknown = set(command.speeds) - set(self.joints)
-        if unknown:
-            raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
-        speeds: Floats = np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs
-        return speeds
 
 
 def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:

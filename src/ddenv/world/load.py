@@ -134,7 +134,12 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
-        known = sorted([*_section(model, location[:-1]).model_fields, *_shorthands(location[:-1])])
+        known = sorted(
+            [
+                *_section(model, location[:-1]).model_fields,
+                *(each.name for each in SETTINGS.values() if not each.stored and [each.section] == location[:-1]),
+            ]
+        )
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if error["type"] == "as_printed":
         return f"{key}.as_printed", str(error["msg"])
@@ -159,10 +164,6 @@ def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
         # A section that may be missing is a union with None.
         model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))
     return model
-
-
-def _shorthands(location: list[str]) -> list[str]:
-    return [each.name for each in SETTINGS.values() if not each.stored and [each.section] == location]
 
 
 def _shown(value: Any) -> str:

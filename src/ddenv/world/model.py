@@ -5,6 +5,7 @@ Poses are absolute (in the world frame), lengths in m, masses in kg, angles in r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -128,12 +129,12 @@ class Joint:
     parent: str
     child: str
     pose: Pose
-    axis: Vector
-    lower: float
-    upper: float
-    effort: float
-    velocity: float
-    damping: float
+    axis: Vector = (0.0, 0.0, 1.0)
+    lower: float = -math.inf
+    upper: float = math.inf
+    effort: float = math.inf
+    velocity: float = math.inf
+    damping: float = 0.0
     axis2: Vector | None = None
 
 

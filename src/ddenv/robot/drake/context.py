@@ -89,15 +89,11 @@ class Presence:
             yield mine, _set([*self._free, *(other.geometry for other in (*bodies[number + 1 :], *others))])
             if robot:
                 yield mine, self._robot
-            yield mine, self._ground_of(body)
+            # A model does not touch its own links that never move: a door its frame.
+            not_its_own = (geometry for name, geometry in self._kept.items() if name != body.name)
+            yield mine, _set(not_its_own) if self._built.static.get(body.name) else self._ground
             for one, other in body.own_pairs:
                 yield GeometrySet(list(one)), GeometrySet(list(other))
-
-    def _ground_of(self, body: Body) -> GeometrySet:
-        """What is kept and never moves, without the model's own links: a door does not touch its frame."""
-        if not self._built.static.get(body.name):
-            return self._ground
-        return _set(geometry for name, geometry in self._kept.items() if name != body.name)
 
 
 def _set(groups: Iterable[tuple[GeometryId, ...]]) -> GeometrySet:
@@ -269,25 +265,11 @@ class RunContext:
         """Everything where it starts. `robot` takes the robot's own frame to the world frame."""
         context = built.diagram.CreateDefaultContext()
         plant_context = built.plant.GetMyMutableContextFromRoot(context)
-        _place(built, plant_context, robot)
+        # The plant's default context has all models at the world's origin.
+        for body, origin in [(built.robot, robot), *((body, Pose()) for body in built.moving.values())]:
+            for link, pose in zip(body.links, body.poses, strict=True):
+                if link.is_floating_base_body():
+                    built.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, link, transform(origin @ pose))
         start = cast(Floats, built.plant.GetPositionsAndVelocities(plant_context))
-        presence = Presence(built, context)
-        return cls(
-            built,
-            context,
-            plant_context,
-            presence,
-            Hold(built, plant_context, start),
-            Twins(built, context),
-            clock,
-            floor,
-            region,
-        )
-
-
-def _place(built: Built, plant_context: Context, robot: Pose) -> None:
-    """Puts all models where they start; the plant's default context has them at the world's origin."""
-    for body, origin in [(built.robot, robot), *((body, Pose()) for body in built.moving.values())]:
-        for link, pose in zip(body.links, body.poses, strict=True):
-            if link.is_floating_base_body():
-                built.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, link, transform(origin @ pose))
+        presence, hold = Presence(built, context), Hold(built, plant_context, start)
+        return cls(built, context, plant_context, presence, hold, Twins(built, context), clock, floor, region)

@@ -155,7 +155,9 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     # The order in which moving models are added is the order of the solver's unknowns, which decides the last bits of every
     # result. It is always the file's order, with the robot first.
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
-    _add_motors(plant, robot, drive, driver, motor_gain)
+    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
+        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
+        actuator.set_controller_gains(PdControllerGains(p=0.0, d=motor_gain))
     moving = {
         model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
         for model in world.models
@@ -249,22 +251,11 @@ def _add_moving(
 def _inertia(model: Model, link: Link) -> SpatialInertia:
     if link.inertia is not None:
         return spatial_inertia(link.inertia, link.pose)
-    if not _weighs(model, link):
+    together = held_with(model, link.name)
+    if not any(one.inertia is not None for one in model.links if one.name in together):
         why = "has no <inertial>, nor has any that is fixed to it"
         raise ValueError(f"link '{link.name}' of the moving model '{model.name}' {why}")
     return SpatialInertia.Zero()
-
-
-def _weighs(model: Model, link: Link) -> bool:
-    """Whether `link`, or anything that fixed joints attach to it, has a mass."""
-    together = held_with(model, link.name)
-    return any(each.inertia is not None for each in model.links if each.name in together)
-
-
-def _add_motors(plant: MultibodyPlant, robot: Model, drive: Drive, body: Body, gain: float) -> None:
-    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
-        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, body.instance), joint.effort)
-        actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))
 
 
 def _register(

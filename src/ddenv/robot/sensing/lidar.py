@@ -57,7 +57,8 @@ class Lidar:
         there = np.array([name in present for name in obstacles.names], dtype=bool)
         self._obstacles = obstacles
         (self._rows,) = there[obstacles.owners].nonzero()
-        self._first = dict(zip((model.name for model in moving), _firsts(moving), strict=True))
+        firsts = accumulate((len(model.links) for model in moving), initial=0)
+        self._first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
         self._gathered: Vector = (math.inf, math.inf, math.inf)
         # The shapes that beams may hit from near the pose at which they were collected.
         self._near: Near | None = None
@@ -193,11 +194,6 @@ class Lidar:
             if self._unseen[owner] and ranges is not None and math.isfinite(ranges[beam % count]):
                 self._unseen[owner] = False
                 self._first_seen[self._names[owner]] = turn.time
-
-
-def _firsts(models: Sequence[Model]) -> list[int]:
-    """The index of each model's first link among the links of all `models`."""
-    return [0, *accumulate(len(model.links) for model in models)][:-1]
 
 
 @dataclass(slots=True, eq=False)

@@ -91,7 +91,7 @@ class Reached:
         apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
         near = apart <= margin
         self._place = pose
-        self._free = float(apart[~self._belong(self._owners[near])].min(initial=math.inf))
+        self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
         self._find(near)
 
     def _look_around_models(self) -> None:
@@ -113,11 +113,6 @@ class Reached:
             near = np.zeros(len(self._owners), dtype=bool)
             near[self._around[met]] = True
             self._find(near)
-
-    def _belong(self, models: Integers) -> Booleans:
-        """Which shapes belong to `models` (K,)."""
-        belong: Booleans = np.isin(self._owners, models)
-        return belong
 
     def _find(self, near: Booleans) -> None:
         """Notes the models of the shapes `near`, and looks at their shapes no more."""

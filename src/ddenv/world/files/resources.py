@@ -103,7 +103,13 @@ class Stored:
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         key = _key("sdf", uri, str(base))
-        return self._sdfs.get(key, lambda: _unpack_sdf(self._bytes(key)))
+        return self._sdfs.get(key, lambda: self._unpacked(key))
+
+    def _unpacked(self, key: str) -> tuple[Path, bytes]:
+        path, end, text = self._bytes(key).partition(b"\0")
+        if not end or not path:
+            raise Unusable("its stored file is damaged")
+        return Path(path.decode("utf-8", "surrogateescape")), text
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
         key = _key("mesh", uri, str(base), submesh, center, convex)
@@ -138,13 +144,6 @@ class _Answers(Generic[Answer]):
 def _key(*request: str | bool) -> str:
     """The name under which a run file stores the answer to a request."""
     return json.dumps(request)
-
-
-def _unpack_sdf(packed: bytes) -> tuple[Path, bytes]:
-    path, end, text = packed.partition(b"\0")
-    if not end or not path:
-        raise Unusable("its stored file is damaged")
-    return Path(path.decode("utf-8", "surrogateescape")), text
 
 
 # In place of a folder: messages name it.

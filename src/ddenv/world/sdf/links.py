@@ -68,6 +68,8 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
     note_unread(element, context)
     items = [_item(child, scope, site, context) for child in element if child.tag in ("collision", "visual")]
     collisions, density = [], []
+    inertial = element.find("inertial")
+    usual = WATER if inertial is None else read_density(inertial, WATER)
     for item in items:
         if item.element.tag == "collision":
             placed = _settled(item, items, element, context)
@@ -75,7 +77,7 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
                 pose = site.pose @ item.pose @ placed.offset
                 mu = read_friction(item.element, context)
                 collisions.append(Collision(name_of(item.element), placed.shape, pose, mu))
-                density.append(read_density(item.element, _density(element)))
+                density.append(read_density(item.element, usual))
     inertia = read_inertia(element, site.pose, collisions, density, context) if site.moving else None
     kinematic = element.find("kinematic")
     if kinematic is not None and site.moving and truth(element, "kinematic", False):
@@ -95,17 +97,10 @@ class _Item:
 def _item(child: Element, scope: Scope, site: Site, context: Context) -> _Item:
     note_unread(child, context)
     name_of(child)
-    pose = child.find("pose")
+    pose, local = child.find("pose"), scope.place(child)
     if pose is not None and (pose.get("relative_to") or pose.get("frame")):
-        local = site.local.inverse() @ scope.place(child)
-    else:
-        local = scope.place(child)
+        local = site.local.inverse() @ local
     return _Item(child, local, read_shape(child, context, site.scale))
-
-
-def _density(link: Element) -> float:
-    inertial = link.find("inertial")
-    return WATER if inertial is None else read_density(inertial, WATER)
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -177,7 +172,10 @@ def can_be_touched(collision: Element, context: Context) -> bool:
         return True
     mask = contact.find("collide_bitmask")
     if mask is not None and text_of(mask):
-        bits = _integer(mask) & EVERYTHING
+        try:
+            bits = int(text_of(mask), 0) & EVERYTHING
+        except ValueError:
+            raise complain(mask, f"expected a whole number, found '{text_of(mask)[:60]}'") from None
         if bits == 0:
             context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
             return False
@@ -187,14 +185,6 @@ def can_be_touched(collision: Element, context: Context) -> bool:
         context.note("ignored", collision, "it collides without contact")
         return False
     return True
-
-
-def _integer(element: Element) -> int:
-    text = text_of(element)
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise complain(element, f"expected a whole number, found '{text[:60]}'") from None
 
 
 def read_friction(collision: Element, context: Context) -> float:
@@ -220,7 +210,8 @@ def read_friction(collision: Element, context: Context) -> float:
 def read_color(visual: Element) -> Color | None:
     """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there is none."""
     opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
-    color = _written(visual) or _named(text_of(visual.find("material/script/name")))
+    name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
+    color = _written(visual) or ((*GAZEBO_COLORS[name], 1.0) if name in GAZEBO_COLORS else None)
     if color is None:
         return None
     # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
@@ -236,8 +227,3 @@ def _written(visual: Element) -> Color | None:
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
             return red, green, blue, alpha[0] if alpha else 1.0
     return None
-
-
-def _named(material: str) -> Color | None:
-    color = GAZEBO_COLORS.get(material.removeprefix("Gazebo/"))
-    return None if color is None else (*color, 1.0)
