@@ -134,12 +134,8 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
-        known = sorted(
-            [
-                *_section(model, location[:-1]).model_fields,
-                *(each.name for each in SETTINGS.values() if not each.stored and [each.section] == location[:-1]),
-            ]
-        )
+        shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
+        known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if error["type"] == "as_printed":
         return f"{key}.as_printed", str(error["msg"])

@@ -109,6 +109,12 @@ def headings(quaternions: np.ndarray) -> np.ndarray:
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
+def angle_between(one: Sequence[float], other: Sequence[float]) -> float:
+    """The angle of the rotation between two unit quaternions, rad; q and -q are the same rotation."""
+    likeness = abs(sum([a * b for a, b in zip(one, other, strict=True)]))
+    return 2.0 * math.acos(min(1.0, likeness))
+
+
 def wrap(angle: float) -> float:
     """`angle` (rad), wrapped into [-pi, pi]."""
     return math.remainder(angle, math.tau)

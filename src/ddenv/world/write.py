@@ -160,7 +160,7 @@ def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, file
 def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
     geometry = SubElement(parent, "geometry")
     if not isinstance(shape, Mesh):
-        kind, sizes = _primitive(shape)
+        kind, sizes = primitive(shape)
         element = SubElement(geometry, kind)
         for name, values in sizes.items():
             SubElement(element, name).text = _numbers(values)
@@ -171,7 +171,7 @@ def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
         SubElement(element, f"{{{DRAKE}}}declare_convex")
 
 
-def _primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
+def primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
     """The tag of a shape other than a mesh, with its sizes by tag."""
     match shape:
         case Box(size):

@@ -234,18 +234,15 @@ class Navigator:
         return twist
 
     def _look(self, reading: Reading) -> None:
+        """Takes in a scan that is due, collects the points near the robot, and checks whether the path is blocked."""
         self._imu = reading.imu or self._imu
         every = LOOK_WAITING if self._waits else LOOK_EVERY
         if reading.scan is None or reading.time < self._looked + every - TICK:
             return
         self._looked = reading.time
         self._map.see(reading.scan, reading.estimate, self._imu)
-        self._see(reading.estimate)
-
-    def _see(self, estimate: Estimate) -> None:
-        """Collects the points near the robot, and checks whether the path is blocked."""
         spots, reach = self._map.spots, self._follower.reach
-        near = (np.abs(spots[0] - estimate.x) < reach) & (np.abs(spots[1] - estimate.y) < reach)
+        near = (np.abs(spots[0] - reading.estimate.x) < reach) & (np.abs(spots[1] - reading.estimate.y) < reach)
         self._near = spots[:, near]
         self._blocked = self._path is not None and self._planner.room(self._path, self._map.points) is None
 
@@ -266,7 +263,8 @@ class Navigator:
         twist = self._follower.step(self._path, estimate, self._near)
         if self._progress.is_stalled(time, estimate):
             return self._try_to_recover(reading)
-        self._note_progress(estimate)
+        if self._recovered and math.dist((estimate.x, estimate.y), self._recovered) >= BETTER:
+            self._recovery.made, self._recovered = 0, None
         return twist
 
     def _think(self, time: float, estimate: Estimate) -> None:
@@ -274,7 +272,10 @@ class Navigator:
         since = time - self._planned + TICK
         is_due = since >= self._replan and self._map.version != self._planned_on
         if self._path is None or self._is_spoilt(self._path):
-            if since >= THINK_EVERY and (is_due or not self._is_no_use(estimate)):
+            here = math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
+            # A new plan would not help: the last one was made here, and the robot cannot follow it.
+            no_use = self._follower.stuck and not self._blocked and here
+            if since >= THINK_EVERY and (is_due or not no_use):
                 self._plan(time, estimate)
             return
         if not is_due:
@@ -282,12 +283,6 @@ class Navigator:
         self._planned, self._planned_on = time, self._map.version
         if not self._planner.is_best(self._path, self._map.points):
             self._plan(time, estimate)
-
-    def _is_no_use(self, estimate: Estimate) -> bool:
-        """Whether a new plan would not help: the last one was made here, and the robot cannot follow it."""
-        if not self._follower.stuck or self._blocked:
-            return False
-        return math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
 
     def _is_spoilt(self, path: Path) -> bool:
         """Whether the path is blocked, the robot cannot follow it or has left it, or it soon ends at the map's border."""
@@ -312,12 +307,6 @@ class Navigator:
             return False
         room, others = self._planner.room(path, points), self._planner.room(other, points)
         return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
-
-    def _note_progress(self, estimate: Estimate) -> None:
-        was = self._recovered
-        if was and math.hypot(estimate.x - was[0], estimate.y - was[1]) >= BETTER:
-            self._recovery.made = 0
-            self._recovered = None
 
     def _try_to_recover(self, reading: Reading) -> Twist:
         self._attempt = self._recovery.next(reading.time, reading.estimate)

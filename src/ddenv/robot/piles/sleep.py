@@ -9,7 +9,6 @@ that goes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,23 +25,6 @@ TOUCH = 0.02  # m; models this near to each other may touch
 CLOSE = 0.01
 FAST = 0.1  # m/s, the mean speed of what wakes all that it reaches
 PASSED = 0.02  # m; a robot that has moved less since a model fell asleep beside it does not wake it
-
-
-@dataclass(frozen=True)
-class Situation:
-    """What the rules look at: for each of M models (M,), or for each pair of them (M, M).
-
-    `close` to a robot that moves; `met` by something that moves, so that both must be simulated together; `stirred` by something
-    near that is not slow; `touching`, near enough to carry each other; `reached`: perhaps touched, before the tick after next, by
-    something that is simulated; `together`, moved by the same script.
-    """
-
-    close: Booleans
-    met: Booleans
-    stirred: Booleans
-    touching: Booleans
-    reached: Booleans
-    together: Booleans
 
 
 class Sleep:
@@ -117,7 +99,9 @@ class Sleep:
             seconds = (step - self._now) * self._step
             self._play()
             self._look(np.flatnonzero(self._awake), seconds)
-            self._drop()
+            # What has fallen out of the world is not worth simulating.
+            self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
+            self._lay(self._awake & self._gone)
             self._decide(seconds)
         # Also when no moving model is kept: removed ones are held, too.
         self._hold.apply()
@@ -218,33 +202,41 @@ class Sleep:
         if seconds:
             self._pace[links] = self._links.pace(links, before, now, seconds)
 
-    def _drop(self) -> None:
-        """Holds what has fallen out of the world: it is not worth simulating."""
-        self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
-        self._lay(self._awake & self._gone)
-
     def _decide(self, seconds: float) -> None:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
         slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
         speed = np.maximum.reduceat(self._motion.speed, self._links.first)
         near, close = self._near(speed)
-        moves = self._awake | (self._played >= 0) | self._due
-        if not (near | close | moves).any():
+        played = self._played >= 0
+        moving = self._awake | played
+        if not (near | close | moving | self._due).any():
             return
-        now = self._situation(speed, slow, close)
-        self._took_part |= near | now.reached
+        apart = gaps(self._links, self._motion, self._links, self._motion)
+        apart[self._gone] = apart[:, self._gone] = np.inf
+        np.fill_diagonal(apart, np.inf)
+        # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of them is not slow.
+        together = played[:, None] & (self._played[:, None] == self._played)
+        touching: Booleans = apart < TOUCH
+        lively: Booleans = moving & ~slow
+        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
+        meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
+        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
+        met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
+        # Something that is simulated may touch it before the tick after next.
+        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
+        self._took_part |= near | beside.any(axis=1)
         self._stillness.look(self._motion, seconds)
-        within = self._settled & (near | now.touching[:, self._awake].any(axis=1))
+        within = self._settled & (near | touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
-        start: Booleans = ~self._awake & (now.close | now.met | self._due | (pressed & self._settled))
+        start: Booleans = ~self._awake & (close | met | self._due | (pressed & self._settled))
         if start.any():
             self._loads.woke(start, pressed)
             # What has no twin cannot stay asleep beside what wakes.
-            joined = now.together | (now.touching & ~self._has_twin[:, None])
+            joined = together | (touching & ~self._has_twin[:, None])
             self._wake(spread(start, joined) & ~self._awake & ~self._gone)
         rests = self._stillness.at_rest
-        restless = self._awake & (~rests | (~self._has_twin & (now.close | now.stirred)))
-        joined = now.touching & self._awake[:, None] & self._awake
+        restless = self._awake & (~rests | (~self._has_twin & (close | stirring.any(axis=1))))
+        joined = touching & self._awake[:, None] & self._awake
         self._lay(self._awake & np.where(self._has_twin, rests, ~spread(restless, joined)))
         if within.any() or start.any():
             self._loads.note(self._settled, self._awake)
@@ -268,24 +260,6 @@ class Sleep:
         self._robot_was[close | self._awake] = place
         near: Booleans = (apart < TOUCH + margin) & ~self._gone
         return near, close
-
-    def _situation(self, speed: Floats, slow: Booleans, close: Booleans) -> Situation:
-        apart = gaps(self._links, self._motion, self._links, self._motion)
-        apart[self._gone] = apart[:, self._gone] = np.inf
-        np.fill_diagonal(apart, np.inf)
-        played = self._played >= 0
-        moving = self._awake | played
-        lively: Booleans = moving & ~slow
-        together = played[:, None] & (self._played[:, None] == self._played)
-        touching: Booleans = apart < TOUCH
-        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
-        meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
-        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
-        met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
-        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
-        return Situation(
-            close, met, np.asarray(stirring.any(axis=1)), touching, np.asarray(beside.any(axis=1)), together
-        )
 
     def _struck(self, apart: Floats) -> Booleans:
         """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""

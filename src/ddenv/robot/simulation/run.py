@@ -26,7 +26,7 @@ from ddenv.robot.simulation.autonomy import Autonomy
 from ddenv.robot.simulation.notice import Notice
 from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, angle_between
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.
@@ -271,7 +271,8 @@ class Stuck:
 
     def update(self, now: float, pose: PoseRow) -> bool:
         """Whether the robot is stuck at `now` (s). Call it for each recorded pose, in order of time."""
-        if self._place is None or _has_left(self._place, pose):
+        place = self._place
+        if place is None or math.dist(place[:3], pose[:3]) > RADIUS or angle_between(place[3:], pose[3:]) > ANGLE:
             self._since, self._place = now, pose
         # Times are sums of steps: 8 s may come out 1e-15 s short.
         return now - self._since >= self._seconds - 1e-6
@@ -280,11 +281,3 @@ class Stuck:
 def seconds_for(controller: Controller) -> float:
     """How long a robot with this controller must not move to be stuck for good, s."""
     return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS
-
-
-def _has_left(place: PoseRow, pose: PoseRow) -> bool:
-    if math.dist(place[:3], pose[:3]) > RADIUS:
-        return True
-    # The quaternions q and -q are the same rotation.
-    likeness = abs(sum(a * b for a, b in zip(place[3:], pose[3:], strict=True)))
-    return 2 * math.acos(min(1.0, likeness)) > ANGLE

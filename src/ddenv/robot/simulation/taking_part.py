@@ -18,7 +18,7 @@ from ddenv.robot.result import PoseRow
 from ddenv.robot.simulation.robot_hull import Hull
 from ddenv.world.extent import shape_bounds, stacked
 from ddenv.world.model import World, still_links
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, angle_between
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
 SLACK = 0.05
@@ -126,5 +126,4 @@ class Reached:
 
 def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
     """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
-    likeness = abs(sum([a * b for a, b in zip(one[3:], other[3:], strict=True)]))
-    return math.dist(one[:3], other[:3]) + 2.0 * math.acos(min(1.0, likeness)) * reach
+    return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach

@@ -50,7 +50,9 @@ class Template:
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
-        self._solid = _with_ground(world, scenario)
+        spawn, goal = scenario.robot.spawn, scenario.goal
+        # Boxes in place of planes, large enough for all models, the spawn and the goal.
+        self._solid = with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
         self._robot = robot
         self._scenario = scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
@@ -72,7 +74,8 @@ class Template:
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
         self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
-        self._surround(_region(world, scenario))
+        moving = [model for model in world.models if not model.static]
+        self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
 
     def without(self, names: frozenset[str]) -> Template:
@@ -107,9 +110,8 @@ class Template:
     def shapes_without(self, names: frozenset[str]) -> int:
         """The number of collision shapes in the plant, without those of the models `names`."""
         built = self._context.built
-        kept = [shapes for name, shapes in built.static.items() if name not in names]
-        kept += [body.geometry for name, body in built.moving.items() if name not in names]
-        return len(built.robot.geometry) + sum(map(len, kept))
+        shapes = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in shapes if name not in names)
 
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
@@ -119,7 +121,8 @@ class Template:
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self._names = names
-        built = _build(_part(self._solid, names - self._far), self._robot, self._drive, self._scenario)
+        near = tuple(model for model in self._solid.models if model.name in names - self._far)
+        built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
         boxes = [box for box in self._boxes if box[0] in names]
         self._surroundings = Surroundings.of(boxes, self._reach, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
@@ -151,7 +154,9 @@ class Template:
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
-                notice=self._notice(sleep, kept, present),
+                notice=Notice(
+                    self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
+                ),
                 autonomy=self._autonomy(suite, seed, listener),
                 lidar=self._lidar(present, kept, suite),
                 watch=Watch(self._region, self._reach) if self._far else None,
@@ -197,25 +202,16 @@ class Template:
         self._context.diagram_context.SetTime(0.0)
         sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
         try:
-            yield sleep, unusual | self._carriers(present)
+            # With what those models are tied to that are always kept.
+            ties = self._repertoire.ties if self._repertoire.learnt else {}
+            yield sleep, unusual.union(*(ties[always] & present for always in self._always & set(ties)))
         finally:
             sleep.end()
-
-    def _carriers(self, present: frozenset[str]) -> frozenset[str]:
-        """What those models are tied to that are always kept, among the models `present`."""
-        if not self._repertoire.learnt:
-            return frozenset()
-        ties = self._repertoire.ties
-        return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
         if not (self._slices and self._sleeping and self._repertoire.learnt):
             return None
         return Reached(self._solids, self._hull, sleep, present, self._clock.period)
-
-    def _notice(self, sleep: Sleep, kept: Sequence[Body], present: frozenset[str]) -> Notice:
-        plant_context = self._context.plant_context
-        return Notice(self._surroundings, self._scenario.sensors, plant_context, sleep, kept, present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
@@ -231,23 +227,6 @@ class Template:
         if settings is None or self._obstacles is None:
             return None
         return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
-
-
-def _with_ground(world: World, scenario: Scenario) -> World:
-    """`world` with boxes in place of its planes, large enough for all models, the spawn and the goal."""
-    spawn, goal = scenario.robot.spawn, scenario.goal
-    return with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
-
-
-def _region(world: World, scenario: Scenario) -> Region:
-    spawn, goal = scenario.robot.spawn, scenario.goal
-    moving = (model for model in world.models if not model.static)
-    return Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving)
-
-
-def _part(world: World, names: frozenset[str]) -> World:
-    """`world` with the models `names` alone."""
-    return replace(world, models=tuple(model for model in world.models if model.name in names))
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
@@ -338,22 +317,13 @@ class Variants:
         able = [one for one in (self._whole, *self._smaller) if keep <= one.names]
         template = min(able, key=lambda one: len(one.removable), default=self._whole)
         needless = template.removable & removed
-        if self._pays(needless, template):
-            self._forget()
+        shapes = template.shapes_without(needless)
+        if shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps:
+            if len(self._smaller) == MOST:
+                del self._smaller[0]
+                # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
+                gc.collect()
             template = template.without(needless)
         if template is not self._whole:
             self._smaller = [*(one for one in self._smaller if one is not template), template]
         return template
-
-    def _pays(self, needless: frozenset[str], template: Template) -> bool:
-        """Whether building a plant without the models `needless` takes less time than one run with them."""
-        shapes = template.shapes_without(needless)
-        return shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps
-
-    def _forget(self) -> None:
-        """Makes room for one more smaller template."""
-        if len(self._smaller) < MOST:
-            return
-        del self._smaller[0]
-        # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
-        gc.collect()
