@@ -19,7 +19,7 @@ import numpy as np
 
 from ddenv.errors import UserError
 from ddenv.world.access import write_file
-from ddenv.world.ground import with_ground_boxes
+from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import (
     Box,
     Capsule,

@@ -29,8 +29,7 @@ from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
 from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.simulation.taking_part import Reached, Solids
 from ddenv.world.drive import Drive, find_drive
-from ddenv.world.extent import shape_bounds
-from ddenv.world.ground import with_ground_boxes
+from ddenv.world.extent import shape_bounds, with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
