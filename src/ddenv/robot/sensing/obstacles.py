@@ -6,7 +6,9 @@ and ellipsoids the same ball.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +19,11 @@ from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
+# Where each kind begins in a sorted array of kinds, and where the last one ends.
+BOUNDS = np.arange(len(KINDS) + 1)
+# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
+# larger than rounding errors.
+SPARE = 1e-6
 # A plane is the top of a cube of this size, m: what lies below it is inside.
 PLANE = 2e4
 # The minimum half thickness of a shape, m.
@@ -24,47 +31,79 @@ THINNEST = 1e-9
 
 
 @dataclass(frozen=True)
+class Shapes:
+    """N shapes, sorted by kind, at some instant.
+
+    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
+    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
+    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
+    in units of their radius, `facets` the faces of meshes by the number of the shape.
+    """
+
+    kinds: Integers
+    centers: Floats
+    frames: Floats
+    squares: Floats
+    reaches: Floats
+    lengths: Floats
+    facets: Mapping[int, Facets]
+
+    @cached_property
+    def firsts(self) -> list[int]:
+        """Where each kind begins, and where the last one ends."""
+        firsts: list[int] = self.kinds.searchsorted(BOUNDS).tolist()
+        return firsts
+
+    def take(self, rows: Integers) -> Shapes:
+        """The shapes `rows` (K,) alone, in this order."""
+        return Shapes(
+            kinds=self.kinds[rows],
+            centers=self.centers.take(rows, axis=1),
+            frames=self.frames.take(rows, axis=2),
+            squares=self.squares.take(rows, axis=1),
+            reaches=self.reaches[rows],
+            lengths=self.lengths[rows],
+            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
+        )
+
+
+@dataclass(frozen=True)
 class Obstacles:
     """All N collision shapes of a world, sorted by kind.
 
     `names` are the world's models, `owners` (N,) the index of each shape's model in `names`. `links` (N,) is the index of the
-    shape's link in its model, -1 for a shape that never moves. `centers` (3, N) m and `turns` (3, 3, N) are the poses of the
-    shapes' frames: in the link's frame, or in the world frame for a shape that never moves. `halves` (3, N) m are half the
-    sizes. `lengths` (N,) are half lengths in units of the radius, for capsules. `facets` are the faces of meshes by
-    the number of the shape.
+    shape's link in its model, -1 for a shape that never moves. `shapes` on moving links are still in their link's frame.
     """
 
     names: tuple[str, ...]
     owners: Integers
     links: Integers
-    kinds: Integers
-    centers: Floats
-    turns: Floats
-    halves: Floats
-    lengths: Floats
-    facets: dict[int, Facets]
+    shapes: Shapes
 
     @classmethod
     def of(cls, world: World) -> Obstacles:
         found = [(owner, *one) for owner, model in enumerate(world.models) for one in _shapes(model)]
         found.sort(key=lambda one: _kind(one[2]))
         owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
-        halves = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
-        return cls(
-            names=tuple(model.name for model in world.models),
-            owners=np.array(owners, dtype=int),
-            links=np.array(links, dtype=int),
+        sizes = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
+        halves = sizes.T.copy()
+        squares = halves * halves
+        turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
+        arrays = Shapes(
             kinds=np.array([_kind(shape) for shape in shapes], dtype=int),
             centers=np.array([pose.position for pose in poses]).reshape(-1, 3).T.copy(),
-            turns=np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0).copy(),
-            halves=halves.T.copy(),
-            lengths=halves[:, 2] / halves[:, 0],
+            frames=turns / halves,
+            squares=squares,
+            reaches=np.sqrt(squares.sum(axis=0)) + SPARE,
+            lengths=sizes[:, 2] / sizes[:, 0],
             facets={
-                number: Facets.of(shape, np.array(_extent(shape)[0]), halves[number])
+                number: Facets.of(shape, np.array(_extent(shape)[0]), sizes[number])
                 for number, shape in enumerate(shapes)
                 if isinstance(shape, Mesh)
             },
         )
+        names = tuple(model.name for model in world.models)
+        return cls(names, np.array(owners, dtype=int), np.array(links, dtype=int), arrays)
 
 
 def _shapes(model: Model) -> list[tuple[int, Shape, Pose]]:
