@@ -230,12 +230,10 @@ class Planner:
         places[0] = start
         corners = self._cut_short(places, near[route], points)
         # A place at the map's border only leads to a goal beyond it, however near it is to the goal.
-        final = left <= self._tolerance and self._is_on_map(corner)
-        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
-
-    def _is_on_map(self, corner: Floats) -> bool:
         ahead = np.array(self._goal) - corner
-        return bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
+        on_map = bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
+        final = left <= self._tolerance and on_map
+        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
 
     def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""
