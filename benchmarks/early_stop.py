@@ -20,7 +20,7 @@ from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import Test
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 

@@ -19,7 +19,7 @@ from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.drake.template import Template
 from ddenv.robot.result import RunResult
 from ddenv.runfile.failures import alike
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
 from ddenv.world.read import parse_world

@@ -18,7 +18,7 @@ from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.scenario import Scenario
 
 Keep = frozenset[str]

@@ -31,7 +31,7 @@ from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World
 from ddenv.world.read import read_model

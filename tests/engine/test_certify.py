@@ -18,7 +18,7 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import FIRST_FRESH_RUN, Journal
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
 from tests.engine.killing import Killed, kill_after, models_in, story
 from tests.engine.oracles import needs

@@ -10,7 +10,7 @@ from ddenv.engine.limits import memory_limit
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
 from tests.engine.killing import models_in

@@ -23,7 +23,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import LOGS, NoRoom, RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from ddenv.words import news
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story

@@ -11,7 +11,8 @@ import pytest
 from ddenv.engine import shared
 from ddenv.engine.shared import SharingPool
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
+from ddenv.evidence.slices import Ties
 from ddenv.robot import reached
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.environment import Environment
-from ddenv.evidence.slices import Ties
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of

@@ -16,6 +16,7 @@ from ddenv import __version__
 from ddenv.doctor.run_health import run_health
 from ddenv.errors import UserError
 from ddenv.guiding.pace import Pause, Resume, Stop
+from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run import poll as polling
 from ddenv.workbench.run.observed import Busy, Observed
@@ -140,7 +141,7 @@ def test_a_run_that_comes_to_life_is_followed(run, runs):
     assert look(watching).status == "lost"
     engine = fake_run.RunFile(run.path)
     engine.own()
-    engine.append("engine_started", {"pid": 1, "jobs": 2, "version": "0", "simulator": "none"})
+    engine.append(EngineStarted(1, 2, "0", "none"))
     with run.engine():
         assert look(watching).status in ("running", "baseline")
     engine.close()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count, first_of, percent
+from ddenv.errors import printable
 from ddenv.evidence.claims import (
     current,
     drift,
@@ -21,13 +22,12 @@ from ddenv.evidence.claims import (
     smaller_known,
     verdict_on,
 )
-from ddenv.errors import printable
 from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.took_part import simulated
 from ddenv.runfile.progress import Claim, Node
 from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.evidence.took_part import simulated
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12

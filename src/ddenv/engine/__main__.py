@@ -38,8 +38,8 @@ from ddenv.runfile.events import (
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs.clusters import HERE, check_cluster, made_here
-from ddenv.runs.creation import read_parts
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
+from ddenv.runs.subject import read_parts
 from ddenv.runs.trust import check_trusted
 from ddenv.version import __version__
 from ddenv.world.model import Model, World

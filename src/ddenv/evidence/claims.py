@@ -10,8 +10,7 @@ from ddenv.amounts import between, count, first_of, percent
 from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.evidence.rates import miss_chance, wilson_interval
 from ddenv.runfile.fold_decisions import failures_at, origin
-from ddenv.runfile.progress import Certificate, Claim, Node
-from ddenv.runfile.progress import Isolation, Returned
+from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import BROKEN, RunState, Trial
 from ddenv.runfile.supports import stack_with

@@ -12,17 +12,17 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from ddenv.evidence import claims
 from ddenv.amounts import first_of, percent
 from ddenv.errors import UserError
-from ddenv.learn.recorded_oracle import Oracle
+from ddenv.evidence import claims
 from ddenv.evidence.rates import miss_chance, wilson_interval
+from ddenv.evidence.took_part import slice_words
+from ddenv.learn.recorded_oracle import Oracle
 from ddenv.runfile.events import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import CERTIFY, RunState
 from ddenv.schemas import nearest
-from ddenv.evidence.took_part import slice_words
 
 # Terms that contain a digit.
 TERMS = ("1-minimal", "Algorithm 1", "(1 − rate)")

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ddenv.errors import UserError
-from ddenv.runfile.position import Position
 from ddenv.runfile.events import CandidateJudged, Implied, TestFinished, TestStarted
+from ddenv.runfile.position import Position
 from ddenv.runfile.store import Recorded
 
 ALONE = ("start", "baseline", "end")

@@ -70,7 +70,7 @@ class Memory:
 class Moment:
     """Where a search stands: it began with `leg`, its rounds so far had these `winners`, and `environment` is left.
 
-    `begin(leg, guide)` starts the algorithm; `guide` is the search's own, `memory` what that was asked. `shown` says what is known of
+    `begin(leg, guide)` starts the algorithm; `guide` is the search's own, `memory` what that was asked. `shown` knows of
     the runs so far; f shows in a share `rate` of the runs with all that it needs. `workers` make tests at the same time.
     """
 

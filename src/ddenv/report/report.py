@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ddenv.evidence.claims import ended
 from ddenv.errors import UserError
+from ddenv.evidence.claims import ended
 from ddenv.page.blocks import (
     Paragraph,
     Report,
@@ -34,9 +34,9 @@ from ddenv.report.why import why
 from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
+from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
-from ddenv.runfile.fold import spent
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file

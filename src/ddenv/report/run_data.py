@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddenv.evidence.claims import current
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.runfile.events import Created, RoundStarted
 from ddenv.runfile.fold import apply
 from ddenv.runfile.lock import engine_is_alive
@@ -107,7 +107,7 @@ def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...],
 
 
 def _world(file: RunFile, troubles: list[str]) -> World | None:
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     try:
         return read_parts(file)[1]

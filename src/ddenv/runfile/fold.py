@@ -175,6 +175,9 @@ def _environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> 
 
 def _round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
     whole = state.environments[event.environment]
+    # The bits of a model that is not there could fill the memory.
+    if max((model for part in event.partitions for model in part), default=0) >= len(state.elements):
+        raise ValueError("partitions")
     parts = tuple(map(Environment.of, event.partitions))
     _check(event, whole, parts)
     if state.round is not None and event.round <= state.round.number:

@@ -220,4 +220,7 @@ def _models(value: Any) -> Environment:
 
 
 def _wrong(expected: str, value: Any) -> Invalid:
-    return Invalid(f"expected {expected}, found {repr(value)[:40]!a}")
+    found = (
+        f"a list of {len(value)}" if type(value) is list else "an object" if type(value) is dict else ascii(value)[:40]
+    )
+    return Invalid(f"expected {expected}, found {found}")

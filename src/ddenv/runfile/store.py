@@ -274,7 +274,7 @@ class RunFile:
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
             return [Live(int(slot), int(test), number(at), *_poses(json.loads(text))) for slot, test, at, text in rows]
-        except (ValueError, TypeError, OverflowError, RecursionError, KeyError):
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, KeyError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
     # The methods below are for the engine alone.

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ddenv.evidence.claims import current, is_minimal
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, is_minimal
 from ddenv.runfile.events import (
     BaselineFinished,
     CandidateJudged,

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, plain, say
 from ddenv.evidence.rates import wilson_interval
+from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, plain, say
 from ddenv.study.figures import chart, worlds
 from ddenv.study.plan import Method, file_name
 from ddenv.study.results import Found

@@ -15,11 +15,11 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
 from ddenv.evidence.claims import of_runs, seen
+from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.progress import Decision, Node
-from ddenv.evidence.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from ddenv.evidence.took_part import in_last
 from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
-from ddenv.evidence.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks

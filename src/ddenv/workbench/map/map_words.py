@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv.evidence.took_part import in_last
 from ddenv.map.names import shortened
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import Names, drops
-from ddenv.evidence.took_part import in_last
 from ddenv.workbench.map.place import Shown
 from ddenv.workbench.wording import DROPS, count, dropping
 

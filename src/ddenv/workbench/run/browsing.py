@@ -7,11 +7,11 @@ from array import array
 
 from ddenv.errors import UserError
 from ddenv.runfile.events import Implied, TestFinished, TestLost, TestStarted
+from ddenv.runfile.fold import spent
 from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import pointed, purpose
-from ddenv.runfile.fold import spent
 from ddenv.words import news
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.wording import count, outcome, plain

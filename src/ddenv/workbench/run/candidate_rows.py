@@ -9,11 +9,11 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
+from ddenv.evidence.took_part import implied_words
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.evidence.took_part import implied_words
 from ddenv.workbench.run import certificate_rows
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated

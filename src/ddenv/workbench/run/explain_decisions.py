@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ddenv.evidence.claims import drift, has_dropped
 from ddenv.guiding.situation import named
-from ddenv.runfile.run_settings import settings
 from ddenv.runfile.progress import Node
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Trial
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import count, plain

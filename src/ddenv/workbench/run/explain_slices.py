@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ddenv.runfile.state import RunState
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
+from ddenv.runfile.state import RunState
 from ddenv.workbench.wording import plain
 
 

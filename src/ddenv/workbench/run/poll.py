@@ -12,11 +12,10 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import apply, spent
 from ddenv.runfile.lock import engine_is_alive, suspended_engine
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.runfile.fold import spent
 from ddenv.version import __version__
 from ddenv.workbench.run.observed import Busy, Gone, Observed
 
@@ -199,11 +198,11 @@ class Poll:
         begun, more = time.monotonic(), True
         try:
             while more:
-                count = 0
-                for count, event in enumerate(self.file.read(state.revision, SOME_EVENTS), 1):
-                    before, state = state, apply(state, event)
+                room = SOME_EVENTS
+                for event in self.file.read(state.revision, room):
+                    before, state, room = state, apply(state, event), room - 1
                     self._on_event(event.kind, before, state)
-                more = count == SOME_EVENTS
+                more = not room
                 if time.monotonic() - begun > PATIENCE:
                     break
         except Busy:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ddenv.evidence.claims import current, meaning, rate
-from ddenv.runfile.supports import Names
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
+from ddenv.runfile.supports import Names
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, parting_sentence, reasons, sentence
 from ddenv.workbench.playback.moving import snapshot_with

@@ -1,24 +1,32 @@
-"""Records what algorithms do in a lesson's world, so that lessons show it without the algorithms themselves."""
+"""Records what algorithms do in a lesson's world, so that lessons show it without the algorithms themselves.
+
+python -m docs.lessons.record_plays FILE.yaml   adds it to the oracle of the lesson
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from ddenv import schemas
+from ddenv.engine.sight import traits_of, trajectory_of
 from ddenv.errors import UserError
 from ddenv.learn.lesson import Lesson
 from ddenv.learn.reading import read_lesson
 from ddenv.learn.recorded_oracle import Oracle, read_oracle
 from ddenv.learn.run_places import Places
+from ddenv.reduction.reduce import NamedRound, reduce
+from ddenv.runfile.fold import fold
 from ddenv.runfile.position import position_in
 from ddenv.runfile.state import partition_letter
-from ddenv.runfile.store import RunFile
+from ddenv.runfile.store import COLUMNS, RunFile
+from ddenv.runs.subject import read_parts
+from ddenv.world.extent import center
 from ddenv.world.files.access import write_file
-
-if TYPE_CHECKING:
-    from ddenv.reduction.reduce import NamedRound
 
 
 def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:
@@ -52,14 +60,6 @@ def _places(run: Path) -> Places:
 
 def _evidence(lesson: Lesson) -> dict[str, Any]:
     """What the schemas look at, from the lesson's run: the oracle knows no trajectories, so that of f has to do."""
-    import numpy as np
-
-    from ddenv.engine.sight import traits_of, trajectory_of
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.store import COLUMNS
-    from ddenv.runs.creation import read_parts
-    from ddenv.world.extent import center
-
     with RunFile(lesson.run) as content:
         _, world, _ = read_parts(content)
         state = fold(content.events())
@@ -79,8 +79,6 @@ def _evidence(lesson: Lesson) -> dict[str, Any]:
 
 
 def _play(name: str, oracle: Oracle, known: dict[str, Any]) -> list[dict[str, Any]]:
-    from ddenv.reduction.reduce import reduce
-
     rounds: list[tuple[NamedRound, list[frozenset[str]]]] = []
 
     def test(models: frozenset[str]) -> bool:
@@ -102,3 +100,9 @@ def _recorded(round: NamedRound, tested: list[frozenset[str]]) -> dict[str, Any]
         models, label = (part, f"part {letter}") if kind == "partition" else (whole - part, f"without {letter}")
         labels[models] = label
     return {"parts": [" ".join(part) for part in round.partitions], "tested": [labels[models] for models in tested]}
+
+
+if __name__ == "__main__":
+    for file in sys.argv[1:]:
+        oracle, names = record_plays(Path(file))
+        print(f"{oracle}: has what {', '.join(names)} did")

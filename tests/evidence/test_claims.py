@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from ddenv.evidence.claims import never_left_out, promise, verdict_on
 from ddenv.cli.summary import summary, summary_lines
+from ddenv.evidence.claims import never_left_out, promise, verdict_on
 from ddenv.page.markdown import markdown
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run

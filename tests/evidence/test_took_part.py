@@ -6,12 +6,12 @@ import re
 import pytest
 
 from ddenv.cli.summary import summary, summary_lines
+from ddenv.evidence.took_part import slice_in_short, why_sliced
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.evidence.took_part import slice_in_short, why_sliced
 from ddenv.words import news
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain
@@ -68,25 +68,23 @@ def test_the_workbench_teaches_what_is_implied(moments):
     said = " ".join(explain(Snapshot(sliced, (), "alive")).sentences)
     assert "What took no part in a run can go without changing a bit of it" in said
     assert "u takes it back" in said
-    event, _, implied = first(moments, "implied")
+    recorded, _, implied = first(moments, "implied")
     said = " ".join(explain(Snapshot(implied, (), "alive")).sentences)
     assert (
-        f"Test {event.data['test']} is implied by test {event.data['by']}: nothing that it lacks took part there."
+        f"Test {recorded.event.test} is implied by test {recorded.event.by}: nothing that it lacks took part there."
         in said
     )
 
 
 def test_the_row_of_a_candidate_names_the_run_that_implies_its_test(moments):
-    event, _, _ = first(moments, "implied")
+    event = first(moments, "implied")[0].event
     judged = next(
-        after
-        for each, _, after in moments
-        if each.kind == "candidate_judged" and event.data["test"] in each.data["tests"]
+        after for each, _, after in moments if each.kind == "candidate_judged" and event.test in each.event.tests
     )
     shown = Snapshot(judged, (), "alive")
     listing = listed(shown)
     rows = [words(shown, listing, row) for row in range(len(listing))]
-    by = rf"tests? (\d+, )*{event.data['by']}\b"
+    by = rf"tests? (\d+, )*{event.by}\b"
     assert any(re.match(f"○ dissimilar, implied by {by}", row["verdict"]) for row in rows)
     assert any(re.match(f"○ by {by}", row.get(IN_SHORT, "")) for row in rows)
 
@@ -121,7 +119,7 @@ def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     assert said.returncode == 0
     with RunFile(run) as file:
         state = fold(file.events())
-    met = set().union(*(test.took_part for test in state.tests if test.phase == "baseline"))
+    met = set().union(*(test.took_part.names(MODELS) for test in state.tests if test.phase == "baseline"))
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)
     assert f"{len(met)} models of {len(state.elements)} took part" in said.stdout
