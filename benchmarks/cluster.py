@@ -29,6 +29,7 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.worker import Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
+from ddenv.runfile.events import CandidateJudged, CertificateFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts, scenario_for_world
@@ -102,10 +103,8 @@ def without_a_look_ahead(journal: Journal) -> float:
         "baseline": [test.id for test in journal.state.tests if test.phase == "baseline"]
     }
     for event in journal.file.events():
-        if event.kind in ("candidate_judged", "certificate_finished"):
-            stages.setdefault((event.kind, event.data.get("round"), event.data.get("leg")), []).extend(
-                event.data["tests"]
-            )
+        if isinstance(event.event, CandidateJudged | CertificateFinished):
+            stages.setdefault((event.kind, getattr(event.event, "round", None)), []).extend(event.event.tests)
     made = {test.id: duration(journal.keep_of_test(test.id), test.seed) for test in journal.state.tests}
     return sum(max(map(made.__getitem__, tests)) for tests in stages.values() if tests)
 

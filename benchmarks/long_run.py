@@ -17,15 +17,29 @@ import time
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from ddenv.environment import Environment
+from ddenv.runfile.events import (
+    BaselineFinished,
+    CandidateJudged,
+    Created,
+    EngineStarted,
+    EnvironmentNamed,
+    Event,
+    Outcome,
+    Outcomes,
+    Reduced,
+    RoundFinished,
+    RoundStarted,
+    TestFinished,
+    TestStarted,
+)
 from ddenv.runfile.store import ROBOT, RunFile, create
 from ddenv.world.sdf.read import parse_world
 
 PARTS = 50
 RUNS = 4
 PACE = 0.3  # between the ends of two tests, s
-Happened = tuple[str, dict[str, Any]]
 ROBOT_SDF = (
     '<sdf version="1.9"><model name="robot"><link name="base"><collision name="body"><geometry>'
     "<box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"
@@ -59,12 +73,13 @@ def write(path: Path, tests: int, models: int) -> None:
     }
     elements = list(parse_world(world, path).elements())
     documents = {"scenario": json.dumps(data).encode(), "world": world, "robot": ROBOT_SDF.encode()}
-    create(path, documents, {"scenario": data, "elements": elements})
+    create(path, documents, Created(data, tuple(elements)))
     samples = way(width)
     with RunFile(path) as file:
         file.own()
-        for kind, happened in events(tests, models, width):
-            file.append(kind, happened, {ROBOT: samples} if happened.get("outcome") == "similar" else None)
+        for event in events(tests, models, width):
+            similar = isinstance(event, TestFinished) and event.outcome == "similar"
+            file.append(event, {ROBOT: samples} if similar else None)
         file.settle()
     pace(path)
 
@@ -98,79 +113,53 @@ def way(width: float) -> bytes:
     return rows.tobytes()
 
 
-def events(tests: int, models: int, width: float) -> Iterator[Happened]:
-    yield "engine_started", {"pid": 1, "jobs": 2, "version": "0.1.0", "simulator": "drake"}
-    for run in range(RUNS):
-        yield (
-            "test_started",
-            {"test": run + 1, "phase": "baseline", "round": None, "candidate": None, "run": run, "seed": run},
-        )
-        yield "test_finished", ended(run + 1, "similar", width)
-    yield (
-        "baseline_finished",
-        {
-            "runs": RUNS,
-            "failures": RUNS,
-            "rate": 1.0,
-            "low": 0.51,
-            "high": 1.0,
-            "failure_test": 1,
-            "position": [width / 2, width / 2, 0.2],
-            "miss_chance": 0.0,
-            "iterations_95": 0,
-            "outcomes": dict.fromkeys(map(str, range(1, RUNS + 1)), "similar"),
-            "distances": dict.fromkeys(map(str, range(1, RUNS + 1)), 0.1),
-        },
-    )
-    kept, test, number = list(range(models)), RUNS + 1, 0
+def events(tests: int, models: int, width: float) -> Iterator[Event]:
+    yield EngineStarted(1, 2, "0.1.0", "drake")
+    runs = range(1, RUNS + 1)
+    for test in runs:
+        yield TestStarted(test, 0, test - 1, test - 1, "baseline")
+        yield ended(test, "similar", width)
+    judged = Outcomes(dict.fromkeys(runs, "similar"), dict.fromkeys(runs, 0.1))
+    yield BaselineFinished(RUNS, RUNS, 1.0, 0.51, 1.0, 1, (width / 2, width / 2, 0.2), 0.0, 0, judged)
+    kept, here, environments, test, number = list(range(models)), 0, 1, RUNS + 1, 0
     while test <= tests:
         number += 1
-        partitions = [kept[len(kept) * part // PARTS : len(kept) * (part + 1) // PARTS] for part in range(PARTS)]
-        yield "round_started", announced(number, kept, partitions)
-        for candidate in range(2 * PARTS):
+        parts = [tuple(kept[len(kept) * part // PARTS : len(kept) * (part + 1) // PARTS]) for part in range(PARTS)]
+        kinds = [(kind, part, 0.5 + part) for part in range(PARTS) for kind in ("partition", "complement")]
+        yield RoundStarted(number, PARTS, here, tuple(parts), tuple(kinds))
+        whole = Environment.of(kept)
+        for candidate, (kind, part, _) in enumerate(kinds):
             runs = RUNS if candidate < 2 * PARTS - 1 else 1
-            yield from tried(number, candidate, range(test, test + runs), width)
-            test += runs
-        kept = [model for part in partitions[:-1] for model in part]
-        yield "reduced", {"candidate": 2 * PARTS - 1, "environment": kept, "evidence_test": test - 1}
-        yield "round_finished", {}
+            some = Environment.of(parts[part])
+            yield EnvironmentNamed(environments, some if kind == "partition" else whole - some)
+            yield from tried(number, candidate, environments, range(test, test + runs), width)
+            test, environments = test + runs, environments + 1
+        kept, here = [model for part in parts[:-1] for model in part], environments - 1
+        yield Reduced(number, 2 * PARTS - 1, here, test - 1)
+        yield RoundFinished(number)
 
 
-def announced(number: int, kept: list[int], partitions: list[list[int]]) -> dict[str, Any]:
-    candidates = [[kind, part, 0.5 + part] for part in range(PARTS) for kind in ("partition", "complement")]
-    return {
-        "round": number,
-        "n_partitions": PARTS,
-        "environment": kept,
-        "partitions": partitions,
-        "candidates": candidates,
-    }
-
-
-def tried(round: int, candidate: int, tests: range, width: float) -> Iterator[Happened]:
+def tried(round: int, candidate: int, environment: int, tests: range, width: float) -> Iterator[Event]:
     """All tests of a candidate, and its verdict: similar if there is but one."""
     similar = len(tests) == 1
     for run, test in enumerate(tests):
-        place = {"phase": "round", "round": round, "candidate": candidate}
-        yield "test_started", {"test": test, **place, "run": run, "seed": run}
-        yield "test_finished", ended(test, "similar" if similar else "other" if run % 2 else "pass", width)
-    verdict = "similar" if similar else "dissimilar"
-    yield "candidate_judged", {"candidate": candidate, "verdict": verdict, "tests": list(tests), "known": 0}
+        yield TestStarted(test, environment, run, run, "round", round, candidate)
+        yield ended(test, "similar" if similar else "other" if run % 2 else "pass", width)
+    yield CandidateJudged(round, candidate, "similar" if similar else "dissimilar", tuple(tests))
 
 
-def ended(test: int, outcome: str, width: float) -> dict[str, Any]:
-    return {
-        "test": test,
-        "outcome": outcome,
-        "failure": "" if outcome == "pass" else "stuck",
-        "distance": 0.12 if outcome == "similar" else 2.34567891,
-        "end_pose": [width / 2, width / 2, 0.2, 1.0, 0.0, 0.0, 0.0],
-        "simulated_seconds": 45.0,
-        "wall_seconds": 0.61234567,
-        "first_sensed": [[number, 0.25 * number] for number in range(10)],
-        "cut": False,
-        "first_touched": [[3, 12.5]],
-    }
+def ended(test: int, outcome: Outcome, width: float) -> TestFinished:
+    return TestFinished(
+        test,
+        outcome,
+        failure="" if outcome == "pass" else "stuck",
+        distance=0.12 if outcome == "similar" else 2.34567891,
+        end_pose=(width / 2, width / 2, 0.2, 1.0, 0.0, 0.0, 0.0),
+        simulated_seconds=45.0,
+        wall_seconds=0.61234567,
+        first_sensed=tuple((number, 0.25 * number) for number in range(10)),
+        first_touched=((3, 12.5),),
+    )
 
 
 if __name__ == "__main__":

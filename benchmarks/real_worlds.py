@@ -136,7 +136,7 @@ def engine(scenario: Scenario, path: Path, tests: int, jobs: int) -> Measured:
         )
     # The first test also waits for the worker to start.
     span = ended[-1].time - ended[0].time
-    busy = sum(event.data["wall_seconds"] for event in ended[1:])
+    busy = sum(one.event.wall_seconds for one in ended[1:])
     return Measured((span - busy) / (len(ended) - 1), max(memory))
 
 

@@ -14,15 +14,16 @@ import itertools
 import time
 from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ddenv.runfile.events import EnvironmentNamed, Event, Forecast, RoundStarted, TestFinished, TestLost, TestStarted
 from ddenv.runfile.lock import engine_lock
-from ddenv.runfile.store import COLUMNS, ROBOT, Event, Live, RunFile, create
+from ddenv.runfile.store import COLUMNS, ROBOT, Live, Recorded, RunFile, create
 
 PERIOD = 0.1  # between two looks at the running tests, s
-ENDS = ("confirm_started", "finished", "engine_stopped", "engine_failed")
+ENDS = ("finished", "engine_stopped", "engine_failed")
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,7 @@ class Entry:
     """An event to write `at` this time of the run's clock, s; `test` is the number that its test has in the source."""
 
     at: float
-    kind: str
-    data: dict[str, Any]
+    event: Event
     test: int
 
 
@@ -56,9 +56,9 @@ class Source:
     def __init__(self, file: RunFile) -> None:
         self._file = file
         self.events = file.events()
-        self._ends = {event.data["test"]: event.time for event in self.events if event.kind == "test_finished"}
-        self._starts = {event.data["test"]: event.time for event in self.events if event.kind == "test_started"}
-        named = [event.data.get("failure_test", event.data.get("evidence_test")) for event in self.events]
+        self._ends = {one.event.test: one.time for one in self.events if isinstance(one.event, TestFinished)}
+        self._starts = {one.event.test: one.time for one in self.events if isinstance(one.event, TestStarted)}
+        named = [getattr(one.event, name, None) for one in self.events for name in ("failure_test", "evidence_test")]
         self._read = {test for test in named if test is not None}
         self._any = file.trajectory(min(self._read))
 
@@ -69,7 +69,7 @@ class Source:
 
     def motions(self, entry: Entry) -> dict[str, bytes] | None:
         """What is written with a test's end: the path that shows f, if a view reads it."""
-        if entry.kind != "test_finished" or entry.test not in self._read:
+        if not isinstance(entry.event, TestFinished) or entry.test not in self._read:
             return None
         return {ROBOT: self._file.trajectory(entry.test).tobytes()}
 
@@ -84,7 +84,7 @@ def main() -> None:
     options = parser.parse_args()
     with RunFile(options.source) as file:
         source = Source(file)
-        create(options.target, file.documents(""), source.events[0].data)
+        create(options.target, file.documents(""), source.events[0].event)
         with RunFile(options.target) as target, engine_lock(options.target):
             target.own()
             script = endless(source.events)
@@ -97,9 +97,9 @@ def main() -> None:
 def at_once(source: Source, target: RunFile, script: Iterator[Entry], tests: int) -> Entry:
     """Writes everything before test number `tests` + 1; returns that test's start."""
     for entry in script:
-        if entry.kind == "test_started" and entry.data["test"] > tests:
+        if isinstance(entry.event, TestStarted) and entry.event.test > tests:
             return entry
-        target.append(entry.kind, entry.data, source.motions(entry))
+        target.append(entry.event, source.motions(entry))
     raise ValueError("no more tests")
 
 
@@ -120,54 +120,59 @@ def play(source: Source, target: RunFile, script: Iterator[Entry], speed: float,
             time.sleep(min(looked + PERIOD - now, (entry.at - clock) / speed))
         if entry.at > until:
             return
-        if entry.kind == "test_started":
-            running[entry.data["test"]] = source.course(entry)
-        elif entry.kind in ("test_finished", "test_lost"):
-            running.pop(entry.data["test"], None)
-        target.append(entry.kind, entry.data, source.motions(entry))
+        if isinstance(entry.event, TestStarted):
+            running[entry.event.test] = source.course(entry)
+        elif isinstance(entry.event, TestFinished | TestLost):
+            running.pop(entry.event.test, None)
+        target.append(entry.event, source.motions(entry))
 
 
-def endless(events: list[Event]) -> Iterator[Entry]:
+def endless(events: list[Recorded]) -> Iterator[Entry]:
     """All events but the first, and then those of the rounds again and again, as later tests of later rounds."""
-    begin = next(index for index, event in enumerate(events) if event.kind == "round_started")
-    ends = [index + 1 for index, event in enumerate(events) if event.kind == "round_finished"]
+    begin = next(index for index, one in enumerate(events) if one.kind == "round_started")
+    ends = [index + 1 for index, one in enumerate(events) if one.kind == "round_finished"]
     end = ends[-1] if ends else len(events)
-    for event in events[1:begin]:
-        yield Entry(event.time, event.kind, event.data, event.data.get("test", 0))
-    body = [event for event in events[begin:end] if event.kind not in ENDS]
-    body += [Event(0, body[-1].time, "test_lost", {"test": test}) for test in unfinished(body)]
-    tests = [event.data["test"] for event in body if event.kind == "test_started"]
-    rounds = sum(event.kind == "round_started" for event in body)
-    lasts = body[-1].time - body[0].time
+    for one in events[1:begin]:
+        yield Entry(one.time, one.event, getattr(one.event, "test", 0))
+    body = [(one.time, one.event) for one in events[begin:end] if one.kind not in ENDS]
+    last = body[-1][0]
+    body += [(last, TestLost(test)) for test in unfinished([event for _, event in body])]
+    tests = [event.test for _, event in body if isinstance(event, TestStarted)]
+    rounds = sum(isinstance(event, RoundStarted) for _, event in body)
+    lasts = last - body[0][0]
     for lap in itertools.count():
-        for event in body:
-            data = later(event.data, tests[0], lap * len(tests), lap * rounds)
-            yield Entry(event.time + lap * lasts, event.kind, data, event.data.get("test", 0))
+        for at, event in body:
+            # Environments keep the numbers of the first lap.
+            if not (lap and isinstance(event, EnvironmentNamed)):
+                moved = later(event, tests[0], lap * len(tests), lap * rounds)
+                yield Entry(at + lap * lasts, moved, getattr(event, "test", 0))
 
 
 def unfinished(events: list[Event]) -> list[int]:
     """Tests that were started and did not end."""
     running: dict[int, None] = {}
     for event in events:
-        if event.kind == "test_started":
-            running[event.data["test"]] = None
-        elif event.kind in ("test_finished", "test_lost"):
-            running.pop(event.data["test"], None)
+        if isinstance(event, TestStarted):
+            running[event.test] = None
+        elif isinstance(event, TestFinished | TestLost):
+            running.pop(event.test, None)
     return list(running)
 
 
-def later(data: dict[str, Any], first: int, tests: int, rounds: int) -> dict[str, Any]:
-    """An event's data with later numbers of tests, from `first` on, and of rounds."""
+def later(event: Event, first: int, tests: int, rounds: int) -> Event:
+    """An event with later numbers of tests, from `first` on, and of rounds."""
 
     def moved(test: int) -> int:
         return test + tests if test >= first else test
 
-    changes: dict[str, Any] = {name: moved(data[name]) for name in ("test", "evidence_test") if name in data}
-    if "tests" in data:
-        changes["tests"] = [moved(test) for test in data["tests"]]
-    if data.get("round") is not None:
-        changes["round"] = data["round"] + rounds
-    return data | changes
+    changes: dict[str, Any] = {
+        name: moved(getattr(event, name)) for name in ("test", "evidence_test", "by") if hasattr(event, name)
+    }
+    if hasattr(event, "tests") and not isinstance(event, Forecast):
+        changes["tests"] = tuple(map(moved, event.tests))
+    if getattr(event, "round", None) is not None:
+        changes["round"] = event.round + rounds
+    return replace(event, **changes)
 
 
 if __name__ == "__main__":

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine.journal import Journal
-from ddenv.runfile.atlas import CHUNK, atlas, models_of
+from ddenv.environment import Environment
+from ddenv.runfile.atlas import CHUNK, atlas
+from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import drive, new_run
@@ -29,7 +30,7 @@ Test.__test__ = False
     moment=st.integers(20, 200),
     early_stop=st.booleans(),
 )
-def test_the_models_of_each_failed_test_are_known_from_the_state(salt, plan, moment, early_stop):
+def test_each_other_failure_is_found_with_the_smallest_environment_that_showed_it(salt, plan, moment, early_stop):
     with tempfile.TemporaryDirectory() as folder:
         path = new_run(Path(folder), early_stop=early_stop)
         pool = Disturbed(path, flaky(salt, "wall", "beam"), 2, sorted(plan, key=lambda one: one[0]), salt)
@@ -40,22 +41,18 @@ def test_the_models_of_each_failed_test_are_known_from_the_state(salt, plan, mom
         finally:
             pool.viewer.close()
         with RunFile(path) as file:
-            journal = Journal(file)
-    state = journal.state
-    for test in state.tests:
-        if test.outcome in ("similar", "other"):
-            assert frozenset(models_of(state, test)) == journal.keep_of_test(test.id)
+            state = fold(file.events())
     others = [test.id for test in state.tests if test.outcome == "other"]
     found = atlas(state)
     assert sorted(test for each in found for test in each.tests) == others
     for each in found:
-        sizes = {test: len(journal.keep_of_test(test)) for test in each.tests}
+        sizes = {test: len(state.models_of(state.tests[test - 1])) for test in each.tests}
         assert (each.size, each.smallest) == min((size, test) for test, size in sizes.items())
 
 
 def state_of(*ends: tuple[str, float]) -> RunState:
     tests = [
-        Test(id, "baseline", None, None, id, id, "other", kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        Test(id, 0, "baseline", None, None, id, id, "other", kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         for id, (kind, x) in enumerate(ends, 1)
     ]
     empty = RunState()
@@ -63,6 +60,7 @@ def state_of(*ends: tuple[str, float]) -> RunState:
         tests=empty.tests.of(tests),
         tally=empty.tally | {"other": len(tests)},
         elements=("a", "b"),
+        environments=empty.environments.of([Environment.whole(2)]),
         scenario={"failure": {"epsilon": 0.5}},
     )
 
