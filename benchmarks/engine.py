@@ -34,6 +34,7 @@ from ddenv.engine.pool import Pool
 # Loads scikit-learn, which is part of the start.
 from ddenv.reduction import partitionings  # noqa: F401
 from ddenv.robot.result import Progress, RunResult
+from ddenv.runfile.events import EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
@@ -137,7 +138,7 @@ def work(run: Path, jobs: int, make: partial[Sleeper]) -> Cost:
         scenario, world, robot = read_parts(file)
         file.own()
         journal = Journal(file)
-        journal.record("engine_started", None, pid=os.getpid(), jobs=jobs, version=__version__, simulator="none")
+        journal.record(EngineStarted(os.getpid(), jobs, __version__, "none"))
         control, pool = Control(journal, threading.Event()), Pool(scenario, world, robot, jobs, make)
         driver = Driver(scenario, world, journal, Bench(journal, pool, control), control)
         cost = Cost(time.thread_time())

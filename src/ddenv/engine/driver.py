@@ -30,7 +30,7 @@ from ddenv.reduction.guide import Guide, Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.stepping_back import tried_again
-from ddenv.reduction.verdict import MOST_RUNS, Acceptance
+from ddenv.reduction.verdict import Acceptance
 from ddenv.runfile import events
 from ddenv.runfile.fold import digest
 from ddenv.runfile.progress import Certificate
@@ -55,6 +55,7 @@ class Driver:
         # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
         self._trials: list[Trial] = []
         self._learnt: set[int] = set()
+        self._unknown: set[Environment] = set()
         self._memory = Memory()
         self._guide: Guide | None = None
         self._stacks = Stacks({})
@@ -136,6 +137,7 @@ class Driver:
         self._bench.rule = self._leg.rule
         self._trials.clear()
         self._learnt.clear()
+        self._unknown.clear()
         self._learn(leg.tests)
         self._look_at(leg.evidence_test)
         return self._leg
@@ -223,12 +225,8 @@ class Driver:
         return replace(self._evidence, trials=self._trials)
 
     def _broke(self, leg: steps.Leg, candidate: Candidate) -> bool:
-        """Whether a test of a candidate of the algorithm, which knows one model of each stack, broke for good."""
-        tally = self._journal.state.tally
-        if not any(tally[outcome] for outcome in BROKEN):
-            return False
-        environment = leg.pinned | Environment.of(self._stacks.expanded(candidate.models))
-        return any(self._journal.shown(environment, run) == "broken" for run in range(MOST_RUNS))
+        """Whether tests of a candidate of the algorithm, which knows one model of each stack, broke and left it unknown."""
+        return leg.pinned | Environment.of(self._stacks.expanded(candidate.models)) in self._unknown
 
     def _learn(self, tests: Iterable[int]) -> None:
         """The schemas see the tests behind the verdicts of a round: a resumed run sees the same."""
@@ -271,13 +269,14 @@ class Driver:
     def _round_began(self, step: steps.RoundBegan) -> steps.Past | None:
         state, leg = self._journal.state, self._journal.state.leg
         parts = tuple(map(Environment.of, step.round.partitions))
-        assert leg is not None
+        assert leg is not None and self._leg is not None
         place = step.number - leg.first_round
         if place < len(leg.past):
             past = leg.past[place]
             if past.digest != digest(parts):
                 raise UserError(other_way(step.number))
             self._learn(past.tests)
+            self._unknown.update(step.round.candidates[index].models | self._leg.pinned for index in past.unknown)
             if past.evidence_test is not None:
                 self._look_at(past.evidence_test)
             return steps.Past(past.winner)
@@ -342,6 +341,8 @@ class Driver:
     def _judged(self, step: steps.Judged) -> None:
         """Records a verdict, unless an earlier engine has."""
         journal, round = self._journal, self._journal.current
+        if step.verdict == "unknown":
+            self._unknown.add(step.environment)
         if round.candidates[step.index].verdict:
             return
         tests = journal.tests(step.environment, range(step.runs))

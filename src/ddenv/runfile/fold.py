@@ -22,6 +22,9 @@ from ddenv.runfile.progress import Forecast, Node, PastRound, Point
 from ddenv.runfile.state import Candidate, Round, RunState, Split
 from ddenv.runfile.store import Recorded, uncollected
 
+# Verdicts that tests led to, not the user.
+JUDGED = ("similar", "missed", "dissimilar", "unknown")
+
 
 def fold(recorded: Iterable[Recorded], state: RunState | None = None) -> RunState:
     """The state after these events, from the beginning or from an earlier `state`. Raises UserError for invalid ones."""
@@ -271,10 +274,14 @@ def _round_finished(state: RunState, event: e.RoundFinished, _: float) -> Change
     changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
     if state.leg is not None:
         last = len(round.candidates) if round.winner is None else round.winner + 1
-        judged = ("similar", "missed", "dissimilar", "unknown")
-        tests = (test for one in round.candidates[:last] if one.verdict in judged for test in one.tests)
-        evidence = None if round.winner is None else state.evidence_test
-        past = PastRound(digest(round.split.parts), round.winner, evidence, tuple(dict.fromkeys(tests)))
+        judged = [one for one in round.candidates[:last] if one.verdict in JUDGED]
+        past = PastRound(
+            digest(round.split.parts),
+            round.winner,
+            None if round.winner is None else state.evidence_test,
+            tuple(dict.fromkeys(test for one in judged for test in one.tests)),
+            tuple(one.index for one in judged if one.verdict == "unknown"),
+        )
         changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
     return changes
 

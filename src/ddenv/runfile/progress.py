@@ -34,13 +34,14 @@ class Leg:
 class PastRound:
     """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts.
 
-    `evidence_test` is the run of the winner that guides the next rounds.
+    `evidence_test` is the run of the winner that guides the next rounds; tests of the candidates `unknown` broke.
     """
 
     digest: int
     winner: int | None
     evidence_test: int | None
     tests: tuple[int, ...]
+    unknown: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,6 +170,8 @@ def _tuple(arguments: tuple[Any, ...]) -> Reader:
 
         return items
     readers = [_reader(argument) for argument in arguments]
+    if len(readers) == 2:
+        return _pair(*readers)
 
     def group(value: Any) -> Any:
         if type(value) is not list or len(value) != len(readers):
@@ -177,6 +179,17 @@ def _tuple(arguments: tuple[Any, ...]) -> Reader:
         return tuple(reader(item) for reader, item in zip(readers, value, strict=True))
 
     return group
+
+
+def _pair(first: Reader, second: Reader) -> Reader:
+    """As any group of two, in half the time: tests have hundreds of thousands."""
+
+    def pair(value: Any) -> Any:
+        if type(value) is not list or len(value) != 2:
+            raise _wrong("a list of 2", value)
+        return first(value[0]), second(value[1])
+
+    return pair
 
 
 def _dictionary(key: Any, content: Any) -> Reader:
