@@ -14,8 +14,8 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.arrays import Booleans, Floats
-from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.motion import ARRAY, NEAR, Links, Motion, Script, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import model_bounds

@@ -10,8 +10,8 @@ from pydrake.geometry import QueryObject
 from pydrake.math import RotationMatrix
 
 from ddenv.arrays import Booleans, Floats
-from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.motion import CALM, Script
 from ddenv.robot.piles.rehearsal import Rehearsals
 from ddenv.robot.settled import Settled

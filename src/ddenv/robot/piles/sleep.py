@@ -15,8 +15,8 @@ import numpy as np
 from pydrake.multibody.plant import ContactResults
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.motion import NEAR, SLOW, Links, Motion, Script, Stillness, gaps, spread, tight_gaps
 from ddenv.world.extent import Bounds
 

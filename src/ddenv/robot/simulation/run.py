@@ -14,9 +14,9 @@ from pydrake.systems.framework import Context
 from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
-from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.region import Watch
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult

@@ -12,9 +12,9 @@ from typing import TypeVar
 from ddenv.errors import UserError
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
-from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
+from ddenv.robot.drake.run_context import RunContext
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
 from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
@@ -201,11 +201,14 @@ class Template:
         self._context.diagram_context.SetTime(0.0)
         sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
         try:
-            # With what those models are tied to that are always kept.
-            ties = self._repertoire.ties if self._repertoire.learnt else {}
-            yield sleep, unusual.union(*(ties[always] & present for always in self._always & set(ties)))
+            yield sleep, unusual | self._carriers(present)
         finally:
             sleep.end()
+
+    def _carriers(self, present: frozenset[str]) -> frozenset[str]:
+        """What those models are tied to that are always kept, among the models `present`."""
+        ties = self._repertoire.ties if self._repertoire.learnt else {}
+        return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
         if not (self._slices and self._sleeping and self._repertoire.learnt):
