@@ -1,22 +1,19 @@
 """What idle workers make ahead of time: it changes no result, whatever their number, and what nobody needs is counted."""
 
 import tempfile
-from dataclasses import asdict
 from pathlib import Path
-from types import SimpleNamespace
 from zlib import crc32
 
 import pytest
-from ddenv.engine.ahead import LONGEST, Ahead
-from ddenv.reduction.rounds_ahead import Place, RoundsAhead
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ddenv.engine.journal import Journal
-from ddenv.reduction.round import make_round
-from ddenv.runfile.state import AHEAD, BROKEN, FRESH
+from ddenv.runfile.events import CandidateJudged, CertificateFinished, Finished, LeftOut, RateLost, Reduced
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
-from tests.engine.fake import FakePool, drive, new_run
+from tests.engine.fake import FakePool, drive
+from tests.engine.killing import models_in
 from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.test_certify import _killed, at_rates
@@ -35,35 +32,36 @@ WORKERS = (2, 8, 64)
 
 
 def decided(path):
-    """All that a run decided, with the tests that it rests on, as (models, run), and those known as its last search begins."""
-    found = []
+    """All that a run decided, with the tests that it rests on, as (models, run), and those known as its last search began."""
     with RunFile(path) as file:
-        journal = Journal(file)
-        for event in file.events():
-            if event.kind in (
-                "candidate_judged",
-                "reduced",
-                "rate_lost",
-                "left_out",
-                "certificate_finished",
-                "finished",
-            ):
-                data = {
-                    key: value for key, value in asdict(event.event).items() if key not in ("known", "evidence_test")
-                }
-                if "tests" in data:
-                    tests = [journal.state.tests[test - 1] for test in data["tests"]]
-                    data["tests"] = sorted((sorted(journal.keep_of_test(one.id)), one.run) for one in tests)
-                found.append((event.kind, data))
-        made = [
-            (journal.keep_of_test(one.id), one.run) for one in journal.state.finished_tests if one.outcome not in BROKEN
-        ]
+        events = [recorded.event for recorded in file.events()]
+        state = fold(file.events())
+
+    def named(tests):
+        return sorted((sorted(models_in(state, test)), state.tests[test - 1].run) for test in tests)
+
+    found = []
+    for event in events:
+        match event:
+            case CandidateJudged():
+                found.append((event.round, event.candidate, event.verdict, named(event.tests)))
+            case Reduced():
+                found.append(
+                    (event.round, event.candidate, state.environments[event.environment].names(state.elements))
+                )
+            case RateLost():
+                found.append((event.node, event.lost, event.again, named(event.tests)))
+            case LeftOut():
+                found.append(("left out", event.without))
+            case CertificateFinished():
+                claims = [(one.without, one.verdict, one.shown, one.runs, one.outcomes) for one in event.claims]
+                found.append((claims, named(event.tests)))
+            case Finished():
+                found.append(event)
+    made = [(test.environment, test.run) for test in state.finished_tests if test.outcome not in BROKEN]
     assert len(made) == len(set(made)), "a test was made twice"
-    leg = journal.begin_leg()
-    found.append(
-        ("leg", [(sorted(journal.keep_of_test(test)), journal.state.tests[test - 1].run) for test in leg.tests])
-    )
-    return found, journal.state
+    found.append(named(state.leg.tests))
+    return found, state
 
 
 @pytest.mark.parametrize("method", slow(pytest.mark.fuzz, METHODS, but=[METHODS[1], METHODS[6]]), ids=str)
@@ -83,7 +81,7 @@ def test_any_number_of_workers_comes_to_the_same_verdicts(salt, needed, fewer, r
         alone = sliced_run(Path(folder), **method)
         drive(alone, FakePool(oracle, 1))
         expected, state = decided(alone)
-        assert not any(test.phase == AHEAD for test in state.tests)
+        assert not state.ahead
         for workers in WORKERS:
             path = sliced_run(Path(folder), **method)
             drive(path, FakePool(oracle, workers, seed))
@@ -122,7 +120,7 @@ def test_an_engine_that_goes_on_knows_what_was_made_ahead(moments, salt):
         _killed(path, simulated.pool(64), moments)
         for workers in (8, 1):
             drive(path, simulated.pool(workers))
-        journeys = [[(kind, data) for kind, data in decided(each)[0] if kind != "finished"] for each in (path, alone)]
+        journeys = [[one for one in decided(each)[0] if not isinstance(one, Finished)] for each in (path, alone)]
         assert journeys[0] == journeys[1]
 
 
@@ -143,59 +141,20 @@ def test_what_ran_ahead_for_nothing_is_counted(runs):
     assert together.ahead == len(pool.made) - alone.tests_done > 0
 
 
-def test_later_rounds_and_the_certificate_are_begun_ahead_of_time(runs):
+def test_idle_workers_make_nothing_of_later_rounds(runs):
     _, (state, _) = runs
-    last_round = max(test.id for test in state.tests if test.phase == "round")
-    assert AHEAD in {test.phase for test in state.tests}
-    assert any(test.phase in FRESH and test.id < last_round for test in state.tests)
+    phases = [test.phase for test in state.tests]
+    assert set(phases) <= {"baseline", "round", "audit", "certify"}
+    assert phases.index("certify") > max(place for place, phase in enumerate(phases) if phase == "round")
+    rounds = [test.round for test in state.tests if test.phase == "round"]
+    assert rounds == sorted(rounds)
 
 
-def test_nothing_beyond_the_round_is_made_where_tests_are_counted(tmp_path):
-    path = new_run(tmp_path, budget=500)
-    state = drive(path, FakePool(needs("wall", "beam"), 16))
-    assert {test.phase for test in state.tests} == {"baseline", "round", "certify"}
-
-
-@pytest.mark.parametrize("workers", [2, 4])
-def test_the_next_test_of_the_search_never_waits_for_those_of_later_rounds(tmp_path, workers):
+def test_the_workers_take_the_tests_of_the_list_in_its_order(tmp_path):
+    """Re-runs of a candidate come before tests of the next ones."""
     path = sliced_run(tmp_path, accept_rate="first", iterations=25)
-    drive(path, FakePool(needs(MODELS[0], MODELS[3]), workers))
+    drive(path, FakePool(needs(MODELS[0], MODELS[3]), 4))
     with RunFile(path) as file:
-        begun = [asdict(event.event) for event in file.events() if event.kind == "test_started"]
-    # Nobody looks so far ahead in the runs of one candidate.
-    first = [(one["phase"], one["candidate"], one["run"]) for one in begun]
-    late = first.index(("round", 0, 12))
-    assert late - first.index(("round", 0, 11)) <= 2 * workers
-
-
-def test_no_look_begins_a_step_that_would_take_too_long(tmp_path, monkeypatch):
-    """Commands wait for it."""
-    now, steps, looks = 0.0, 0, []
-    find, look = RoundsAhead._next, Ahead.likely
-
-    def found(*place):
-        nonlocal now, steps
-        now, steps = now + 0.7 * LONGEST, steps + 1
-        return find(*place)
-
-    def looked(*asked):
-        began = now
-        likely = look(*asked)
-        looks.append(now - began)
-        return likely
-
-    monkeypatch.setattr("ddenv.engine.ahead.time", SimpleNamespace(monotonic=lambda: now))
-    monkeypatch.setattr(RoundsAhead, "_next", found)
-    monkeypatch.setattr(Ahead, "likely", looked)
-    drive(sliced_run(tmp_path, **METHODS[1]), FakePool(needs(*MODELS[3:5]), 16))
-    assert steps > 2
-    assert max(looks) <= LONGEST
-
-
-def test_candidates_that_are_judged_are_forgotten(tmp_path):
-    """The models of 10,000 candidates of 10,000 models each would take gigabytes."""
-    models = [str(number) for number in range(20)]
-    round = make_round(20, tuple(models), [((name,), 0.0) for name in models])
-    place = Place((), round, keeps={index: frozenset() for index in range(40)}, after=dict.fromkeys([None, *range(40)]))
-    place.judged(30)
-    assert list(place.keeps) == list(range(29, 40)) and list(place.after) == [None, *range(29, 40)]
+        begun = [recorded.event for recorded in file.events() if recorded.kind == "test_started"]
+    first = [(one.candidate, one.run) for one in begun if one.phase == "round" and one.round == begun[20].round]
+    assert first == sorted(first)

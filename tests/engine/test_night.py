@@ -19,6 +19,7 @@ from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
 from ddenv.runfile import lock
+from ddenv.runfile.events import EngineStarted, Paused, TestFinished
 from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
@@ -47,7 +48,7 @@ def watched(path, terminated=None):
         journal = Journal(file)
         pool = FakePool(oracle, 2)
         _begin(journal, pool.jobs, None)
-        control = Control(journal, terminated, room=watch)
+        control = Control(journal, terminated, disk=watch)
         Driver(scenario, world, journal, Bench(journal, pool, control), control).reduce()
         return journal.state
 
@@ -95,11 +96,11 @@ def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path,
     looks = []
     original = RunFile._append
 
-    def full_for_a_while(file, kind, data, motions):
-        if kind == "test_finished" and data["test"] == 3 and len(looks) < 4:
+    def full_for_a_while(file, event, *values):
+        if isinstance(event, TestFinished) and event.test == 3 and len(looks) < 4:
             # Even less than a result.
             file._db.execute("PRAGMA max_page_count = 1")
-        return original(file, kind, data, motions)
+        return original(file, event, *values)
 
     def look():
         looks.append(1)
@@ -128,7 +129,7 @@ def test_an_engine_that_waits_for_room_can_be_ended(tmp_path, monkeypatch):
     terminated = threading.Event()
     disk(monkeypatch, lambda: 10 * NEEDED)
 
-    def full(file, kind, data, motions):
+    def full(file, *event):
         terminated.set()
         raise NoRoom(f"{path}: cannot be written: full")
 
@@ -143,7 +144,7 @@ def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path):
     with RunFile(path) as file:
         file.own()
         journal = Journal(file)
-        journal.record("engine_started", pid=1, jobs=1, version="1", simulator="x")
+        journal.record(EngineStarted(1, 1, "1", "x"))
         jumps = ClockJumps(journal, lambda: now[0] + now[1], lambda: now[1])
         for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
             now[0], now[1] = now[0] + jump, now[1] + passed
@@ -256,6 +257,6 @@ def test_an_error_of_writing_that_is_no_full_disk_is_not_waited_for(tmp_path):
         file.own(lambda _: pytest.fail("waits"))
         file._db.execute("PRAGMA query_only = ON")
         with pytest.raises(UserError, match="cannot be written") as told_once:
-            file.append("paused", {})
+            file.append(Paused())
     assert not isinstance(told_once.value, NoRoom)
     assert sqlite3.connect(path).execute("SELECT count(*) FROM event").fetchone() == (1,)

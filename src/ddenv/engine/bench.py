@@ -256,7 +256,9 @@ class Bench:
             environment = journal.state.environments[started.environment]
             self._started.discard((environment, started.run, journal.is_full(started.phase)))
         took_part = data.pop("took_part", None)
+        pose = data.pop("end_pose")
         noticed: dict[str, Any] = {
+            "end_pose": None if pose is None else tuple(pose),
             "first_sensed": journal.in_order(data.pop("first_sensed")),
             "first_touched": journal.in_order(data.pop("first_touched")),
             "took_part": None if took_part is None else journal.models(took_part),
