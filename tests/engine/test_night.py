@@ -86,7 +86,7 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
     path = new_run(tmp_path)
     assert story(watched(path)) == undisturbed
     lines, kinds = told(path)
-    first, last = (number for number, kind in enumerate(kinds) if kind == "room")
+    first, last = (number for number, kind in enumerate(kinds) if kind == "disk_space")
     assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
     assert "no room on the disk: waits until 32 MB are free" in lines and "there is room on the disk again" in lines
 

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ddenv.environment import NOTHING, Environment
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing, plays
 from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.procedure import Leg, RoundBegan, RoundEnded, Similar, Wants, search_on
 from ddenv.reduction.verdict import Acceptance
 from ddenv.schemas import split_pair
 
@@ -31,42 +33,92 @@ def needed_of(known, count):
     rng = np.random.default_rng([known.seed, count])
     apart = np.linalg.norm(known.places(known.elements) - known.failure_position, axis=1)
     weights = np.exp(-apart / 2)
-    return set(rng.choice(known.elements, count, replace=False, p=weights / weights.sum()))
+    return Environment.of(rng.choice(len(known.elements), count, replace=False, p=weights / weights.sum()).tolist())
+
+
+def leg_of(known, iterations):
+    free = {model: Environment.of([model]) for model in range(len(known.elements))}
+    whole = Environment.whole(len(known.elements))
+    return Leg(1, whole, (whole,), NOTHING, free, Acceptance(1 + iterations))
+
+
+class Searched:
+    """Drives a search of a world that knows which models f needs, and forecasts each of its rounds."""
+
+    refusals, workers = 0, 1
+
+    def __init__(self, known, needed, algorithm, pair, iterations, **options):
+        self.known, self.needed, self.algorithm_name, self.pair = known, needed, algorithm, pair
+        self.leg, self.memory = leg_of(known, iterations), Memory()
+        self.trials, self.made, self.winners, self.told = [], {}, [], []
+        self.left = self.leg.whole
+        evidence = lambda: replace(known, trials=self.trials)  # noqa: E731
+        self.guide = make_guide(*split_pair(pair), evidence, runs=lambda: 1 + iterations, **options)
+
+    def shown(self, environment, run, full=False):
+        return self.made.get((environment, run))
+
+    def refused(self, environment):
+        return False
+
+    refused_by_user = refused
+
+    def algorithm(self, leg):
+        return self.begin(leg, self.memory.of(self.guide))
+
+    def begin(self, leg, guide):
+        return search(self.algorithm_name, range(len(self.known.elements)), guide)
+
+    def moment(self, rate=1.0):
+        return Moment(
+            self.leg,
+            tuple(self.winners),
+            self.left,
+            self.pair,
+            self.begin,
+            self.guide,
+            self.memory,
+            replace(self.known, trials=tuple(self.trials)),
+            self.shown,
+            self.refused,
+            rate,
+        )
+
+    def carried_through(self):
+        """(the forecast's low, likely, high; the tests that were left) in each round."""
+        steps, answer = search_on(self, self.leg), None
+        while True:
+            try:
+                step = steps.send(answer)
+            except StopIteration as end:
+                assert end.value[-1] == self.needed
+                return [(*expected, len(self.trials) - at) for at, expected in self.told]
+            answer = None
+            match step:
+                case Wants():
+                    test = step.tests[0]
+                    shows = self.made[test.environment, test.run] = self.needed <= test.environment
+                    self.trials.append(Trial(test.environment, shows, self.known.elements))
+                case RoundBegan():
+                    self.told.append((len(self.trials), interval(list(plays(self.moment())))))
+                case Similar():
+                    self.left, answer = step.environment, True
+                case RoundEnded():
+                    self.winners.append(step.winner)
 
 
 def searched(known, needed, algorithm="ddenv", pair=NEAR, iterations=3, **options):
-    """Plays a search and forecasts each round: (the forecast's low, likely, high; the tests that were left)."""
-    trials, verdicts, told = [], {}, []
-    guide = make_guide(*split_pair(pair), lambda: replace(known, trials=trials), runs=lambda: 1 + iterations, **options)
-    memory = Memory()
-    searching, winner = search(algorithm, known.elements, memory.of(guide)), None
-    try:
-        while True:
-            round = searching.send(winner)
-            now = replace(known, trials=tuple(trials))
-            moment = Moment(
-                algorithm, pair, known.elements, round.environment, guide, memory, now, Acceptance(1 + iterations), 1.0
-            )
-            told.append((len(trials), interval(list(plays(moment)))))
-            winner = None
-            for one in round.candidates:
-                if one.models not in verdicts:
-                    verdicts[one.models] = shows = needed <= one.models
-                    trials += [Trial(one.models, shows)] * (1 if shows else 1 + iterations)
-                if verdicts[one.models]:
-                    winner = one
-                    break
-    except StopIteration as end:
-        assert end.value == needed
-        return [(*expected, len(trials) - at) for at, expected in told]
+    return Searched(known, needed, algorithm, pair, iterations, **options).carried_through()
 
 
 def first(models, algorithm="ddenv", pair=NEAR, iterations=3, rate=1.0, known=None, **options):
     known = world(models) if known is None else known
-    guide = make_guide(*split_pair(pair), lambda: known, **options)
-    return Moment(
-        algorithm, pair, known.elements, known.elements, guide, Memory(), known, Acceptance(1 + iterations), rate
-    )
+    driver = Searched(known, NOTHING, algorithm, pair, iterations, **options)
+    driver.trials = list(known.trials)
+    for trial in known.trials:
+        for run in range(1 + iterations):
+            driver.made[trial.environment, run] = trial.similar
+    return driver.moment(rate)
 
 
 def likely(*arguments, **options):
@@ -116,8 +168,10 @@ def test_what_makes_a_search_longer_is_expected_to():
 
 def test_models_that_are_known_to_be_needed_make_a_search_longer():
     known = world(60)
-    everything = frozenset(known.elements)
-    missed = [Trial(everything - set(known.elements[place : place + 6]), False) for place in range(0, 60, 6)]
+    everything = Environment.whole(60)
+    missed = [
+        Trial(everything - Environment.of(range(place, place + 6)), False, known.elements) for place in range(0, 60, 6)
+    ]
     assert likely(60, **BEST) < likely(60, known=replace(known, trials=missed), **BEST)
 
 
