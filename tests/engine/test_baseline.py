@@ -82,14 +82,7 @@ def test_another_failure_can_be_chosen_by_its_number():
     ]
     second = ran(*runs, wanted=2)
     assert (second.failure_test, second.failures, second.position) == (1, 2, (5.0, 0.0, 0.0))
-    assert second["outcomes"] == {
-        "1": "similar",
-        "2": "other",
-        "3": "other",
-        "5": "other",
-        "6": "similar",
-        "7": "other",
-    }
+    assert second.judged.outcomes == {1: "similar", 2: "other", 3: "other", 5: "other", 6: "similar", 7: "other"}
     assert ran(*runs, wanted=4) == (
         "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "
         "2. fell at (5.00, 0.00) in 2 runs; 3. lost at (-9.00, 0.00) in 1 run"
