@@ -203,7 +203,7 @@ def reduce(
             complement_order=complement_order,
             growth=growth,
             skip=skip,
-            rate=lambda: caller.rate() if iterations else 1.0,
+            rate=lambda: leg.rule.rate or caller.share_shown,
             runs=lambda: leg.rule.misses,
         )
         return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
@@ -270,6 +270,11 @@ class _Caller:
 
     def refused_by_user(self, environment: Environment) -> bool:
         return False
+
+    @property
+    def share_shown(self) -> float:
+        """The share of the calls with all elements that showed the failure; 1 before the first."""
+        return sum(self._of_whole) / len(self._of_whole) if self._of_whole else 1.0
 
     def rate(self) -> float:
         return estimated_rate(sum(self._of_whole), len(self._of_whole))
