@@ -31,8 +31,8 @@ from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.events import CandidateJudged, CertificateFinished
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
-from ddenv.runs.scenarios import scenario_for_world
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts, scenario_for_world
 
 SHORTEST, LONGEST_TEST = 20.0, 60.0  # s
 NEEDED = 3

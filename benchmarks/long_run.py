@@ -35,7 +35,7 @@ from ddenv.runfile.events import (
     TestStarted,
 )
 from ddenv.runfile.store import ROBOT, RunFile, create
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 PARTS = 50
 RUNS = 4

@@ -23,6 +23,7 @@ from typing import Any
 import yaml
 from docs.lessons.delivery import outcome
 from docs.lessons.quay import rate
+from docs.lessons.record_plays import record_plays
 from docs.lessons.toys import DELIVERY, QUAY, SIMULATOR, TOYS, Box, Toy
 
 from ddenv.runfile.fold import fold
@@ -88,8 +89,7 @@ def record(name: str) -> None:
     if name in ORACLES:
         (LESSONS / f"{recorded.world}.oracle.json").write_text(ORACLES[name](), encoding="utf-8")
     if name == "delivery":
-        lesson = LESSONS / "1-what-delta-debugging-is.yaml"
-        subprocess.run((sys.executable, "-m", "ddenv", "learn", "--record", str(lesson)), check=True)
+        record_plays(LESSONS / "1-what-delta-debugging-is.yaml")
 
 
 def written(toy: Toy, folder: Path, reduction: Mapping[str, Any]) -> Path:

@@ -301,8 +301,7 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
 
 def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
     from ddenv.cli.command_line import app
-    from ddenv.runs.creation import read_parts
-    from ddenv.runs.scenarios import with_options
+    from ddenv.runs.subject import read_parts, with_options
 
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
     monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, RunState()))

@@ -25,7 +25,7 @@ from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 
 # What every run notices, in s; the ground is no element.
@@ -138,7 +138,7 @@ def drive(
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)

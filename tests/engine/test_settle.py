@@ -12,15 +12,16 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
 from ddenv.engine.settle import note_start
 from ddenv.errors import UserError
-from ddenv.runfile.supports import stacks
 from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runfile.supports import stacks
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts
 from ddenv.words import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import Guided, numbers, until

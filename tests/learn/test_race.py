@@ -6,8 +6,8 @@ import sqlite3
 
 import pytest
 from docs.lessons import delivery
+from docs.lessons.record_plays import record_plays
 
-from ddenv.cli.record_plays import record_plays
 from ddenv.errors import UserError
 from ddenv.learn.plays import Play, plays_of_runs, recorded_play
 from ddenv.learn.race import KINDS, Race, bet, result, tally, why

@@ -3,9 +3,9 @@
 from itertools import pairwise
 
 import pytest
+from ddenv.engine.certify import MOST_STEPS_BACK
 
 from ddenv import schemas
-from ddenv.engine.certify import MOST_STEPS_BACK
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import MOST_ALONE, MOST_BROKEN, MOST_PAIRS
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS

@@ -17,7 +17,7 @@ from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.run.processes import last_line
 from ddenv.workbench.runs.recent_runs import recent_runs
 from ddenv.workbench.wording import about, brief, duration, metres, percent, plain, shorten
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 
 def snapshot(run, engine="alive") -> Snapshot:

@@ -20,7 +20,7 @@ from ddenv.evidence.certificate import Procedure, Terms, error_of, falls
 from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import by_chunks
 from ddenv.reduction.guide import Search
-from ddenv.reduction.procedure import Driver, NamedClaim, Step, judge, settled
+from ddenv.reduction.procedure import NamedClaim, Runs, Step, judge, settled
 from ddenv.reduction.round import Candidate, Partition, Round
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import Verdict
@@ -75,9 +75,9 @@ class Checked:
 
 @dataclass(frozen=True)
 class Asked:
-    """An isolation: of `whole`, the suspects may go, first to last, at first `size` of them; `stacks` has what goes with each.
+    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each.
 
-    The claims of each check are wrong with the error of its number. Its fresh runs begin `block` runs after those of the one before.
+    Each check has the error of its number, and begins `block` runs after the one before.
     """
 
     whole: Environment
@@ -92,7 +92,7 @@ class Asked:
 
 
 def isolation(
-    driver: Driver, asked: Asked, checks: Sequence[Checked] = ()
+    driver: Runs, asked: Asked, checks: Sequence[Checked] = ()
 ) -> Generator[Step | Checked, Any, Environment | None]:
     """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
     checks = list(checks)
@@ -117,7 +117,7 @@ def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environ
 
 
 def _search(
-    driver: Driver, asked: Asked, smaller: Environment, refuted: set[Environment]
+    driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
 ) -> Generator[Step | Checked, Any, Environment]:
     """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
     if smaller:
@@ -138,7 +138,7 @@ def _search(
         winner = None if place is None else candidates[place]
 
 
-def _check(driver: Driver, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
+def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
     """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
     passing, error = asked.whole - removed, error_of(number + 1) / 2.0
     backs = [model for model in asked.suspects if model in removed]

@@ -12,7 +12,7 @@ from ddenv.reduction.evidence import Evidence, Names, nearest_on_path
 
 
 def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess whose centroid is near the place where the robot failed are tried first. Good if the cause stands where the robot
+    """Partitions whose centroid is near the place where the robot failed are tried first. Good if the cause stands where the robot
     got stuck; it ignores what happened on the way there.
 
     Paper, Algorithm 3. The scores are distances in m.
@@ -23,7 +23,7 @@ def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[fl
 
 
 def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess whose centroid has the smallest mean distance to the robot, over its whole last similar run, are tried first. What
+    """Partitions whose centroid has the smallest mean distance to the robot, over its whole last similar run, are tried first. What
     disturbed the robot early counts as much as what stood where it failed.
 
     The scores are distances in m.
@@ -33,7 +33,7 @@ def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
 
 def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess whose centroid the robot came nearest to, at any time of its last similar run, are tried first. What the robot
+    """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are tried first. What the robot
     only passed counts as much as what it failed at.
 
     The scores are distances in m, to the segments of the path.
@@ -44,8 +44,8 @@ def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> 
 
 
 def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess are tried in the order in which the robot first sensed any of their models in its last similar run: by touch, or
-    within the range and the field of view of its sensors. Namess that it never sensed come last. Good if an early disturbance
+    """Partitions are tried in the order in which the robot first sensed any of their models in its last similar run: by touch, or
+    within the range and the field of view of its sensors. Partitions that it never sensed come last. Good if an early disturbance
     leads to the failure.
 
     The scores are in s.
@@ -55,7 +55,7 @@ def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
 
 
 def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess are tried in the order in which their first models appear in the world file. It knows nothing about the failure: a
+    """Partitions are tried in the order in which their first models appear in the world file. It knows nothing about the failure: a
     yardstick for the schemas that do, and right if the order of the file means something.
 
     The scores are places in the file.
@@ -65,7 +65,7 @@ def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
 
 
 def random(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
-    """Namess are tried in a random order, fixed by the seed and the round, so that repeated runs use the same order. The
+    """Partitions are tried in a random order, fixed by the seed and the round, so that repeated runs use the same order. The
     baseline that every other prioritization has to beat.
 
     The scores mean nothing.

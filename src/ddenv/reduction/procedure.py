@@ -138,8 +138,8 @@ class Certified:
 class SteppedBack:
     """What is left lost the rate. The search goes back to place number `place` of the chain.
 
-    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on fresh `tests`, as (environment, run). The
-    answer is the next leg.
+    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
+    fresh `tests`, as (environment, run). The answer is the next leg.
     """
 
     place: int
@@ -173,14 +173,17 @@ Step = (
 
 @dataclass(frozen=True)
 class Leg:
-    """Where a search begins: `chain` leads from the world in which f was seen to the environment that is searched.
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back.
+
+    What is left has to keep the rate of f in `whole`.
 
     `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
-    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the usual
-    number. The groups `again` are left out first.
+    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
+    usual number. The groups `again` are left out first.
     """
 
     first_round: int
+    whole: Environment
     chain: tuple[Environment, ...]
     pinned: Environment
     free: dict[int, Environment]
@@ -207,11 +210,11 @@ class NamedClaim:
     claim: Claim
 
 
-class Driver(Protocol):
-    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
+class Runs(Protocol):
+    """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
 
     def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
-        """Whether a run showed f; None if it has not ended. With `full` only a run to its end counts."""
+        """Whether a run showed what is looked for; None if it has not ended. With `full` only a run to its end counts."""
 
     def refused(self, environment: Environment) -> bool:
         """Whether the environment is not taken: the user refused it, or it is part of what lost the rate."""
@@ -226,6 +229,10 @@ class Driver(Protocol):
     @property
     def workers(self) -> int:
         """How many tests can be made at the same time."""
+
+
+class Driver(Runs, Protocol):
+    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
 
     def rate(self) -> float:
         """The rate of f in the world in which it was seen, from all of its runs that decisions rest on."""
@@ -311,7 +318,7 @@ def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Generator[Ste
 
 
 def judge(
-    driver: Driver, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
+    driver: Runs, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
 ) -> Generator[Step, Any, int | None]:
     """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
 
@@ -339,9 +346,9 @@ def judge(
         yield Wants(tuple(Test(environments[index], run, why, index) for index, run in now.wanted))
 
 
-def _judged(driver: Driver, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
+def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
     if driver.refused(environment):
-        return Judged(index, environment, verdict, 0)
+        return Judged(index, environment, "missed", 0)
     # By these runs alone: more of them may have ended.
     runs, hits = decided_by(lambda run: driver.shown(environment, run), rule)
     missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
@@ -350,7 +357,7 @@ def _judged(driver: Driver, index: int, environment: Environment, verdict: str, 
 
 def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
     """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
-    left, whole = chain[-1], chain[0]
+    left, whole = chain[-1], leg.whole
     certificate: Certificate = yield CertificateDue()
     terms = replace(certificate.terms, error=certificate.terms.error / 2)
     rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
@@ -371,7 +378,7 @@ def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator
 
 
 def settled(
-    driver: Driver,
+    driver: Runs,
     claims: Callable[[], Iterable[tuple[int | None, Environment, Procedure]]],
     ends: Callable[[NamedClaim], bool],
     first_run: int,
@@ -382,11 +389,16 @@ def settled(
     def fresh(environment: Environment, run: int) -> Shown:
         return driver.shown(environment, first_run + run, full=True)
 
+    # Hundreds of runs need not be looked at again once they have decided.
+    decided: dict[int | None, NamedClaim] = {}
     while True:
         named: list[NamedClaim] = []
         for model, environment, shows in claims():
-            named.append(NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
-            if ends(named[-1]):
+            named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            if named[-1].claim.verdict:
+                decided[model] = named[-1]
+            # Each open claim has work for a worker.
+            if ends(named[-1]) or sum(not one.claim.verdict for one in named) == driver.workers:
                 break
         tests = dict.fromkeys(
             Test(environment, first_run + run, why, without=_left_out(named, environment))
@@ -416,15 +428,15 @@ def onward(
     if not driver.goes_on():
         return None
     left, *removals = certified.claims
-    after: Leg | None = None
     if left.claim.verdict == "lost":
         if leg.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
-            after = yield from _step_back(driver, chain, certified)
-        return after
-    spare = next((claim for claim in removals if claim.claim.verdict == "not needed"), None)
-    if spare is not None and spare.model is not None and not driver.refused(spare.environment):
-        after = yield LeftOut(spare.model, spare.environment)
-    return after
+            return (yield from _step_back(driver, chain, certified))
+        return None
+    for claim in removals:
+        if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
+            after: Leg = yield LeftOut(claim.model, claim.environment)
+            return after
+    return None
 
 
 def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any
 
 from ddenv.arrays import Floats
 from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import Terms, Verdict, error_of
 from ddenv.evidence.rates import Shown, estimated_rate, wilson_interval
-from ddenv.reduction.algorithms import sweep
 from ddenv.reduction.arguments import (
     checked_choice,
     checked_count,
@@ -19,7 +20,6 @@ from ddenv.reduction.arguments import (
     checked_names,
     checked_number,
     checked_positions,
-    checked_share,
     checked_times,
     checked_traits,
     checked_trajectory,
@@ -30,6 +30,7 @@ from ddenv.reduction.procedure import (
     BaselineRan,
     Certificate,
     CertificateDue,
+    Certified,
     FailureFixed,
     LeftOut,
     Leg,
@@ -42,7 +43,8 @@ from ddenv.reduction.procedure import (
     procedure,
     search_on,
 )
-from ddenv.reduction.procedure import Test as TestOf
+from ddenv.reduction.procedure import Step as ProcedureStep
+from ddenv.reduction.procedure import Test as ProcedureTest
 from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Partition, Round
 from ddenv.reduction.stepping_back import tried_again
 from ddenv.reduction.verdict import Acceptance, standing
@@ -52,7 +54,6 @@ NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothi
 FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 100_000
 
 Test = Callable[[frozenset[str]], bool]
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,7 @@ def reduce(
     checked_choice("skip", skip, ("known", "implied"))
     checked_choice("prior", prior, ("spatial", "uniform"))
     checked_count("baseline_runs", baseline_runs, 1)
-    checked_share("keep_rate", keep_rate, 0.95)
+    checked_number("keep_rate", keep_rate, 0.95)
     checked_choice("accept_rate", accept_rate := accept_rate or ("kept" if iterations else "first"), ("first", "kept"))
 
     def begin(leg: Leg) -> Search:
@@ -197,7 +198,7 @@ def reduce(
             prioritization,
             lambda: replace(known, trials=caller.trials),
             prior=prior,
-            n_partitions=n_partitions,
+            n_partitions=leg.n_partitions or n_partitions,
             candidates=candidates,
             complement_order=complement_order,
             growth=growth,
@@ -205,29 +206,30 @@ def reduce(
             rate=lambda: caller.rate() if iterations else 1.0,
             runs=lambda: leg.rule.misses,
         )
-        return search(algorithm, range(len(names)), guide)
+        return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
 
     keeps_rate = accept_rate == "kept"
     caller = _Caller(names, test, begin, keep_rate if keeps_rate else 0.0, iterations, baseline_runs, on_round)
     # A missing argument is reported before the first test.
     next(begin(caller.leg()), None)
     if keeps_rate:
-        certified = caller.carry_out(procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
-        claims = tuple(map(caller.plain, certified.claims))
-        minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
+        caller.carry_out(procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
+        minimal = all(claim.verdict in ("kept", "needed") for claim in caller.claims)
     else:
         if check:
             caller.carry_out(baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
-        leg, claims = caller.leg(), ()
-        left = caller.carry_out(search_on(caller, leg))[-1]
-        rests = [left - Environment.of((element,)) for element in left]
+        leg = caller.leg()
+        caller.carry_out(search_on(caller, leg))
+        rests = [caller.left - Environment.of((element,)) for element in caller.left]
         minimal = all(standing([rest], caller.shown, leg.rule).verdicts[0] == "dissimilar" for rest in rests)
-    tests = caller.baseline_tests, len(caller.trials), caller.certificate_tests
-    return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, claims)
+    tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
+    return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
 
 
 class _Caller:
     """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides."""
+
+    refusals, workers = 0, 1
 
     def __init__(
         self,
@@ -240,17 +242,21 @@ class _Caller:
         on_round: Callable[[NamedRound], None] | None,
     ) -> None:
         self._names, self._test, self._begin, self._on_round = names, test, begin, on_round
-        self._keep_rate, self._most_misses, self._baseline_runs = keep_rate, 1 + iterations, baseline_runs
+        self._keep_rate, self._iterations, self._baseline_runs = keep_rate, iterations, baseline_runs
         self.whole = Environment.whole(len(names))
+        # By what they were made for: "baseline", "round" or "certify".
+        self.calls: Counter[str] = Counter()
         self.trials: list[Trial] = []
-        self.baseline_tests = self.certificate_tests = self.rounds = 0
+        self.rounds = 0
         self.history = [Step(0, names)]
-        self.refusals = 0
-        self.workers = 1
+        self.claims: tuple[RateClaim, ...] = ()
         self._known: dict[tuple[Environment, int], bool] = {}
-        # How often the failure showed with all elements, and in how many calls beside the search.
-        self._of_whole = (0, 0)
+        # What calls with all elements showed.
+        self._of_whole: list[bool] = []
         self._chain: tuple[Environment, ...] = (self.whole,)
+        # n of the last round in each environment, or of the round that reached it.
+        self._n_partitions: dict[Environment, int] = {}
+        self._last_n: int | None = None
         self._lost: list[Environment] = []
         self._certificates = 0
 
@@ -266,95 +272,105 @@ class _Caller:
         return False
 
     def rate(self) -> float:
-        return estimated_rate(*self._of_whole)
+        return estimated_rate(sum(self._of_whole), len(self._of_whole))
 
     def goes_on(self) -> bool:
         return True
 
     def algorithm(self, leg: Leg) -> Search:
-        left = tuple(leg.chain[-1])
-        if leg.again:
-            return tried_again(left, leg.again, sweep)
-        return sweep(left) if self._certificates else self._begin(leg)
+        return self._begin(leg)
 
     # What it finds.
 
-    def carry_out(self, steps: Generator[Any, Any, Result]) -> Result:
+    def carry_out(self, steps: Generator[ProcedureStep, Any, object]) -> None:
         """To the end. Raises UserError if the failure never shows in the baseline."""
         answer: object = None
         while True:
             try:
                 step = steps.send(answer)
-            except StopIteration as end:
-                result: Result = end.value
-                return result
+            except StopIteration:
+                return
             answer = self._answer(step)
 
-    def _answer(self, step: Any) -> object:
+    def _answer(self, step: ProcedureStep) -> object:
         match step:
             case Wants():
                 self._call(step.tests[0])
             case BaselineRan():
-                if not self._of_whole[0]:
-                    raise UserError(NOTHING_TO_REDUCE)
-                return self._of_whole[0]
+                return self._failures()
             case FailureFixed():
                 return self.leg()
             case RoundBegan():
-                self.rounds += 1
-                if self._on_round is not None:
-                    self._on_round(self._named(step.round))
+                self._begin_round(step.round)
             case Similar():
-                self._go((*self._chain, step.environment))
+                self._go(*self._chain, step.environment)
                 return True
             case CertificateDue():
-                self._certificates += 1
-                terms = Terms(self._keep_rate, self.rate(), error_of(self._certificates), self._baseline_runs)
-                return Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+                return self._certificate()
+            case Certified():
+                self.claims = tuple(self._claim(claim, step.certificate.first_run) for claim in step.claims)
+            case LeftOut():
+                self._go(*self._chain, step.environment)
+                return self.leg()
             case SteppedBack():
                 self._lost.append(self._chain[step.place + 1])
-                self._go(self._chain[: step.place + 1])
+                self._go(*self._chain[: step.place + 1])
                 return self.leg(step.again)
-            case LeftOut():
-                self._go((*self._chain, step.environment))
-                return self.leg()
         return None
+
+    def _call(self, asked: ProcedureTest) -> None:
+        shown = bool(self._test(frozenset(asked.environment.names(self._names))))
+        self.calls[asked.why] += 1
+        self._known[asked.environment, asked.run] = shown
+        if asked.why == "round":
+            self.trials.append(Trial(asked.environment, shown, self._names))
+        elif asked.environment == self.whole:
+            self._of_whole.append(shown)
+
+    def _failures(self) -> int:
+        if not any(self._of_whole):
+            raise UserError(NOTHING_TO_REDUCE)
+        return sum(self._of_whole)
 
     def leg(self, again: tuple[Partition, ...] = ()) -> Leg:
         """The next search, from what is left."""
         rate = self.rate() if self._keep_rate else 0.0
-        rule = Acceptance(self._most_misses, rate, self._keep_rate, len(self._lost))
-        free = {element: Environment.of((element,)) for element in self._chain[-1]}
-        return Leg(self.rounds + 1, self._chain, NOTHING, free, rule, again=again)
+        rule = Acceptance(1 + self._iterations, rate, self._keep_rate, len(self._lost))
+        free = {element: Environment.of((element,)) for element in self.left}
+        n_partitions = self._n_partitions.get(self.left)
+        return Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
 
-    def _go(self, chain: tuple[Environment, ...]) -> None:
+    @property
+    def left(self) -> Environment:
+        """The environment that was reached."""
+        return self._chain[-1]
+
+    def _begin_round(self, round: Round) -> None:
+        self.rounds += 1
+        self._last_n = self._n_partitions[self.left] = round.n_partitions
+        if self._on_round is not None:
+            candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
+            self._on_round(
+                NamedRound(self._named(round.environment), tuple(map(self._named, round.partitions)), candidates)
+            )
+
+    def _named(self, models: Partition) -> Names:
+        return tuple(self._names[model] for model in models)
+
+    def _go(self, *chain: Environment) -> None:
+        """On, or back, along `chain`."""
         self._chain = chain
-        tests = self.baseline_tests + len(self.trials) + self.certificate_tests
-        self.history.append(Step(tests, chain[-1].names(self._names)))
+        if self._last_n is not None:
+            self._n_partitions.setdefault(self.left, self._last_n)
+        self.history.append(Step(self.calls.total(), self.left.names(self._names)))
 
-    def _call(self, asked: TestOf) -> None:
-        shown = bool(self._test(frozenset(asked.environment.names(self._names))))
-        self._known[asked.environment, asked.run] = shown
-        if asked.why == "round":
-            self.trials.append(Trial(asked.environment, shown, self._names))
-            return
-        self.baseline_tests += asked.why == "baseline"
-        self.certificate_tests += asked.why == "certify"
-        if asked.environment == self.whole:
-            hits, runs = self._of_whole
-            self._of_whole = hits + shown, runs + 1
+    def _certificate(self) -> Certificate:
+        self._certificates += 1
+        terms = Terms(self._keep_rate, self.rate(), error_of(self._certificates), self._baseline_runs)
+        return Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
 
-    def _named(self, round: Round) -> NamedRound:
-        def names(models: Partition) -> Names:
-            return tuple(self._names[model] for model in models)
-
-        candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
-        return NamedRound(names(round.environment), tuple(map(names, round.partitions)), candidates)
-
-    def plain(self, claim: NamedClaim) -> RateClaim:
-        """A claim of the last certificate, for people."""
-        first, runs = FIRST_FRESH + self._certificates * EACH_CERTIFICATE, claim.claim.runs
-        hits = sum(self._known[claim.environment, first + run] for run in range(runs))
-        low, high = wilson_interval(hits, runs) if runs else (0.0, 1.0)
-        without = None if claim.model is None else self._names[claim.model]
-        return RateClaim(without, claim.claim.verdict, hits, runs, low, high)
+    def _claim(self, named: NamedClaim, first: int) -> RateClaim:
+        runs = named.claim.runs
+        shown = sum(self._known[named.environment, first + run] for run in range(runs))
+        without = None if named.model is None else self._names[named.model]
+        return RateClaim(without, named.claim.verdict, shown, runs, *wilson_interval(shown, runs))

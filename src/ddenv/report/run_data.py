@@ -107,7 +107,7 @@ def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...],
 
 
 def _world(file: RunFile, troubles: list[str]) -> World | None:
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     try:
         return read_parts(file)[1]

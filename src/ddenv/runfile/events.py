@@ -7,10 +7,10 @@ from 1. A field with a default may be missing in a file. Times are in s, places 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
 from ddenv.environment import NOTHING, Environment
-from ddenv.runfile.reading import Range
+from ddenv.runfile.reading import OneOf, Range
 
 Natural = Annotated[int, Range(0)]
 Number = Annotated[int, Range(1)]
@@ -19,9 +19,9 @@ Seconds = Annotated[float, Range(0)]
 Pair = tuple[Natural, Natural]
 Pose = tuple[float, float, float, float, float, float, float]
 Place = tuple[float, float, float]
-Phase = Literal["baseline", "round", "hand", "audit", "certify", "isolate"]
-Outcome = Literal["similar", "other", "pass", "error", "timeout", "failed"]
-Verdict = Literal["similar", "dissimilar", "unknown"]
+Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
+Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
+Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
 
 
 # The engine.
@@ -270,13 +270,12 @@ class LegStarted:
     """A search starts from the current environment, with round number `round`.
 
     Its first round has `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f
-    decides. The groups `again` are left out first.
+    decides.
     """
 
     round: Number
     n_partitions: Number | None = None
     rate: Share = 0.0
-    again: tuple[tuple[Natural, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +288,7 @@ class RoundStarted:
     n_partitions: Natural
     environment: Natural
     partitions: tuple[tuple[Natural, ...], ...]
-    candidates: tuple[tuple[Literal["partition", "complement"], Natural, float | None], ...]
+    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, float | None], ...]
     pinned: Environment = NOTHING
 
 
@@ -308,7 +307,7 @@ class CandidateJudged:
 
     round: Number
     candidate: Natural
-    verdict: Literal["similar", "missed", "dissimilar", "unknown"]
+    verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
     tests: tuple[Number, ...]
     known: Natural = 0
 
@@ -327,7 +326,7 @@ class Decided:
 
     round: Number
     candidate: Natural
-    decision: Literal["accept", "reject"]
+    decision: Annotated[str, OneOf("accept", "reject")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -392,7 +391,7 @@ class ClaimMade:
 
     without: Natural | None
     environment: Natural
-    verdict: Literal["kept", "lost", "needed", "not needed", "not shown", "unknown"]
+    verdict: Annotated[str, OneOf("kept", "lost", "needed", "not needed", "not shown", "unknown")]
     shown: Natural
     runs: Natural
     low: Share
@@ -459,7 +458,7 @@ class RemovalJudged:
     """What the search says of an environment of isolation."""
 
     environment: Natural
-    verdict: Literal["passes", "fails", "unknown"]
+    verdict: Annotated[str, OneOf("passes", "fails", "unknown")]
     tests: tuple[Number, ...]
 
 
@@ -468,7 +467,7 @@ class ReturnedMade:
     """A claim of a check: about a world that passes, or, if `back` is a model, about that with it put back."""
 
     back: Natural | None
-    verdict: Literal["passes", "fails", "needed", "not needed", "not shown", "unknown"]
+    verdict: Annotated[str, OneOf("passes", "fails", "needed", "not needed", "not shown", "unknown")]
     reached: Natural
     runs: Natural
     low: Share
@@ -503,7 +502,7 @@ class IsolationGivenUp:
 class AcceptModeChanged:
     """Reductions are made at once, or wait for the user."""
 
-    mode: Literal["automatic", "ask"]
+    mode: Annotated[str, OneOf("automatic", "ask")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -512,7 +511,7 @@ class Vetoed:
 
     round: Number
     candidate: Natural
-    verdict: Literal["vetoed", "rejected", "undone"] = "vetoed"
+    verdict: Annotated[str, OneOf("vetoed", "rejected", "undone")] = "vetoed"
     again: bool = False
 
 

@@ -273,7 +273,8 @@ def _round_finished(state: RunState, event: e.RoundFinished, _: float) -> Change
         last = len(round.candidates) if round.winner is None else round.winner + 1
         judged = ("similar", "missed", "dissimilar", "unknown")
         tests = (test for one in round.candidates[:last] if one.verdict in judged for test in one.tests)
-        past = PastRound(digest(round.split.parts), round.winner, tuple(dict.fromkeys(tests)))
+        evidence = None if round.winner is None else state.evidence_test
+        past = PastRound(digest(round.split.parts), round.winner, evidence, tuple(dict.fromkeys(tests)))
         changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
     return changes
 

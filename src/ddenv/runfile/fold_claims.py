@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ddenv.runfile import events as e
 from ddenv.runfile.fold_decisions import arrived, listed, origin, searched_anew, without_open
-from ddenv.runfile.fold_tests import Changes, counts, removal_of, with_node
+from ddenv.runfile.fold_tests import Changes, counts, with_node, with_removal
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Point, Returned
 from ddenv.runfile.state import OUTCOMES, RunState, Test
@@ -71,6 +71,7 @@ def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
         "nodes": with_node(state.nodes, replace(lost, lost_rate=True)),
         "lost": (*state.lost, (state.failures, state.environments[lost.id])),
         "steps_back": state.steps_back + 1,
+        "again": event.again,
         "node": node.number,
         "came_at": state.tests_done,
         "environment": node.environment,
@@ -112,23 +113,24 @@ def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> C
 
 def removal_judged(state: RunState, event: e.RemovalJudged, _: float) -> Changes:
     _check_tests(state, event.tests)
-    number = _removal(state, event.environment)
-    after = replace(state.removals[number - 1], verdict=event.verdict, tests=event.tests)
-    return {"removals": state.removals.changed(number - 1, after)}
+    removals, number = with_removal(state, event.environment)
+    after = replace(removals[number - 1], verdict=event.verdict, tests=event.tests)
+    return {"removals": removals.changed(number - 1, after)}
 
 
 def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> Changes:
     _check_tests(state, event.tests)
     last = _open(state)
-    check = Check(_removal(state, event.environment), tuple(_returned(state, claim) for claim in event.claims))
+    removals, number = with_removal(state, event.environment)
+    check = Check(number, tuple(_returned(state, claim) for claim in event.claims))
     if not check.claims or check.claims[0].back is not None:
         raise ValueError(event)
-    return {"isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
+    return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
 
 
 def isolation_finished(state: RunState, event: e.IsolationFinished) -> Changes:
     last = _open(state)
-    removal = None if event.environment is None else _removal(state, event.environment)
+    removal = None if event.environment is None else with_removal(state, event.environment)[1]
     if removal is not None and (not last.checks or last.checks[-1].removal != removal):
         raise ValueError(removal)
     return {"isolations": (*state.isolations[:-1], replace(last, ended=True, found=removal))}
@@ -149,14 +151,6 @@ def _open(state: RunState) -> Isolation:
     if last is None:
         raise ValueError("no isolation")
     return last
-
-
-def _removal(state: RunState, environment: int) -> int:
-    """The number of the removal that left an environment, from 1. Raises ValueError if it was not tried."""
-    number = removal_of(state, environment)
-    if number is None:
-        raise ValueError(environment)
-    return number
 
 
 # Slices.

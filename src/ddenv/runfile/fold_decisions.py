@@ -187,9 +187,9 @@ def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
         rate=event.rate,
         steps_back=state.steps_back,
         tests=tuple(test for test in state.judged if state.tests[test - 1].is_finished),
-        again=event.again,
+        again=state.again,
     )
-    return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg}
+    return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
 
 
 # What several events do.

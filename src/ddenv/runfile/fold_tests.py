@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from ddenv.runfile import events as e
 from ddenv.runfile.failures import Baseline, SeenFailure
+from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.progress import Node, Point, Removal
 from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
 
@@ -18,10 +19,9 @@ MAY_BE_AHEAD = ("round", CERTIFY)
 
 
 def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
-    removals = state.removals
-    if event.phase == ISOLATE and removal_of(state, event.environment) is None:
-        gone = (state.environments[0] - state.environments[event.environment]).names(state.elements)
-        removals = removals.added(Removal(gone, event.environment))
+    removals, removal = state.removals, None
+    if event.phase == ISOLATE:
+        removals, removal = with_removal(state, event.environment)
     test = Test(
         id=event.test,
         environment=event.environment,
@@ -32,7 +32,7 @@ def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) ->
         seed=event.seed,
         without=None if event.without is None else state.elements[event.without],
         trial=event.trial,
-        removal=removal_of(state.changed(removals=removals), event.environment) if event.phase == ISOLATE else None,
+        removal=removal,
         audits=event.audits if isinstance(event, e.TestStarted) else None,
         node=_node_of(state, event),
         engine=state.engines,
@@ -65,10 +65,14 @@ def _node_of(state: RunState, event: e.TestStarted | e.Implied) -> int:
     return state.node
 
 
-def removal_of(state: RunState, environment: int) -> int | None:
-    """The number of the removal that left an environment, from 1."""
+def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Removal], int]:
+    """The removals, with the one that left an environment, and its number, from 1."""
     numbered = zip(range(len(state.removals), 0, -1), reversed(state.removals), strict=True)
-    return next((number for number, removal in numbered if removal.environment == environment), None)
+    for number, removal in numbered:
+        if removal.environment == environment:
+            return state.removals, number
+    gone = (state.environments[0] - state.environments[environment]).names(state.elements)
+    return state.removals.added(Removal(gone, environment)), len(state.removals) + 1
 
 
 def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:

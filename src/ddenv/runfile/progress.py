@@ -32,10 +32,14 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class PastRound:
-    """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts."""
+    """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts.
+
+    `evidence_test` is the run of the winner that guides the next rounds.
+    """
 
     digest: int
     winner: int | None
+    evidence_test: int | None
     tests: tuple[int, ...]
 
 

@@ -38,6 +38,13 @@ class Range:
         return f"{self.least:g} or more" if self.most == LARGEST else f"{self.least:g} to {self.most:g}"
 
 
+class OneOf:
+    """The allowed words of a field, `Annotated` with it."""
+
+    def __init__(self, *words: str) -> None:
+        self.words = words
+
+
 def read(kind: type[Data], data: Any) -> Data:
     """An object of a dataclass from plain data. Raises Invalid."""
     made: Data = _of_dataclass(kind)(data)
@@ -114,7 +121,8 @@ def _made(kind: Any) -> Reader:
 def _reader(hint: Any) -> Reader:
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        return _number(arguments[0], arguments[1])
+        allowed = arguments[1]
+        return _choice(allowed.words) if isinstance(allowed, OneOf) else _number(arguments[0], allowed)
     if origin is Literal:
         return _choice(arguments)
     if origin in (Union, types.UnionType):

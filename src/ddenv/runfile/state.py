@@ -48,7 +48,7 @@ class RunState:
     tests, nodes and tries have their numbers. `leg` is the current search; once `search_due`, a new one has to begin. `judged` are
     the tests that verdicts rest on, in their order. `refused` environments are not taken because the user said so, `lost` ones with
     all of their parts because they lost the rate of f, each beside the failures that counted as f then: the search went so many
-    `steps_back`.
+    `steps_back`, and leaves out the groups `again` first in the next leg.
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
@@ -84,6 +84,7 @@ class RunState:
     refusals: int = 0
     lost: tuple[tuple[tuple[int, ...], Environment], ...] = ()
     steps_back: int = 0
+    again: tuple[tuple[int, ...], ...] = ()
     engines: int = 0
     left_unknown: bool = False
     mixed_until: int = 0

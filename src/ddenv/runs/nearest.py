@@ -16,7 +16,7 @@ from ddenv.evidence.claims import is_nearest, of_passing
 from ddenv.runfile.progress import Isolation
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
-from ddenv.runs.reasons import GOAL, F, Parting, parted, parting_unknown, where_they_part
+from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
 
 # Instants at which the two runs are compared, from where they part to the end of the shorter one.
 INSTANTS = 8
@@ -76,12 +76,8 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
         first, second = file.trajectory(failing.id), file.trajectory(passing.id)
     except UserError as error:
         return Nearest(gone, words, shown, lacks=str(error))
-    equal, apart, place = parted(first, second)
-    touched = {model: at for model, at in failing.first_touched if model in gone}
-    met = touched or {model: at for model, at in failing.first_sensed if model in gone}
-    earliest = min(met, key=met.__getitem__, default="")
-    parting = Parting(failing.id, passing.id, failing.seed, equal, apart, place, met.get(earliest), bool(touched))
-    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, equal)))
+    parting, earliest = parting_of(failing, passing, first, second, gone=gone)
+    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, parting.equal)))
 
 
 def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | None:

@@ -17,8 +17,7 @@ from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, reasons
 from ddenv.scene.draw import Scenery
 from ddenv.scene.shot import Shot
-from ddenv.world.motion import pose_of
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, pose_of
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5

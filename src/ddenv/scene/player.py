@@ -14,7 +14,7 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view
@@ -23,8 +23,8 @@ from ddenv.scene.played import pairs_of, play_of, rows_of
 from ddenv.scene.shot import Shot, live_pose, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
-from ddenv.world.motion import pose_of
 from ddenv.world.placement import spawn_pose
+from ddenv.world.pose import pose_of
 from ddenv.world.scenario import Goal, Spawn
 
 READ_EVERY = 0.1  # time between reads of the run file, s

@@ -19,7 +19,7 @@ from ddenv.study.study_folder import Sitting, run_path
 from ddenv.study.tables import best, section
 from ddenv.version import __version__
 from ddenv.words import count
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 
 def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:

@@ -13,7 +13,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.robot.external import pose_log, process
 from ddenv.world.load import load_scenario
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA, ROOT
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 
@@ -222,7 +222,7 @@ def test_a_lack_of_room_for_temporary_files_is_reported(simulator_of, monkeypatc
 KILLED = """
 import os, pathlib, sys
 from ddenv.robot.external.simulator import ExternalSimulator
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from tests.robot.external.own import SLEEP, own_scenario
 written = pathlib.Path.write_bytes
 pathlib.Path.write_bytes = lambda file, text: (written(file, text), os.kill(os.getpid(), 9))

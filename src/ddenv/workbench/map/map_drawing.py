@@ -120,7 +120,7 @@ class MapDrawing:
             return shown
         # NumPy is not loaded before something moves.
         from ddenv.workbench.map.moved_prints import MovedPrints
-        from ddenv.world.motion import pose_of
+        from ddenv.world.pose import pose_of
 
         if self._moved is None or self._moved.place is not shown.place:
             self._moved = MovedPrints(shown.place)

@@ -44,8 +44,8 @@ class Choice:
     @cached_property
     def robot(self) -> Model:
         """Raises UserError if its file cannot be read."""
-        from ddenv.runs.creation import read_parts
-        from ddenv.world.read import read_model
+        from ddenv.runs.subject import read_parts
+        from ddenv.world.sdf.read import read_model
 
         if not self.run:
             return read_model(self.settings.robot.model, self.reading)
@@ -101,7 +101,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
     """A scenario, a world or a run file; `options` are the command line's on how to read worlds. Raises UserError."""
     if path.suffix == ".ddenv":
         return _read_run(path)
-    from ddenv.runs.scenarios import reading_of, scenario_for_world
+    from ddenv.runs.subject import reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
 
@@ -118,7 +118,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
 def _read_run(path: Path) -> Choice:
     """The scenario and the world that a run file holds, wherever their own files are."""
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     with RunFile(path) as run:
         scenario, world, robot = read_parts(run)
@@ -154,7 +154,7 @@ def _ground(world: World, x: float, y: float) -> float | None:
 
 def _clearance(world: World, settings: Scenario, placed: bool) -> float:
     """The scenario's clearance, or else the clearance that the robot's shapes need."""
-    from ddenv.world.read import read_model
+    from ddenv.world.sdf.read import read_model
 
     above = _scenario_clearance(world, settings) if placed else None
     if above is not None:

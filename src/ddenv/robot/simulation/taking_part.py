@@ -1,0 +1,129 @@
+"""Which models can have changed a bit of a run: those without which the same run might go otherwise.
+
+Whatever nothing comes near changes no bit. So a model takes part if the robot or a model that is simulated may have touched it
+between two ticks, if a beam of a scan that the controller read ended on it, if it was simulated itself, or if it belongs to a pile
+that does not move as in the whole world. That is more than what touched, and never less.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ddenv.arrays import Booleans, Floats, Integers, Objects
+from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.result import PoseRow
+from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.world.extent import shape_bounds, stacked
+from ddenv.world.model import World, still_links
+from ddenv.world.pose import Pose, angle_between
+
+# What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
+SLACK = 0.05
+# Shapes this much farther from the models that are simulated are looked at again once those have moved that far, m.
+AROUND = 1.0
+
+
+@dataclass(frozen=True)
+class Solids:
+    """The boxes around all S shapes of a world that never move: corners `low` and `high` (S, 3) m, and the number of each owner.
+
+    `names` (N,) are the models that have such shapes. There are no planes.
+    """
+
+    names: Objects
+    owners: Integers
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def of(cls, world: World) -> Solids:
+        shapes = [(model.name, one) for model in world.models for link in still_links(model) for one in link.collisions]
+        number_of = {name: number for number, name in enumerate(dict.fromkeys(name for name, _ in shapes))}
+        owners = np.array([number_of[name] for name, _ in shapes], dtype=int)
+        low, high = stacked(shape_bounds(one.shape, one.pose) for _, one in shapes)
+        return cls(np.array([*number_of], dtype=object), owners, low, high)
+
+
+class Reached:
+    """The models that never move which the robot, or a model that is simulated, may have touched in one run.
+
+    `hull` is the robot's; `present` are the models that are kept. No two ticks are more than `period` (s) apart.
+    """
+
+    def __init__(self, solids: Solids, hull: Hull, sleep: Sleep, present: frozenset[str], period: float) -> None:
+        self._hull, self._sleep, self._period = hull, sleep, period
+        self._names = solids.names
+        there = np.array([name in present for name in solids.names], dtype=bool)[solids.owners]
+        # The shapes of models that were not reached yet.
+        self._owners, self._low, self._high = solids.owners[there], solids.low[there], solids.high[there]
+        self._found: Booleans = np.zeros(len(solids.names), dtype=bool)
+        # From `_place` on the robot may move by `_free` (m) and reach nothing new.
+        self._place: PoseRow | None = None
+        self._free = 0.0
+        # The shapes within these corners, and their numbers.
+        self._corners = np.full(3, np.inf), np.full(3, -np.inf)
+        self._around: Integers = np.empty(0, dtype=int)
+
+    @property
+    def radius(self) -> float:
+        """No part of the robot is farther from its first link's origin, m."""
+        return self._hull.reach
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The models reached so far."""
+        return frozenset(self._names[self._found])
+
+    def look(self, pose: PoseRow, speed: float) -> None:
+        """Call it at each tick: the robot's first link is at `pose`, and no part of the robot is faster than `speed` (m/s)."""
+        if not len(self._owners):
+            return
+        margin = SLACK + speed * self._period
+        if self._place is None or _moved(self._place, pose, self._hull.reach) + margin >= self._free:
+            self._look_around_robot(pose, margin)
+        self._look_around_models()
+
+    def _look_around_robot(self, pose: PoseRow, margin: float) -> None:
+        low, high = self._hull.bounds(Pose(pose[:3], pose[3:]))
+        apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
+        near = apart <= margin
+        self._place = pose
+        self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
+        self._find(near)
+
+    def _look_around_models(self) -> None:
+        if not self._sleep.anything_awake:
+            return
+        low, high, speed = self._sleep.awake_links()
+        margin = (SLACK + speed * self._period)[:, None]
+        low, high = low - margin, high + margin
+        lowest, highest = low.min(axis=0), high.max(axis=0)
+        if (lowest < self._corners[0]).any() or (highest > self._corners[1]).any():
+            self._corners = lowest - AROUND, highest + AROUND
+            inside = (self._low <= self._corners[1]).all(axis=1) & (self._high >= self._corners[0]).all(axis=1)
+            self._around = np.flatnonzero(inside)
+        if not len(self._around):
+            return
+        meets = (low[:, None] <= self._high[self._around]) & (self._low[self._around] <= high[:, None])
+        met = meets.all(axis=2).any(axis=0)
+        if met.any():
+            near = np.zeros(len(self._owners), dtype=bool)
+            near[self._around[met]] = True
+            self._find(near)
+
+    def _find(self, near: Booleans) -> None:
+        """Notes the models of the shapes `near`, and looks at their shapes no more."""
+        if not near.any():
+            return
+        self._found[self._owners[near]] = True
+        others = ~self._found[self._owners]
+        self._owners, self._low, self._high = self._owners[others], self._low[others], self._high[others]
+        self._corners = np.full(3, np.inf), np.full(3, -np.inf)
+
+
+def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
+    """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
+    return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach

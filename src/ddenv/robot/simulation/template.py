@@ -1,0 +1,328 @@
+"""The simulator of one scenario: a plant that is built once and run many times, each time without other models."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import replace
+from typing import TypeVar
+
+from ddenv.errors import UserError
+from ddenv.robot.clock import Clock
+from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
+from ddenv.robot.drake.context import RunContext
+from ddenv.robot.drake.plant import Body, Built, build
+from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
+from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
+from ddenv.robot.piles.settling import settled, supports
+from ddenv.robot.piles.sleep import Sleep
+from ddenv.robot.result import Progress, RunResult
+from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.sensing.obstacles import Obstacles
+from ddenv.robot.sensing.sensors import SensorSuite
+from ddenv.robot.settled import Settled
+from ddenv.robot.simulation.autonomy import Autonomy, setup_of
+from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
+from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
+from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
+from ddenv.robot.simulation.taking_part import Reached, Solids
+from ddenv.world.drive import Drive, find_drive
+from ddenv.world.extent import shape_bounds, with_ground_boxes
+from ddenv.world.model import Model, World, is_ground
+from ddenv.world.placement import spawn_pose
+from ddenv.world.scenario import Scenario
+
+# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
+YIELD = 0.1
+# A robot this far below everything that it could stand on has fallen out of the world, m.
+FALL = 2.0
+
+
+class Template:
+    """One plant of a scenario's world. Building it takes seconds; switching models off for a run takes milliseconds.
+
+    All runs share one context. Equal `keep` and `seed` give the same result bit for bit, whatever ran before, and the same as a
+    world that never had the removed models.
+    """
+
+    def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
+        """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
+        spawn, goal = scenario.robot.spawn, scenario.goal
+        # Boxes in place of planes, large enough for all models, the spawn and the goal.
+        self._solid = with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
+        self._robot = robot
+        self._scenario = scenario
+        self._drive = find_drive(robot, scenario.robot.wheels)
+        self._controllers = controllers(scenario.controller, scenario.folder)
+        names = frozenset(model.name for model in world.models)
+        grounds = frozenset(model.name for model in world.models if is_ground(model))
+        self._always = names & frozenset(scenario.protected) | grounds
+        self._floor = lowest(world) - FALL
+        self._clock = Clock.of(scenario)
+        self._setup = setup_of(robot, self._drive, self._clock, scenario)
+        self._obstacles = Obstacles.of(world) if scenario.sensors.lidar else None
+        self._models = {model.name: model for model in world.models}
+        self._repertoire = Repertoire(world)
+        self._boxes = still_boxes(world)
+        # False only to measure what sleeping saves: then all moving models are always simulated.
+        self._sleeping = True
+        self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        self._reach = self._hull.reach + YIELD
+        # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
+        # used beside such models, 23 of 274 implied tests differed.)
+        self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
+        moving = [model for model in world.models if not model.static]
+        self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
+        self._build(names)
+
+    def without(self, names: frozenset[str]) -> Template:
+        """A template of the same world without the moving models `names`: cheaper, and with the same bits.
+
+        The two share what they know about the world. Raises ValueError for a model that never moves or is always kept.
+        """
+        wrong = names - self.removable
+        if wrong:
+            raise ValueError(f"cannot be left out: {min(wrong)}")
+        smaller = copy(self)
+        smaller._build(self._names - names)
+        return smaller
+
+    def wider(self, place: Place, times: int) -> Template:
+        """A template of the same models with a larger region, see `Region.with_place`."""
+        wider = copy(self)
+        wider._surround(self._region.with_place(place, times))
+        wider._build(self._names)
+        return wider
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The models in its plant."""
+        return self._names
+
+    @property
+    def removable(self) -> frozenset[str]:
+        """The moving models that can be left out of the plant."""
+        return frozenset(self._context.built.moving) - self._always
+
+    def shapes_without(self, names: frozenset[str]) -> int:
+        """The number of collision shapes in the plant, without those of the models `names`."""
+        built = self._context.built
+        shapes = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in shapes if name not in names)
+
+    def _surround(self, region: Region) -> None:
+        """From the next `_build` on, the plant has nothing outside `region` that never moves."""
+        self._region = region
+        self._far = region.far(self._solid.models) if self._reach < ENDLESS else frozenset()
+
+    def _build(self, names: frozenset[str]) -> None:
+        """Builds the plant with the models `names`. Everything else stays that of the whole world."""
+        self._names = names
+        near = tuple(model for model in self._solid.models if model.name in names - self._far)
+        built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
+        boxes = [box for box in self._boxes if box[0] in names]
+        self._surroundings = Surroundings.of(boxes, self._reach, built)
+        at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
+        self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
+        self._rehearsals = Rehearsals(self._repertoire, self._context)
+
+    def run(
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        full: bool = True,
+        listener: Listener | None = None,
+    ) -> RunResult:
+        """As `Simulator.run`; `listener` hears the controller.
+
+        Raises LeftRegion if something comes near what is not in the plant.
+        """
+        unknown = keep - self._names
+        if unknown:
+            raise ValueError(f"no such model: {min(unknown)}")
+        removed = self._names - keep - self._always
+        kept = [body for name, body in self._context.built.moving.items() if name not in removed]
+        present = self._names - removed
+        self._context.presence.remove(removed)
+        with self._asleep(kept, present) as (sleep, unusual):
+            suite = SensorSuite(self._scenario.sensors, seed)
+            parts = RunParts(
+                scenario=self._scenario,
+                drive=self._drive,
+                sleep=sleep,
+                notice=Notice(
+                    self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
+                ),
+                autonomy=self._autonomy(suite, seed, listener),
+                lidar=self._lidar(present, kept, suite),
+                watch=Watch(self._region, self._reach) if self._far else None,
+                stuck=None if full else Stuck(seconds_for(self._scenario.controller)),
+                reached=self._reached(sleep, present),
+                unusual=unusual,
+                kept=kept,
+                seed=seed,
+            )
+            return Run(self._context, parts).execute(progress)
+
+    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
+        """What rests on what in the whole world, as `piles.support.supports` has it. Raises LeftRegion."""
+        return supports(self._context, self._rehearsals, self._names, elements)
+
+    def settled(self) -> Settled:
+        """How the whole world settles. Raises LeftRegion."""
+        return settled(self._context, self._rehearsals, self._names)
+
+    def learn_piles(self) -> None:
+        """Finds out how the piles of the whole world move, if that is unknown. Raises LeftRegion."""
+        if not self._repertoire.learnt:
+            self._context.presence.remove(frozenset())
+            self._rehearsals.learn(self._names)
+
+    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """Each of `elements` that starts away from the robot with each one that it is tied to, as `Repertoire.ties`; sorted.
+
+        Call it after `learn_piles`. None: unknown.
+        """
+        if not self._slices:
+            return None
+        ties = self._repertoire.ties
+        return sorted((name, other) for name in elements & set(ties) for other in elements & ties[name])
+
+    @contextmanager
+    def _asleep(self, kept: Sequence[Body], present: frozenset[str]) -> Iterator[tuple[Sleep, frozenset[str]]]:
+        """The moving models `kept` at their start, in a world that keeps the models `present`, and what moves otherwise there."""
+        piles = self._rehearsals.piles(kept, present) if self._sleeping else []
+        held = frozenset(self._context.built.moving) - set(self._context.built.twins)
+        unusual = self._repertoire.unusual(piles, present, held)
+        scripts = [known.script for known in piles if known.script is not None]
+        self._context.diagram_context.SetTime(0.0)
+        sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
+        try:
+            # With what those models are tied to that are always kept.
+            ties = self._repertoire.ties if self._repertoire.learnt else {}
+            yield sleep, unusual.union(*(ties[always] & present for always in self._always & set(ties)))
+        finally:
+            sleep.end()
+
+    def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
+        if not (self._slices and self._sleeping and self._repertoire.learnt):
+            return None
+        return Reached(self._solids, self._hull, sleep, present, self._clock.period)
+
+    def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
+        scenario, setup = self._scenario, replace(self._setup, seed=seed)
+        controller = self._controllers(setup)
+        if listener is not None:
+            controller = Heard(controller, setup, listener)
+        return Autonomy(
+            scenario.sensors, suite, self._drive, scenario.controller.skid, self._clock, setup.start, controller
+        )
+
+    def _lidar(self, present: frozenset[str], kept: Sequence[Body], suite: SensorSuite) -> Lidar | None:
+        settings = self._scenario.sensors.lidar
+        if settings is None or self._obstacles is None:
+            return None
+        return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
+
+
+def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
+    try:
+        built = build(world, robot, drive, scenario.simulation, scenario.controller.motor_gain)
+    except (ValueError, RuntimeError, SystemExit) as error:
+        raise UserError(f"{world.path}: cannot be simulated: {error}") from error
+    if not built.robot.base.is_floating_base_body():
+        raise UserError(
+            f"robot '{robot.name}': its first link must be free to move, not joined to the world or another link"
+        )
+    return built
+
+
+def lowest(world: World) -> float:
+    """A height (m) below which there is no surface of the world."""
+    collisions = [collision for model in world.models for collision in model.collisions]
+    return min((float(shape_bounds(one.shape, one.pose)[0][2]) for one in collisions), default=0.0)
+
+
+Result = TypeVar("Result")
+# What a moving model that is switched off costs in each step of a run, s.
+HELD = 5e-6
+# The minimum time to build a plant, and the time for each pair of shapes, s. A pair also takes 0.15 kB.
+BUILD = 0.05
+PAIR = 1e-6
+# A plant with more shapes than this gets no smaller ones beside it: each would take more than 150 MB.
+LARGEST = 1000
+# The maximum number of smaller plants at a time.
+MOST = 4
+
+
+class Variants:
+    """Runs a scenario as `Template` does, with the same results to the last bit, but in smaller plants where that saves time.
+
+    It holds the template of the whole world and the last few smaller ones.
+    """
+
+    def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
+        """Raises UserError as `Template` does."""
+        self._whole = Template(world, robot, scenario)
+        self._steps = Clock.of(scenario).last
+        # The one that was used last comes last.
+        self._smaller: list[Template] = []
+
+    def run(
+        self,
+        keep: frozenset[str],
+        seed: int,
+        progress: Progress | None = None,
+        full: bool = True,
+        listener: Listener | None = None,
+    ) -> RunResult:
+        """As `Template.run`, in a plant that has all that comes near."""
+        self._within(lambda: self._whole.learn_piles())
+        return self._within(lambda: self._template(keep).run(keep, seed, progress, full, listener))
+
+    def supports(self, elements: frozenset[str]) -> list[tuple[str, str]]:
+        """As `Template.supports`."""
+        return self._within(lambda: self._whole.supports(elements))
+
+    def settled(self) -> Settled:
+        """As `Template.settled`."""
+        return self._within(lambda: self._whole.settled())
+
+    def ties(self, elements: frozenset[str]) -> list[tuple[str, str]] | None:
+        """As `Template.ties`."""
+        self._within(lambda: self._whole.learn_piles())
+        return self._whole.ties(elements)
+
+    def _within(self, work: Callable[[], Result]) -> Result:
+        """Does `work`, again from its beginning in a larger plant each time that something leaves the plant's region."""
+        times = 1
+        while True:
+            try:
+                return work()
+            except LeftRegion as left:
+                place = left.place
+            times *= 2
+            # Held plants would take as much memory as the new ones.
+            self._smaller = []
+            self._whole = self._whole.wider(place, times)
+            gc.collect()
+
+    def _template(self, keep: frozenset[str]) -> Template:
+        """A template that has at least the models `keep`, chosen for the least time of one run."""
+        removed = self._whole.removable - keep
+        able = [one for one in (self._whole, *self._smaller) if keep <= one.names]
+        template = min(able, key=lambda one: len(one.removable), default=self._whole)
+        needless = template.removable & removed
+        shapes = template.shapes_without(needless)
+        if shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps:
+            if len(self._smaller) == MOST:
+                del self._smaller[0]
+                # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
+                gc.collect()
+            template = template.without(needless)
+        if template is not self._whole:
+            self._smaller = [*(one for one in self._smaller if one is not template), template]
+        return template

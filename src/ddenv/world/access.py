@@ -1,0 +1,116 @@
+"""Reads and writes single files, with errors in one line."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ddenv.errors import UserError
+
+MAX_BYTES = 100_000_000  # of a file that the user names
+
+
+class Missing(Exception):
+    """No file was found for a URI; the text says where we looked."""
+
+
+class Unusable(Exception):
+    """A file or URI cannot be used; the text is the reason, in one line."""
+
+
+class MissingFiles(UserError):
+    """Required files cannot be found; `uris` are all of them."""
+
+    def __init__(self, message: str, uris: Sequence[str]) -> None:
+        super().__init__(message)
+        self.uris = tuple(uris)
+
+
+def read(path: Path, limit: int) -> bytes:
+    """The bytes of the file `path`. Raises Unusable if it is not a regular file, is unreadable or exceeds `limit` bytes."""
+    size = size_of(path)
+    if size > limit:
+        raise Unusable(f"has {size / 1e6:.0f} MB; the maximum is {limit / 1e6:.0f} MB")
+    try:
+        with path.open("rb") as file:
+            return file.read(limit)
+    except OSError as error:
+        raise Unusable(reason(error)) from None
+
+
+def size_of(path: Path) -> int:
+    """Size of the file `path` in bytes. Raises Unusable if it is not a regular file."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise Unusable(reason(error)) from None
+    except ValueError:
+        raise Unusable("is not a valid file name") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise Unusable("is a folder, not a file")
+    # Reading a pipe or a device might never end.
+    if not stat.S_ISREG(status.st_mode):
+        raise Unusable("is not a regular file")
+    return status.st_size
+
+
+def is_folder(path: Path) -> bool:
+    """Whether `path` is an accessible folder."""
+    try:
+        return stat.S_ISDIR(path.stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def without_tilde(name: str) -> Path:
+    """`name` with a leading `~` expanded, if the home folder is known."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        return Path(name)
+
+
+def reason(error: OSError) -> str:
+    return f"cannot be read: {error.strerror or error}"
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file. Raises UserError if it is missing, unreadable or larger than `MAX_BYTES`."""
+    try:
+        if path.is_dir():
+            raise UserError(f"{path}: is a folder; expected a file")
+        if path.exists() and not path.is_file():
+            raise UserError(f"{path}: is not a regular file")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise UserError(f"{path}: {size / 1e6:.0f} MB is too large; the maximum is {MAX_BYTES / 1e6:.0f} MB")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file") from None
+    except ValueError:
+        raise UserError(f"{path}: is not a valid file name") from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Writes `content` atomically: to a temporary file beside `path`, which is then renamed. Raises UserError."""
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written: {error.strerror}") from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(name).chmod(0o666 & ~mask)
+        Path(name).replace(path)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise UserError(f"{path}: cannot be written: {error.strerror}") from None

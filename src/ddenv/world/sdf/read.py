@@ -1,0 +1,155 @@
+"""Reads an SDF world or model file, or a URDF robot, into plain data (`ddenv.world.model`).
+
+We read SDF ourselves because Drake's parser refuses many files that simulators accept, and silently drops parts of others.
+This reader notes everything that it replaces or ignores (`World.notes`), and refuses what it does not understand, with file,
+line and XPath. It never guesses.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from ddenv.errors import UserError
+from ddenv.world.access import read_bytes
+from ddenv.world.files.resources import Disk, Resources
+from ddenv.world.model import Model, World
+from ddenv.world.pose import vector
+from ddenv.world.scenario import PLAIN, Reading
+from ddenv.world.sdf.assemble import Saved, assemble, read_state
+from ddenv.world.sdf.context import Context, note_unread, sdf_root
+from ddenv.world.sdf.frames import Scope
+from ddenv.world.sdf.standin import AUTO
+from ddenv.world.sdf.urdf import ROOT, massless, to_sdf, without_mass
+from ddenv.world.sdf.xml import complain, name_of, numbers, parse
+
+GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
+# Elements that add or join models in a way that is not supported, with the error message.
+REFUSED = {
+    "population": "<population> is not supported; write its models out",
+    "joint": "joints between models are not supported; put both models into one",
+}
+
+
+def read_world(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> World:
+    """The world in the SDF file `path`. Raises UserError with file, line and XPath.
+
+    `announce` is called with a line of text before slow steps.
+    """
+    text = read_bytes(path)
+    return parse_world(text, path, reading, disk_of(path, reading, announce))
+
+
+def parse_world(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> World:
+    """The world in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
+    context = Context(resources or disk_of(path, reading, None), reading)
+    try:
+        return _world(text, path, context)
+    except UserError:
+        # The error may only be a consequence of a missing file, such as a pose relative to a model in it.
+        context.complain_of_missing()
+        raise
+    except RecursionError:
+        raise UserError(f"{path}: models or frames are nested too deeply") from None
+
+
+def read_model(path: Path, reading: Reading = PLAIN, announce: Callable[[str], None] | None = None) -> Model:
+    """The one model in the SDF or URDF file `path`, such as a robot. Raises UserError."""
+    return parse_model(read_bytes(path), path, reading, disk_of(path, reading, announce))
+
+
+def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
+    """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
+    context = Context(resources or disk_of(path, reading, None), reading)
+    urdf = parse(text, path) if f"<{ROOT}".encode() in text else None
+    if urdf is not None and urdf.tag != ROOT:
+        urdf = None
+    root = sdf_root(text, path) if urdf is None else to_sdf(urdf, context)
+    scope = Scope(root, (path,), context)
+    if len(scope.parts) != 1:
+        raise UserError(f"{path}: expected one <model> inside <sdf>, found {len(scope.parts)}")
+    try:
+        model = assemble(scope.parts[0], scope.parts[0].name, scope, None, context)
+        context.complain_of_missing()
+        return model if urdf is None else without_mass(model, massless(urdf))
+    except RecursionError:
+        raise UserError(f"{path}: models or frames are nested too deeply") from None
+
+
+def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Disk:
+    """The files beside the world `path`, and those in the folders of `reading.model_path`. Raises UserError."""
+    for folder in reading.model_path:
+        if not folder.is_dir():
+            raise UserError(f"reading.model_path: there is no folder {folder}")
+    return Disk(path.parent, reading.model_path, announce)
+
+
+def _world(text: bytes, path: Path, context: Context) -> World:
+    root = sdf_root(text, path)
+    worlds = root.findall("world")
+    if len(worlds) != 1:
+        found = "no <world>" if not worlds else f"{len(worlds)} <world> elements"
+        raise UserError(f"{path}: expected one <world> inside <sdf>, found {found}")
+    world = worlds[0]
+    for tag, message in REFUSED.items():
+        refused = world.find(tag)
+        if refused is not None:
+            raise complain(refused, message)
+    note_unread(world, context)
+    scope = Scope(world, (path,), context)
+    models = _models(scope, read_state(world, context), context)
+    context.complain_of_missing()
+    context.model = ""
+    # An unused stand-in is probably a typing error; `auto` asks for nothing as long as nothing is missing.
+    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in.word != AUTO}
+    for uri in sorted(asked - context.used):
+        context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")
+    anchors = scope.references()
+    gravity = next(
+        (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
+    )
+    return World(
+        path=path,
+        name=world.get("name") or "",
+        text=text,
+        gravity=GRAVITY if gravity is None else vector(numbers(gravity, 3)),
+        models=models,
+        version=root.get("version") or "",
+        notes=tuple(context.notes),
+        anchors=frozenset(model.name for model in models if model.name in anchors),
+        resources=context.resources.taken,
+    )
+
+
+def _models(scope: Scope, state: dict[str, list[Saved]], context: Context) -> tuple[Model, ...]:
+    names = unique_names([part.name for part in scope.parts])
+    counts = Counter(part.name for part in scope.parts)
+    left = {name: list(saved) for name, saved in state.items()}
+    models = []
+    for part, name in zip(scope.parts, names, strict=True):
+        if name != part.name:
+            context.model = name
+            context.note("replaced", part.at, f"its name, used {counts[part.name]} times, by '{name}'")
+        entries = left.get(part.name)
+        models.append(assemble(part, name, scope, entries.pop(0) if entries else None, context))
+    context.model = ""
+    for entries in left.values():
+        for saved in entries:
+            context.note("ignored", saved.element, f"the world has no model '{name_of(saved.element)}'")
+    return tuple(models)
+
+
+def unique_names(names: list[str]) -> list[str]:
+    """`names` with repeated ones made unique: the second `name` becomes `name #2`, the third `name #3`, ..."""
+    taken, unique = set(names), []
+    given: Counter[str] = Counter()
+    for name in names:
+        own, number = name, given[name]
+        while number and own in taken:
+            number += 1
+            own = f"{name} #{number}"
+        given[name] = max(number, 1)
+        taken.add(own)
+        unique.append(own)
+    return unique

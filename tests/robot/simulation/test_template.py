@@ -1,0 +1,165 @@
+"""One template, many runs: how they end, and that no run leaves a trace in the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.robot.simulation.template import Template, lowest
+from ddenv.world.model import Sphere
+from ddenv.world.pose import Pose
+from tests.robot.conftest import joint_of, link_of, model_of
+
+NOTHING = frozenset()
+
+
+def same(a, b) -> bool:
+    return a.outcome == b.outcome and a.failure == b.failure and a.trajectory.tobytes() == b.trajectory.tobytes()
+
+
+def test_reaches_its_goal_on_flat_ground(world_of, husky, scenario_of):
+    result = Template(world_of(), husky, scenario_of()).run(NOTHING, seed=1)
+    assert (result.outcome, result.failure) == ("pass", "")
+    x, y, z, *_ = result.end_pose
+    assert np.hypot(x - 3.0, y) <= 0.5
+    # It stands on its wheels: their axes are 0.0328 m above the model's frame, and the tyres sink in by little.
+    assert z == pytest.approx(0.1651 - 0.0328, abs=0.005)
+    assert result.simulated_seconds == result.trajectory[-1, 0]
+    # 2.5 m at up to 1 m/s, with 1 m/s^2 at the start.
+    assert 2.5 < result.simulated_seconds < 4.0
+    assert result.motions == {}
+
+
+def test_trajectory_has_a_row_each_tenth_of_a_second_and_one_at_the_end(world_of, husky, scenario_of):
+    scenario = scenario_of(failure={"timeout": 1.23}, controller={"period": 0.03})
+    trajectory = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory
+    assert trajectory.dtype == np.float64
+    assert trajectory[:, 0] == pytest.approx([*np.arange(13) * 0.1, 1.23])
+    assert trajectory[0, 1:4] == pytest.approx([0, 0, 0.14])
+    assert np.linalg.norm(trajectory[:, 4:], axis=1) == pytest.approx(np.ones(14))
+
+
+def test_turns_round_to_a_goal_behind_it(world_of, husky, scenario_of):
+    result = Template(world_of(), husky, scenario_of(goal={"x": -2.0, "y": 1.0})).run(NOTHING, seed=1)
+    assert result.outcome == "pass"
+
+
+def test_starts_where_the_scenario_says(world_of, husky, scenario_of):
+    spawn = {"x": 1.5, "y": -2.0, "z": 0.14, "yaw": 1.0}
+    scenario = scenario_of(robot={"model": "husky.sdf", "spawn": spawn}, failure={"timeout": 0.1})
+    start = Template(world_of(), husky, scenario).run(NOTHING, seed=1).trajectory[0]
+    assert start[1:] == pytest.approx([1.5, -2.0, 0.14, np.cos(0.5), 0, 0, np.sin(0.5)])
+
+
+def test_a_wall_stops_it_until_time_is_up_and_without_the_wall_it_passes(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
+    blocked = template.run(frozenset({"wall"}), seed=1)
+    assert (blocked.outcome, blocked.failure) == ("failed", "stuck")
+    assert blocked.simulated_seconds == pytest.approx(10.0)
+    assert blocked.end_pose[0] < 1.1
+    assert template.run(NOTHING, seed=1).outcome == "pass"
+
+
+def test_a_robot_with_a_pose_of_its_own_starts_where_the_scenario_says(world_of, husky, scenario_of):
+    at = Pose.from_rpy(1.0, 2.0, 3.0, 0.0, 0.0, 0.5)
+    links = tuple(replace(link, pose=at @ link.pose) for link in husky.links)
+    joints = tuple(replace(joint, pose=at @ joint.pose, axis=tuple(at.rotate(joint.axis))) for joint in husky.joints)
+    posed = replace(husky, pose=at @ husky.pose, links=links, joints=joints)
+    starts = [
+        Template(world_of(), robot, scenario_of(failure={"timeout": 0.2})).run(NOTHING, seed=1).trajectory[0, 1:]
+        for robot in (husky, posed)
+    ]
+    assert starts[1] == pytest.approx(starts[0], abs=1e-9)
+
+
+def test_protected_models_and_the_ground_stay(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of(protected=("wall",)))
+    assert same(template.run(NOTHING, seed=1), template.run(frozenset({"wall", "ground"}), seed=1))
+    assert template.run(NOTHING, seed=1).failure == "stuck"
+
+
+def test_falls_out_of_a_world_without_ground(world_of, husky, scenario_of, box):
+    world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), ground=False)
+    result = Template(world, husky, scenario_of(goal={"x": 50, "y": 0})).run(frozenset({"table"}), seed=1)
+    assert (result.outcome, result.failure) == ("failed", "fell")
+    assert result.end_pose[2] < lowest(world) - 2.0
+    assert result.simulated_seconds < 10.0
+
+
+def test_unknown_models_are_refused(world_of, husky, scenario_of):
+    with pytest.raises(ValueError, match="no such model: wal"):
+        Template(world_of(), husky, scenario_of()).run(frozenset({"wal"}), seed=1)
+
+
+def test_progress_gets_every_row(world_of, husky, scenario_of):
+    reported = []
+    template = Template(world_of(), husky, scenario_of(failure={"timeout": 1.0}))
+    result = template.run(NOTHING, 1, lambda time_s, pose, _: reported.append((time_s, *pose)))
+    assert np.array(reported).tobytes() == result.trajectory.tobytes()
+
+
+def test_progress_gets_the_models_that_can_move(world_of, husky, scenario_of, box):
+    world = world_of(box("ball", "2 0 0.2 0 0 0", "0.4 0.4 0.4", mass=5.0), box("wall", "9 0 1 0 0 0", "1 1 2"))
+    places = []
+    template = Template(world, husky, scenario_of(failure={"timeout": 6.0}))
+    result = template.run(frozenset({"ball", "wall"}), 1, lambda *told: places.append(told[2]))
+    assert {name for models in places for name in models} == {"ball"}
+    assert np.array([models["ball"] for models in places]).tobytes() == result.motions["ball"][:, 1:].tobytes()
+
+
+def test_numbers_that_are_not_finite_are_an_error_and_leave_no_trace(world_of, husky, scenario_of):
+    template = Template(world_of(), husky, scenario_of())
+    before = template.run(NOTHING, seed=1)
+
+    def poison(time_s: float, *_: object) -> None:
+        if time_s > 0.45:
+            state = template._context.plant_context.get_mutable_discrete_state_vector()
+            state.SetFromVector(np.full(state.size(), np.nan))
+
+    broken = template.run(NOTHING, 1, poison)
+    assert (broken.outcome, broken.failure) == ("error", "not-finite")
+    assert np.isfinite(broken.trajectory).all()
+    assert same(template.run(NOTHING, seed=1), before)
+
+
+def test_what_breaks_in_progress_is_the_callers(world_of, husky, scenario_of, box):
+    template = Template(world_of(box("wall", "1.5 0 0.5 0 0 0", "0.2 4 1")), husky, scenario_of())
+    wall = frozenset({"wall"})
+    before = template.run(wall, seed=1)
+
+    def leave(*_: object) -> None:
+        raise KeyError("gone")
+
+    with pytest.raises(KeyError, match="gone"):
+        template.run(NOTHING, 1, leave)
+    # The wall, which that run had removed, is back.
+    assert same(template.run(wall, seed=1), before)
+
+
+def test_other_seeds_give_other_noise(world_of, husky, scenario_of):
+    template = Template(world_of(), husky, scenario_of())
+    assert not same(template.run(NOTHING, seed=1), template.run(NOTHING, seed=2))
+
+
+def test_a_world_drake_cannot_simulate_is_the_users(world_of, add, husky, scenario_of):
+    ghost = replace(model_of("ghost", link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)), mass=None)), static=False)
+    with pytest.raises(UserError, match=r"ghost.*no <inertial>"):
+        Template(add(world_of(), ghost), husky, scenario_of())
+
+
+def test_impossible_inertia_is_the_users(world_of, add, husky, scenario_of):
+    heavy = link_of("link", Sphere(0.5), Pose((2.0, 2.0, 0.5)))
+    heavy = replace(heavy, inertia=replace(heavy.inertia, moments=(1.0, 1.0, 9.0)))
+    with pytest.raises(UserError, match="cannot be simulated"):
+        Template(add(world_of(), model_of("heavy", heavy)), husky, scenario_of())
+
+
+def test_models_that_move_in_a_loop_are_the_users(world_of, add, husky, scenario_of):
+    links = [link_of(name, Sphere(0.1), Pose((float(x), 3.0, 1.0))) for x, name in enumerate("abc")]
+    pairs = (("a", "b"), ("b", "c"), ("a", "c"))
+    loop = model_of("loop", *links, joints=tuple(joint_of("ball", *pair, (0.0, 3.0, 1.0)) for pair in pairs))
+    with pytest.raises(UserError, match="cannot be simulated"):
+        Template(add(world_of(), loop), husky, scenario_of())

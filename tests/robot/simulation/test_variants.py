@@ -1,0 +1,165 @@
+"""Smaller plants for what is left of a world: the same bits as in the plant of all of it, and no plant twice."""
+
+from __future__ import annotations
+
+import pytest
+
+from ddenv.robot.piles.rehearsal import Rehearsals
+from ddenv.robot.result import RunResult
+from ddenv.robot.simulation import template as variants
+from ddenv.robot.simulation.template import Template, Variants
+from ddenv.runs.subject import load_parts
+from ddenv.world.load import SCENARIOS, load_scenario
+from ddenv.world.model import Box, Model, World
+from ddenv.world.pose import Pose
+from ddenv.world.scenario import Scenario
+from tests.robot.conftest import joint_of, link_of, model_of
+from tests.tiers import slow
+
+ALL = frozenset({"a", "b", "c", "d"})
+
+
+def cube(name: str, x: float, y: float, z: float = 0.15) -> Model:
+    return model_of(name, link_of("link", Box((0.3, 0.3, 0.3)), Pose((x, y, z))))
+
+
+def bits(result: RunResult) -> tuple:
+    motions = {name: rows.tobytes() for name, rows in result.motions.items()}
+    noticed = result.first_sensed, result.first_touched
+    return result.outcome, result.failure, result.trajectory.tobytes(), motions, noticed
+
+
+@pytest.fixture
+def built(monkeypatch) -> list[frozenset[str]]:
+    """The moving models that are left out of each smaller plant which is built. Building is so cheap that it always pays."""
+    monkeypatch.setattr(variants, "BUILD", 0.0)
+    monkeypatch.setattr(variants, "PAIR", 0.0)
+    reported: list[frozenset[str]] = []
+    without = Template.without
+
+    def tell(self: Template, names: frozenset[str]) -> Template:
+        smaller = without(self, names)
+        reported.append(ALL - smaller.names)
+        return smaller
+
+    monkeypatch.setattr(Template, "without", tell)
+    return reported
+
+
+@pytest.fixture
+def cubes(world_of, add) -> World:
+    """A cube in the robot's way, a pile of two that falls beside it, a cube far away."""
+    return add(world_of(), cube("a", 1.2, 0), cube("b", 1, 3), cube("c", 1, 3.1, 0.5), cube("d", 5, -9))
+
+
+@pytest.fixture
+def scenario(scenario_of) -> Scenario:
+    return scenario_of(failure={"timeout": 4.0}, goal={"x": 9, "y": 0})
+
+
+def rubble() -> tuple[World, Model, Scenario]:
+    scenario = load_scenario(SCENARIOS / "rubble.yaml")
+    short = scenario.model_copy(update={"failure": scenario.failure.model_copy(update={"timeout": 6.0})})
+    return *load_parts(scenario), short
+
+
+@pytest.mark.rates
+def test_parts_of_the_rubble_give_the_same_bits_as_in_the_plant_of_all_of_it_in_any_order():
+    world, robot, scenario = rubble()
+    names = world.elements()
+    parts = [frozenset(part) for part in (names[:11], names[:6] + names[16:21], names[::6])]
+    whole = Template(world, robot, scenario)
+    expected = [bits(whole.run(part, seed=2)) for part in parts]
+    touched = {name for *_, (_, first_touched) in expected for name in first_touched}
+    assert touched & whole.removable
+    smaller = Variants(world, robot, scenario)
+    for number in (2, 0, 1, 2, 0):
+        assert bits(smaller.run(parts[number], seed=2)) == expected[number]
+
+
+@pytest.mark.rates
+def test_what_a_pile_does_is_worked_out_once_for_all_plants(cubes, husky, scenario, built, monkeypatch):
+    rehearsed = []
+    simulate = Rehearsals._simulate
+
+    def tell(self: Rehearsals, pile: tuple) -> object:
+        rehearsed.append([body.name for body in pile])
+        return simulate(self, pile)
+
+    monkeypatch.setattr(Rehearsals, "_simulate", tell)
+    smaller = Variants(cubes, husky, scenario)
+    results = [smaller.run(keep, 1) for keep in (ALL - {"d"}, ALL - {"a"}, ALL, ALL - {"c"})]
+    assert len(built) == 3
+    assert sorted(rehearsed) == [["a"], ["b"], ["b", "c"], ["d"]]
+    whole = Template(cubes, husky, scenario)
+    assert bits(results[1]) == bits(whole.run(ALL - {"a"}, 1))
+
+
+def test_a_script_is_not_played_where_something_static_is_gone_of_a_model_that_was_left_out(
+    world_of, add, husky, scenario
+):
+    """The frame of a door holds a cube up: with the door the cube falls less far."""
+    frame = link_of("frame", Box((1.0, 1.0, 0.5)), Pose((1.0, 4.0, 0.25)), mass=5.0)
+    leaf = link_of("leaf", Box((0.1, 0.1, 0.1)), Pose((1.0, 6.0, 1.0)))
+    joints = (
+        joint_of("fixed", "world", "frame", (1.0, 4.0, 0.0)),
+        joint_of("revolute", "world", "leaf", (1.0, 6.0, 1.0)),
+    )
+    world = add(world_of(), model_of("a", frame, leaf, joints=joints), cube("b", 1.0, 4.0, 0.8))
+    smaller = Variants(world, husky, scenario)
+    for keep, height in (({"b"}, 0.15), ({"a", "b"}, 0.65), ({"b"}, 0.15)):
+        rows = smaller.run(frozenset(keep), 1).motions["b"]
+        assert rows[-1, 3] == pytest.approx(height, abs=0.005)
+
+
+def test_a_plant_is_built_once_while_it_is_asked_for(cubes, husky, scenario, built):
+    smaller = Variants(cubes, husky, scenario)
+    for seed in range(3):
+        smaller.run(ALL, seed)
+        smaller.run(ALL - {"a"}, seed)
+    assert built == [{"a"}]
+    smaller.run(frozenset({"b"}), 1)
+    assert built == [{"a"}, ALL - {"b"}]
+
+
+@pytest.mark.rates
+def test_those_that_were_used_last_are_held(cubes, husky, scenario, built, monkeypatch):
+    monkeypatch.setattr(variants, "MOST", 2)
+    smaller = Variants(cubes, husky, scenario)
+    for left_out in ("a", "b", "a", "c", "a", "b"):
+        smaller.run(ALL - {left_out}, 1)
+    assert built == [{"a"}, {"b"}, {"c"}, {"b"}]
+
+
+TOO_DEAR = {"BUILD": 1.0, "PAIR": 1.0, "LARGEST": 3, "HELD": 0.0}
+
+
+@pytest.mark.parametrize("limit", slow(pytest.mark.rates, TOO_DEAR, but=["LARGEST"]))
+def test_no_plant_is_built_that_costs_more_than_it_saves(cubes, husky, scenario, built, monkeypatch, limit):
+    monkeypatch.setattr(variants, limit, TOO_DEAR[limit])
+    result = Variants(cubes, husky, scenario).run(ALL - {"d"}, 1)
+    assert not built
+    assert bits(result) == bits(Template(cubes, husky, scenario).run(ALL - {"d"}, 1))
+
+
+def test_what_is_protected_stays(cubes, husky, scenario, built):
+    protected = scenario.model_copy(update={"protected": ("a",)})
+    result = Variants(cubes, husky, protected).run(frozenset({"b"}), 1)
+    assert built == [{"c", "d"}]
+    assert "a" in result.motions
+
+
+def test_the_floor_is_that_of_the_whole_world(world_of, husky, scenario_of, box):
+    """What is removed must not change when the robot has fallen out of the world."""
+    cellar = box("a", "0 9 -20 0 0 0", "1 1 1", mass=1.0)
+    world = world_of(box("table", "0 0 -0.5 0 0 0", "3 3 1"), cellar, ground=False)
+    scenario = scenario_of(goal={"x": 50, "y": 0})
+    table = frozenset({"table"})
+    assert bits(Variants(world, husky, scenario).run(table, 1)) == bits(Template(world, husky, scenario).run(table, 1))
+
+
+def test_unknown_models_are_refused(cubes, husky, scenario):
+    with pytest.raises(ValueError, match="no such model: e"):
+        Variants(cubes, husky, scenario).run(frozenset({"e"}), 1)
+    with pytest.raises(ValueError, match="cannot be left out: ground"):
+        Template(cubes, husky, scenario).without(frozenset({"ground"}))
