@@ -158,9 +158,7 @@ class Control:
             command = parse(request.kind, request.data)
         except UserError as error:
             return str(error)
-        journal = self._journal
-        now = Situation(journal.state, search_due=journal.state.search_due)
-        why = refusal(command, now)
+        why = refusal(command, Situation(self._journal.state))
         if not why:
             _OBEYED[type(command)](self, command)
         return why

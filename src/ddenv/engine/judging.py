@@ -36,7 +36,7 @@ def result_data(result: RunResult | Broken, failures: Sequence[Failure] = ()) ->
     if failures:
         judgement = nearest([judge(result, failure) for failure in failures])
         outcome, distance = judgement.outcome, judgement.distance
-    pose = [float(value) for value in result.end_pose]
+    pose = tuple(float(value) for value in result.end_pose)
     more: dict[str, Any] = {"taken": result.taken} if result.taken else {}
     if result.took_part is not None:
         more["took_part"] = sorted(result.took_part)

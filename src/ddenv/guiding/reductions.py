@@ -112,7 +112,7 @@ def _not_waiting(now: Situation, command: Accept | Reject) -> str:
     state = now.state
     waits = None
     # When a new search is due, earlier reductions can no longer be accepted.
-    if state.round is not None and state.waiting_candidate is not None and not now.search_due:
+    if state.round is not None and state.waiting_candidate is not None and not state.search_due:
         waits = state.round.number, state.waiting_candidate
     same = (command.round, command.candidate) == waits
     return "" if same else "that reduction no longer waits"

@@ -29,14 +29,13 @@ class Situation:
     """A run, and what else decides whether a command is possible.
 
     `barred` is why this viewer cannot guide the run at all, or "". `pending` is the kind of the viewer's last command until the
-    engine obeys it, or "". `search_due` says that the current search is over.
+    engine obeys it, or "".
     """
 
     state: RunState
     engine: EngineIs = "alive"
     barred: str = ""
     pending: str = ""
-    search_due: bool = False
 
     def needs_engine(self) -> str:
         """Why no engine can answer now, or ""."""
