@@ -33,7 +33,6 @@ from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments, what_happened
-from ddenv.workbench.run.guide_place import GuidePlace
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.observed import Observed
 from ddenv.workbench.run.poll import Snapshot
@@ -150,8 +149,6 @@ class LessonScreen(Screen[bool]):
             position, score = opened.position, all_scores().get(opened.lesson.name)
         self.course = Course(position, opened, score)
         self._kept = self.course.score
-        # Many may have the same lesson open: only a run that is walked through freely leads those who watch it.
-        self._guide = GuidePlace(run, position) if opened is None else None
         self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
 
     def compose(self) -> ComposeResult:
@@ -176,8 +173,6 @@ class LessonScreen(Screen[bool]):
 
     def on_unmount(self) -> None:
         self._file.close()
-        if self._guide is not None:
-            self._guide.close()
 
     # What is shown.
 
@@ -340,8 +335,6 @@ class LessonScreen(Screen[bool]):
         """After a move: what was said before it would only hide the text."""
         self.app.clear_notifications()
         self._show()
-        if self._guide is not None:
-            self._guide.browsed()
 
     def _say(self, why: str) -> None:
         self.notify(why, timeout=3, markup=False)

@@ -13,7 +13,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
 from ddenv.runfile.fold import apply
-from ddenv.runfile.lock import engine_is_alive, suspended_engine
+from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.working import spent
@@ -38,10 +38,9 @@ def now() -> float:
 class Snapshot:
     """All that the run screen shows at one moment.
 
-    `engine` is "alive", "starting" or "absent"; `suspended` is its process while that stands still (SIGSTOP). `evidence` is the
-    robot's path on the last similar run, `original` its path in f itself: flat rows of `COLUMNS` floats. `spent` is the time
-    engines have worked on the run, s. `error` says why the run file cannot be read. `gone` says that it was deleted or replaced:
-    the rest is what was read last.
+    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path in f
+    itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the run file
+    cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
     `behind` says that not all of it was read yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that
     moment, and `happened` says what happened there.
     """
@@ -58,7 +57,6 @@ class Snapshot:
     past: bool = False
     pointed: Candidate | None = None
     happened: str = ""
-    suspended: int | None = None
 
     @property
     def older_engine(self) -> str:
@@ -127,7 +125,6 @@ class Poll:
         self._behind = self._catching_up = True
         self._looked = -math.inf
         self._alive = False
-        self._suspended: int | None = None
         self._posed = -math.inf
         self._evidence: tuple[int | None, array[float] | None] = (None, None)
         self._original: tuple[int | None, array[float] | None] = (None, None)
@@ -173,9 +170,9 @@ class Poll:
         engine, last = self._engine(), self._snapshot
         if last is not None and not self._behind:
             spent = self._spent(last.state, engine)
-            if (engine, spent, self._suspended) == (last.engine, last.spent, last.suspended):
+            if (engine, spent) == (last.engine, last.spent):
                 return last
-            return replace(last, engine=engine, spent=spent, suspended=self._suspended)
+            return replace(last, engine=engine, spent=spent)
         state, error, more = self._fold(last.state if last else RunState())
         spent = self._spent(state, engine)
         try:
@@ -187,7 +184,7 @@ class Poll:
             snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
         self._behind = more or not due
         self._catching_up = more
-        return replace(snapshot, behind=more, suspended=self._suspended)
+        return replace(snapshot, behind=more)
 
     def _left(self, why: str) -> Snapshot:
         """What was read last of a file that is gone."""
@@ -219,7 +216,6 @@ class Poll:
             # Rows of running tests are read only while an engine is there.
             self._behind = self._behind or alive != self._alive
             self._looked, self._alive = moment, alive
-            self._suspended = suspended_engine(self.path) if alive else None
         if self._alive:
             return "alive"
         return "starting" if self._starting() else "absent"

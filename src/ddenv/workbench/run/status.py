@@ -110,8 +110,7 @@ class Status(Widget):
         if name == "state":
             colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
             status = self._snapshot.status if self._snapshot else ""
-            warns = self._besides[2] or (self._snapshot and self._snapshot.suspended is not None)
-            variable = "text-warning" if warns else colors.get(status, "text-success")
+            variable = "text-warning" if self._besides[2] else colors.get(status, "text-success")
             return ink(self.app.theme_variables, variable, bold=True)
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
@@ -168,8 +167,6 @@ def facts(
         sign, word = "✗", "the run file is gone"
     elif status == "lost":
         way_on = ": r resumes"
-    elif snapshot.suspended is not None and not state.ended:
-        sign, word, way_on = "!", "engine suspended", f": kill -CONT {snapshot.suspended} wakes it"
     elif state.needs_room and not state.ended:
         sign, word = "!", "no room on the disk"
     mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
@@ -180,7 +177,7 @@ def facts(
         Fact("drift", drift_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(remaining(state, snapshot.engine == "alive" and snapshot.suspended is None))),
+        Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
         Fact("mode", (mode, "")),
         Fact("engine", engine_said(snapshot)),
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
