@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.map.paint import HUES
+from ddenv.map.colors import HUES
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter

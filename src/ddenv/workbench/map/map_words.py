@@ -51,11 +51,8 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
-def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
-    """One line with the meanings of the signs on the map, as many as fit in `width`.
-
-    With `same_paths`, the last similar run has the same path as f.
-    """
+def legend(shown: Shown, width: int) -> Text:
+    """One line with the meanings of the signs on the map, as many as fit in `width`."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
         PARTS: bool(state.elements) and "partitions" in layers,
@@ -64,7 +61,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
         FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),
         SENSED: "sensed" in layers and state.evidence_test is not None,
         NO_PART: "took part" in layers and in_last(state) is not None,
-        FIRST_PATH: "original" in layers and not same_paths,
+        FIRST_PATH: "original" in layers and not shown.same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]
     usual = LEGEND if state.elements else LEGEND[:2]

@@ -81,6 +81,12 @@ class Shown:
         position = self.snapshot.state.f_position
         return None if position is None else position[:2]
 
+    @property
+    def same_paths(self) -> bool:
+        """Whether the last similar run has the same path as f: before the first reduction it is f."""
+        original, evidence = self.snapshot.original, self.snapshot.evidence
+        return original is None or original == evidence
+
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:
     """The models of a world, with the scenario's start and goal if there is one."""
