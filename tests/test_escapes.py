@@ -14,7 +14,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.words import headline
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.config import Config
+from ddenv.workbench.config import Config
 from ddenv.workbench.lines.line_mode import LineMode
 from tests.command import in_process
 from tests.workbench import fake_moments, fake_run

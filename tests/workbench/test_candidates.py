@@ -13,7 +13,7 @@ from ddenv.runfile.state import Candidate, Round, RunState, Split, Trial
 from ddenv.workbench.run import candidates as module
 from ddenv.workbench.run.candidate_rows import COLUMNS, fitting, listed, words
 from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 
 
 def snapshot(run, engine="alive") -> Snapshot:

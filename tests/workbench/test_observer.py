@@ -13,9 +13,9 @@ from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.pace import Pause, Resume, Stop
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.run import poll as polling
-from ddenv.workbench.run.observed import Busy, Observed
-from ddenv.workbench.run.poll import Poll
+from ddenv.workbench.shared import poll as polling
+from ddenv.workbench.shared.observed import Busy, Observed
+from ddenv.workbench.shared.poll import Poll
 from tests.waiting import eventually
 
 

@@ -22,10 +22,10 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, ssh_line
-from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import SchemaSelect
 from ddenv.workbench.setup.setup_screen import SetupScreen
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 

@@ -13,10 +13,10 @@ from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.map.picture import strip
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.run.processes import last_line
 from ddenv.workbench.runs.recent_runs import recent_runs
-from ddenv.workbench.wording import about, brief, duration, metres, percent, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.processes import last_line
+from ddenv.workbench.shared.wording import about, brief, duration, metres, percent, plain, shorten
 from ddenv.world.read import parse_world
 
 

@@ -21,12 +21,12 @@ from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
+from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.terminal.parsed_once import ParsedOnce
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 from ddenv.workbench.widgets.breakpoints import classes_at
-from ddenv.workbench.wording import plain
 
 # New objects until garbage is collected, then how often until older ones are looked through, too.
 THRESHOLDS = (20_000, 20, 20)
@@ -137,7 +137,7 @@ class Workbench(App[int]):
         self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
-            from ddenv.workbench.run.observed import Observed
+            from ddenv.workbench.shared.observed import Observed
 
             # Opened before the screen, so that an error in the file is one line in the terminal.
             Observed(run, strictly=watch).close()

@@ -14,7 +14,7 @@ from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.lessons_screen import LessonsScreen
 from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLesson, ShowLessons
+from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 from tests.tiers import slow
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])

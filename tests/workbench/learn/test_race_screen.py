@@ -12,7 +12,7 @@ from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.race_screen import RaceScreen
 from ddenv.workbench.learn.racer_pane import RacerPane
-from ddenv.workbench.messages import ShowLessons, ShowRace
+from ddenv.workbench.shared.messages import ShowLessons, ShowRace
 from tests.command import in_process
 from tests.tiers import slow
 from tests.waiting import eventually

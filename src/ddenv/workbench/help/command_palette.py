@@ -11,8 +11,8 @@ from textual.content import Content
 
 from ddenv.workbench.help.shortcuts import Shortcut, commands
 from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared.wording import plain, shorten
 from ddenv.workbench.terminal.themes import theme_names
-from ddenv.workbench.wording import plain, shorten
 
 # The maximum number of models that are offered: typing more letters finds others.
 MOST_MODELS = 12

@@ -17,7 +17,7 @@ from textual.widgets import Static
 
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.key_names import shown
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.wording import plain
 
 _FOCUS = "to the next or previous pane, field or button"
 _LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"

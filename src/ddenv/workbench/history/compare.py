@@ -17,12 +17,12 @@ from ddenv.guiding.course import place
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Node, RunState
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.history import branches
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared import branches
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, plain
 from ddenv.workbench.widgets.lines import Lines
-from ddenv.workbench.wording import count, plain
 
 
 @dataclass(frozen=True, slots=True)

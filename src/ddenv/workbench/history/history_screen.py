@@ -23,13 +23,13 @@ from ddenv.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.history import branches
 from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
-from ddenv.workbench.run.log import NOTHING_DECIDED, as_it_is, decision_line
+from ddenv.workbench.shared import branches
+from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
+from ddenv.workbench.shared.wording import count, plain, shorten
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
-from ddenv.workbench.wording import count, plain, shorten
 
 # Time between two looks at the run, s.
 PERIOD = 0.5

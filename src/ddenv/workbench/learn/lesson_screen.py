@@ -34,9 +34,9 @@ from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.happening import Happening
-from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.observed import Observed
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import plain
 
 SMALLEST = (64, 20)
 

@@ -19,7 +19,7 @@ from ddenv.learn.shelf import bundled, glance, open_lesson
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, in_words
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.shared.wording import plain, shorten
 
 SHOWN = ("lessons.open", "lessons.help", "lessons.back")
 

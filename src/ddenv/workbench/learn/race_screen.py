@@ -20,9 +20,9 @@ from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.racer_pane import RacerPane
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.run.browsing import Moments
-from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.shared.observed import Observed
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import plain, shorten
 
 SMALLEST = (64, 20)
 # Time between two tests while the race runs, s.

@@ -12,8 +12,8 @@ from ddenv.learn.race import Race
 from ddenv.learn.variables import SIGNS
 from ddenv.workbench.learn.world_maps import snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, plain, shorten
 
 IN, OUT, GONE = "■", "□", "·"
 

@@ -20,8 +20,8 @@ from ddenv.learn.variables import SIGNS
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.world_maps import read_world, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, plain, shorten
 
 SMALLEST = (64, 20)
 NAME = 16

@@ -6,7 +6,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.learn.variables import Variable
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.shared.wording import plain, shorten
 
 CHANGED = "▸"
 WIDTH = 15

@@ -20,9 +20,9 @@ from ddenv.runfile.state import RunState
 from ddenv.words import news
 from ddenv.workbench.lines.said import QUESTIONS
 from ddenv.workbench.lines.typed import GUIDES, meaning
-from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.processes import Engine
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.poll import Poll
+from ddenv.workbench.shared.processes import Engine
+from ddenv.workbench.shared.wording import plain
 
 # How often the run file is read, s, and how many lines of what happened before are said first.
 PERIOD, BEFORE = 0.2, 10

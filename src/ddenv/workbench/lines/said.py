@@ -12,8 +12,8 @@ from ddenv.runs.tests_left import remaining
 from ddenv.words import first_of, headline
 from ddenv.workbench.run.certificate_rows import name_of
 from ddenv.workbench.run.explain import explain
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import about, count, percent, plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import about, count, percent, plain
 
 # The maximum number of models that a line names.
 NAMED = 50

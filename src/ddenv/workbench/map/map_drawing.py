@@ -33,7 +33,7 @@ from ddenv.workbench.map.picture import (
     seen,
 )
 from ddenv.workbench.map.place import Point, Shown
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.motion import pose_of
 
 T = TypeVar("T")

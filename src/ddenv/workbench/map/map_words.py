@@ -15,7 +15,7 @@ from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import drops
 from ddenv.took_part import in_last
 from ddenv.workbench.map.place import Shown
-from ddenv.workbench.wording import DROPS, count, dropping
+from ddenv.workbench.shared.wording import DROPS, count, dropping
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

@@ -31,7 +31,7 @@ from ddenv.workbench.map.map_colors import (
     Tone,
     mixed,
 )
-from ddenv.workbench.wording import DROPS
+from ddenv.workbench.shared.wording import DROPS
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

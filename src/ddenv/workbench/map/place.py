@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddenv.workbench.run.observed import Busy, Observed
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.observed import Busy, Observed
+from ddenv.workbench.shared.poll import Snapshot
 
 if TYPE_CHECKING:
     import numpy as np

@@ -17,7 +17,7 @@ from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.wording import outcome
+from ddenv.workbench.shared.wording import outcome
 
 # The maximum number of tests in the list.
 LISTED = 200

@@ -19,7 +19,6 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
-from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
@@ -30,7 +29,8 @@ from ddenv.workbench.playback.met import Met
 from ddenv.workbench.playback.moving import Moving, RobotWay, snapshot_with, without
 from ddenv.workbench.playback.playing import SPEEDS, STEP, Playing
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.wording import count, plain
 
 SMALLEST = (64, 18)
 # Time between two pictures, s: more would only send more to the terminal.

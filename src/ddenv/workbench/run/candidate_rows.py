@@ -15,8 +15,8 @@ from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.took_part import implied_words
 from ddenv.workbench.run import certificate_rows
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated
 
 # Maximum width of a model's name, in cells.
 NAME = 8

@@ -9,8 +9,8 @@ from ddenv.map.names import shortened
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.runs.fresh_runs import FreshRuns
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import CLAIM, count, percent, signs, simulated
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import CLAIM, count, percent, signs, simulated
 
 # Maximum width of a model's name, in cells.
 NAME = 18

@@ -22,8 +22,8 @@ from ddenv.schemas import Kind, names
 from ddenv.settings import Value
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.methods import KINDS, note, paragraph
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.entry import Entry
-from ddenv.workbench.wording import plain
 
 # Beside the pair and the algorithm, which have lists.
 NUMBERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")

@@ -16,7 +16,7 @@ from textual.widgets.option_list import Option
 from ddenv.map.names import shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.shared.wording import count, plain, shorten
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
 LISTED, WIDTH = 100, 58

@@ -16,8 +16,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Static
 
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.run.processes import Scene
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.processes import Scene
+from ddenv.workbench.shared.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind

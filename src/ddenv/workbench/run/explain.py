@@ -23,8 +23,8 @@ from ddenv.workbench.run.explain_decisions import (
 )
 from ddenv.workbench.run.explain_slices import implied, refuted, sliced
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, metres, percent, plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, metres, percent, plain
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8

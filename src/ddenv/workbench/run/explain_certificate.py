@@ -7,8 +7,8 @@ from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.words import isolating
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import plain
 
 
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:

@@ -6,8 +6,8 @@ from ddenv.claims import drift, has_dropped
 from ddenv.guiding.situation import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, plain
 
 HOW = {
     "adopted": "You adopted {what}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ddenv.runfile.state import RunState
 from ddenv.took_part import TEACHING, refuted_words, slice_words
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.wording import plain
 
 
 def sliced(state: RunState) -> tuple[str, ...]:

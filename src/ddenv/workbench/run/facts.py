@@ -9,10 +9,11 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
 from ddenv.words import first_of
-from ddenv.workbench.wording import OUTCOME, count, metres, plain
+from ddenv.workbench.playback.met import how_it_ended, met
+from ddenv.workbench.shared.wording import count, metres, plain
 
-# The maximum number of models to name, and of lines of a test's log.
-NAMED, LOGGED = 12, 400
+# The maximum number of models to name.
+NAMED = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     models = made.models or ()
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
     said = (
-        ("end", _end(test)),
+        ("end", how_it_ended(test)),
         ("place", _place(test)),
         ("seed", f"{test.seed} (run {test.run})"),
         ("time", _took(test)),
@@ -49,27 +50,7 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     )
     title = f"Test {number} of {len(state.tests)} · {made.words}{again}"
     command = f"ddenv test {run} --test {number}"
-    return Facts(title, tuple((name, words) for name, words in said if words), log(test), command)
-
-
-def log(test: Test) -> tuple[tuple[float, str], ...]:
-    """What the robot met in a test, and when, simulated s."""
-    met = [(at, 0, f"senses {plain(name)}") for name, at in test.first_sensed]
-    met += [(at, 1, f"touches {plain(name)}") for name, at in test.first_touched]
-    lines = [(at, words) for at, _, words in sorted(met)]
-    if len(lines) > LOGGED:
-        lines = [*lines[:LOGGED], (lines[LOGGED][0], f"and {len(lines) - LOGGED} more such lines")]
-    if test.is_finished:
-        lines.append((test.simulated_seconds, _end(test)))
-    return ((0.0, "starts"), *lines)
-
-
-def _end(test: Test) -> str:
-    if test.outcome == "running":
-        return "▶ it runs"
-    why = f": {plain(test.failure)}" if test.failure else ""
-    early = ", ended early: it was stuck for good" if test.cut else ""
-    return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
+    return Facts(title, tuple((name, words) for name, words in said if words), met(test), command)
 
 
 def _place(test: Test) -> str:

@@ -16,7 +16,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.position import Position
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.facts import Facts, facts
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.wording import plain
 
 WIDTH = 11
 

@@ -22,8 +22,8 @@ from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
 from ddenv.words import first_of
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.wording import count, plain, shorten
 from ddenv.workbench.widgets.question import Question
-from ddenv.workbench.wording import count, plain, shorten
 
 # Time between two looks at the run, s.
 PERIOD = 0.5

@@ -15,8 +15,8 @@ from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.browsing import NOT_NOW, Browsing
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_keys import GUIDES, GUIDING
+from ddenv.workbench.shared.poll import Poll
 
 # These ask for models if none are selected. A pin always asks: it ends the search.
 TITLES = {

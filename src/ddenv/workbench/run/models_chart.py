@@ -11,10 +11,10 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.runfile.progress import Point
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.terminal.themes import ink
 from ddenv.workbench.widgets.lines import changed_lines
-from ddenv.workbench.wording import count
 
 LEVELS = " ▁▂▃▄▅▆▇█"
 NEEDED, DECIDED, FREE = "╌", "▲", "▽"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ddenv.claims import ended
 from ddenv.runs.tests_left import remaining
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import STATUS, count, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import STATUS, count, plain, shorten
 
 # Which states end with a notification: the first one of these that follows another state.
 WORTH = ("finished", "failed", "lost", "waiting", "stopped")

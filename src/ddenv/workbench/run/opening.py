@@ -15,16 +15,16 @@ from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
-from ddenv.workbench.background import is_open
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
-from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.processes import Scene
 from ddenv.workbench.run.tests_of_row import of_row
-from ddenv.workbench.wording import attach_name
+from ddenv.workbench.shared.background import is_open
+from ddenv.workbench.shared.poll import Poll
+from ddenv.workbench.shared.processes import Scene
+from ddenv.workbench.shared.wording import attach_name
 
 
 class Opening:

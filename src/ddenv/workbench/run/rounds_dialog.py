@@ -14,7 +14,7 @@ from textual.widgets.option_list import Option
 
 from ddenv.runfile.position import Chapter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.wording import count
+from ddenv.workbench.shared.wording import count
 
 NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
 

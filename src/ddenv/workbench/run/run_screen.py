@@ -20,13 +20,11 @@ from ddenv.runfile.position import Step
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
-from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import Attention
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
@@ -34,18 +32,20 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.run.models_chart import Chart
 from ddenv.workbench.run.models_left import ModelsLeft
 from ddenv.workbench.run.noteworthy import title, worth_a_look
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.poll import Poll, Snapshot
-from ddenv.workbench.run.processes import Engine, Scene
 from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
 from ddenv.workbench.run.status import Header, Status
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
+from ddenv.workbench.shared.messages import Attention
+from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.processes import Engine, Scene
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
-from ddenv.workbench.wording import plain
 
 # The time until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004

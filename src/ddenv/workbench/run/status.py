@@ -16,11 +16,11 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
 from ddenv.version import __version__
-from ddenv.workbench.history.branches import path
 from ddenv.workbench.run.methods import GROUPS, labels
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.branches import path
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import STATUS, about, count, duration, plain, shorten
 from ddenv.workbench.terminal.themes import ink
-from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.

@@ -17,7 +17,7 @@ from textual.widgets import Static
 from ddenv.words import first_of
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
-from ddenv.workbench.wording import brief, count, plain
+from ddenv.workbench.shared.wording import brief, count, plain
 
 # The maximum number of models to name, and width of a value.
 NAMED, LONGEST = 20, 60

@@ -14,15 +14,15 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import call_if_open, is_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.messages import ShowRun, ShowSetup
 from ddenv.workbench.runs.deleted_runs import bring_back, delete_run
 from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
+from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.messages import ShowRun, ShowSetup
+from ddenv.workbench.shared.wording import count, plain, shorten
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import count, plain, shorten
 
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
 PERIOD, PATIENCE = 1.0, 0.3

@@ -22,8 +22,8 @@ from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
 from ddenv.workbench.setup.places import remembered_jobs
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.entry import Entry
-from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

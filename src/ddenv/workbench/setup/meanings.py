@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddenv.workbench.setup.form import Field
-from ddenv.workbench.wording import count, plain
+from ddenv.workbench.shared.wording import count, plain
 
 OURS = ("ddenv", "ddmin", "probdd", "splitting")
 

@@ -17,8 +17,8 @@ from textual.widgets.option_list import Option
 from ddenv.errors import UserError
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.remedies import Missing, remedy
+from ddenv.workbench.shared.wording import count, plain
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import count, plain
 
 OPEN, DONE = "?", "✓"
 HOW = """auto       a guessed shape

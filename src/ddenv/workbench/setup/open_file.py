@@ -17,8 +17,8 @@ from textual.widgets import DirectoryTree, Input, Static
 from ddenv.errors import shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.file_list import is_file
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import plain
 
 SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
 

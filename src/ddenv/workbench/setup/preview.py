@@ -17,7 +17,6 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
-from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
@@ -30,7 +29,8 @@ from ddenv.workbench.setup.missing_list import MissingList
 from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.remedies import remember_remedies
 from ddenv.workbench.setup.start_notes import StartNotes
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.wording import plain, shorten
 
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {

@@ -17,10 +17,8 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import call_if_open
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.arrangement import HEADS, PANES, ROOMY, SMALLEST, VAST, arrange
@@ -31,8 +29,10 @@ from ddenv.workbench.setup.file_list import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.setup_keys import KEYS, SHOWN, keys_at
 from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.messages import ShowRun
+from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.panes import Panes
-from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from textual.app import App
 
 from ddenv.errors import UserError
-from ddenv.workbench.run.processes import Engine
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.equivalent_command import command, source_of
 from ddenv.workbench.setup.file_list import remember
 from ddenv.workbench.setup.places import remember_jobs
+from ddenv.workbench.shared.processes import Engine
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

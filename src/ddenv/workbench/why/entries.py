@@ -12,7 +12,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, parting_sentence, reasons, sentence
 from ddenv.workbench.playback.moving import snapshot_with
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 
 # The maximum number of models in the list.
 LISTED = 200

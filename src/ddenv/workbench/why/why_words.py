@@ -11,8 +11,8 @@ from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
 from ddenv.runs.reasons import no_reasons
 from ddenv.words import isolating
+from ddenv.workbench.shared.wording import CLAIM, percent, plain
 from ddenv.workbench.why.entries import NEAREST, Entry
-from ddenv.workbench.wording import CLAIM, percent, plain
 
 # The width of a row without the model's name.
 FIGURES = 23

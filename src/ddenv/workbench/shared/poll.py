@@ -18,7 +18,7 @@ from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.working import spent
 from ddenv.version import __version__
-from ddenv.workbench.run.observed import Busy, Gone, Observed
+from ddenv.workbench.shared.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.
 LOCK_PERIOD = 0.5

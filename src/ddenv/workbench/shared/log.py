@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ddenv.runfile.state import Decision, RunState
 from ddenv.words import news
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.wording import plain
 
 # Where the words begin, after the time.
 BEGIN = " " * 10
