@@ -8,10 +8,10 @@ import sqlite3
 import pytest
 
 from ddenv.cli.summary import summary_lines
-from ddenv.errors import printable
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
+from ddenv.text import printable
 from ddenv.words import headline
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.config import Config

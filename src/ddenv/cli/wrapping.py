@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ddenv.map.names import width
+from ddenv.text import width
 
 # The minimum width for readable text, columns.
 LEAST = 8

@@ -21,10 +21,10 @@ from ddenv.guiding.situation import (
     names_of,
     new_search,
 )
-from ddenv.map.names import shortened
 from ddenv.runfile.atlas import models_of
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState, Test, Trial
+from ddenv.text import shortened
 from ddenv.words import count
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ddenv.claims import seen
-from ddenv.page.blocks import Block, Cell, Section, Table, moment, plain, say
+from ddenv.page.blocks import Block, Cell, Section, Table, moment, say
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.text import plain
 from ddenv.words import count
 
 # Longer tables of decisions, trials or nodes show only the first and the last rows.

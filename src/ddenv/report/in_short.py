@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ddenv.claims import current, for_everyone
-from ddenv.page.blocks import Name, Paragraph, Part, Strong, duration, plain, say, thousands
+from ddenv.page.blocks import Name, Paragraph, Part, Strong, duration, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState
 from ddenv.runfile.working import spent
+from ddenv.text import plain
 from ddenv.words import count
 
 # Models are named up to this number.

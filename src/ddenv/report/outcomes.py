@@ -14,7 +14,6 @@ from ddenv.page.blocks import (
     Strong,
     Table,
     percent,
-    plain,
     say,
     section,
     thousands,
@@ -23,6 +22,7 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import AHEAD, BROKEN, RunState
+from ddenv.text import plain
 from ddenv.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.words import count, failed_in
 

@@ -15,7 +15,6 @@ from ddenv.page.blocks import (
     moment,
     percent,
     place,
-    plain,
     say,
     section,
     thousands,
@@ -36,6 +35,7 @@ from ddenv.runfile.events import DEEDS, deed, vector
 from ddenv.runfile.failures import Place
 from ddenv.runfile.state import RunState
 from ddenv.runfile.working import spent
+from ddenv.text import plain
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file

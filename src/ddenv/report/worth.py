@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from ddenv.claims import current, drift, meaning, missing, never_left_out, promise, verdict_on
-from ddenv.page.blocks import Block, Cell, Name, Section, Table, percent, plain, say, thousands
+from ddenv.page.blocks import Block, Cell, Name, Section, Table, percent, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.text import plain
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200

@@ -7,13 +7,14 @@ from html import escape
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.page.blocks import Block, Name, Part, Picture, plain, say
+from ddenv.page.blocks import Block, Name, Part, Picture, say
 from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.results import Found
 from ddenv.study.rows import Group, Row, theirs
 from ddenv.study.study_folder import run_path
+from ddenv.text import plain
 from ddenv.words import count
 
 HEIGHT = 320.0

@@ -6,11 +6,12 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from ddenv.page.blocks import Block, Code, Name, Section, Table, duration, moment, plain, say, thousands
+from ddenv.page.blocks import Block, Code, Name, Section, Table, duration, moment, say, thousands
 from ddenv.settings import SETTINGS, Setting
 from ddenv.study.plan import Plan
 from ddenv.study.results import Found
 from ddenv.study.study_folder import RUNS, Sitting
+from ddenv.text import plain
 from ddenv.world.scenario import Scenario
 
 # These differ between cells.

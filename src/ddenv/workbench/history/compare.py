@@ -14,14 +14,14 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from ddenv.guiding.course import place
-from ddenv.map.names import shortened
 from ddenv.runfile.state import Node, RunState
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared import branches
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count, plain
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.lines import Lines
 
 

@@ -19,6 +19,7 @@ from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Decision, Node
+from ddenv.text import plain, shortened
 from ddenv.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
@@ -27,7 +28,7 @@ from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
 from ddenv.workbench.shared import branches
 from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
-from ddenv.workbench.shared.wording import count, plain, shorten
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 
@@ -168,7 +169,7 @@ class History(Screen[int | None]):
         node = self.under_cursor
         if node is None:
             return
-        names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
+        names = first_of([plain(shortened(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
         text = Text(f"{place(node)}: {how}", "bold")
         text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")

@@ -14,7 +14,7 @@ from textual.widgets import Static
 from ddenv.learn.lesson import Question
 from ddenv.learn.lesson_course import LETTERS, Page
 from ddenv.learn.markup import Block
-from ddenv.workbench.shared.wording import plain
+from ddenv.text import plain
 
 # The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines go on below the words.
 BULLET, ANSWER, REMARK = 2, 6, 4

@@ -23,6 +23,7 @@ from ddenv.runfile.position import Position, Step
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_pane import LessonPane
@@ -36,7 +37,6 @@ from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.happening import Happening
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import plain
 
 SMALLEST = (64, 20)
 

@@ -16,13 +16,13 @@ from textual.widgets import Static
 from ddenv.learn.plays import Play, plays_of_runs
 from ddenv.learn.race import Race, result, tally
 from ddenv.runfile.position import position_in
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.racer_pane import RacerPane
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.run.browsing import Moments
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import plain, shorten
 
 SMALLEST = (64, 20)
 # Time between two tests while the race runs, s.
@@ -175,7 +175,7 @@ def _table(race: Race) -> Text:
     for play in race.plays:
         spent = tally(play, race.at).spent
         cells = "".join(f"{spent[kind] or '':>{_wide(head)}}" for kind, head in COLUMNS.items())
-        name = shorten(plain(play.name), width)
+        name = shortened(plain(play.name), width)
         text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
     return text
 

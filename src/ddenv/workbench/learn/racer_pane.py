@@ -10,10 +10,11 @@ from textual.widgets import Static
 from ddenv.learn.plays import Play, Turn
 from ddenv.learn.race import Race
 from ddenv.learn.variables import SIGNS
+from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.learn.world_maps import snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count, plain, shorten
+from ddenv.workbench.shared.wording import count
 
 IN, OUT, GONE = "■", "□", "·"
 
@@ -41,7 +42,7 @@ class RacerPane(Vertical):
         stopped, ended = done and not play.ended, done and play.ended
         figures = f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} left{' ✓' if ended else ''}"
         # As text: a name may look like markup.
-        self.border_title = Text(shorten(plain(play.name), max(6, room - 4 - len(figures))) + figures)
+        self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
         self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
         self._said.update(Text("\n").join(_lines(play, turn, tests, room)))
 
@@ -50,7 +51,7 @@ def _lines(play: Play, turn: Turn | None, tests: int, room: int) -> list[Text]:
     left = play.after(tests)
     there = frozenset(left if turn is None else turn.candidate.models)
     return [
-        Text(shorten(_what(play, turn), room)),
+        Text(truncated(_what(play, turn), room)),
         _bar(play.begins, frozenset(left), there, room),
         _signs(play.turns[:tests], room),
     ]

@@ -6,7 +6,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.learn.variables import Variable
-from ddenv.workbench.shared.wording import plain, shorten
+from ddenv.text import plain, truncated
 
 CHANGED = "▸"
 WIDTH = 15
@@ -43,7 +43,7 @@ class Variables(Widget):
 def _cut(value: str, room: int, rows: int) -> list[str]:
     """At most two lines; the second is indented."""
     if rows == 1 or len(value) <= room:
-        return [shorten(value, room)]
+        return [truncated(value, room)]
     cut = value.rfind(" ", 0, room + 1)
     cut = cut if cut > 0 else room
-    return [value[:cut].rstrip(), " " * (WIDTH + 3) + shorten(value[cut:].strip(), room)]
+    return [value[:cut].rstrip(), " " * (WIDTH + 3) + truncated(value[cut:].strip(), room)]

@@ -12,17 +12,17 @@ from pathlib import Path
 from typing import TextIO
 
 from ddenv import processor
-from ddenv.errors import UserError, printable
+from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
 from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import RunState
+from ddenv.text import plain, printable
 from ddenv.words import news
 from ddenv.workbench.lines.said import QUESTIONS
 from ddenv.workbench.lines.typed import GUIDES, meaning
 from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.shared.processes import Engine
-from ddenv.workbench.shared.wording import plain
 
 # How often the run file is read, s, and how many lines of what happened before are said first.
 PERIOD, BEFORE = 0.2, 10

@@ -9,11 +9,12 @@ from ddenv.claims import drift
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining
+from ddenv.text import plain
 from ddenv.words import first_of, headline
 from ddenv.workbench.run.certificate_rows import name_of
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import about, count, percent, plain
+from ddenv.workbench.shared.wording import about, count, percent
 
 # The maximum number of models that a line names.
 NAMED = 50

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.map.names import shortened
 from ddenv.runfile.state import Test
+from ddenv.text import plain, shortened
 from ddenv.workbench.playback.timeline import ROBOTS
-from ddenv.workbench.shared.wording import OUTCOME, plain
+from ddenv.workbench.shared.wording import OUTCOME
 
 HERE = "▸"
 # The maximum number of lines of a test.

@@ -19,6 +19,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import FRAME, Played, played
 from ddenv.runs.reasons import APART, parted
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
@@ -30,7 +31,7 @@ from ddenv.workbench.playback.moving import Moving, RobotWay, snapshot_with, wit
 from ddenv.workbench.playback.playing import SPEEDS, STEP, Playing
 from ddenv.workbench.playback.timeline import ROBOTS, Instant, Timeline
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.wording import count, plain
+from ddenv.workbench.shared.wording import count
 
 SMALLEST = (64, 18)
 # Time between two pictures, s: more would only send more to the terminal.

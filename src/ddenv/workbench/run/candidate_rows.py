@@ -13,10 +13,11 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.text import plain
 from ddenv.took_part import implied_words
 from ddenv.workbench.run import certificate_rows
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated
+from ddenv.workbench.shared.wording import DROPS, VERDICT, brief, dropping, metres, outcome, signs, simulated
 
 # Maximum width of a model's name, in cells.
 NAME = 8

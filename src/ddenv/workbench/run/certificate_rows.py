@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ddenv.claims import fresh_runs_made, in_the_making, made_of_usual, short
-from ddenv.map.names import shortened
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.runs.fresh_runs import FreshRuns
+from ddenv.text import shortened
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import CLAIM, count, percent, signs, simulated
 

@@ -20,9 +20,9 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Value
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.methods import KINDS, note, paragraph
-from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.entry import Entry
 
 # Beside the pair and the algorithm, which have lists.

@@ -15,9 +15,9 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Button, Static
 
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.processes import Scene
-from ddenv.workbench.shared.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.schemas import Kind

@@ -10,6 +10,7 @@ from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_rates import seen
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
+from ddenv.text import plain
 from ddenv.words import failed_in, other_failures
 from ddenv.workbench.run.explain_certificate import certifying
 from ddenv.workbench.run.explain_decisions import (
@@ -24,7 +25,7 @@ from ddenv.workbench.run.explain_decisions import (
 from ddenv.workbench.run.explain_slices import implied, refuted, sliced
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count, metres, percent, plain
+from ddenv.workbench.shared.wording import count, metres, percent
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8

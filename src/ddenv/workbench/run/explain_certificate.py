@@ -6,9 +6,9 @@ from ddenv.claims import fresh_runs_made, of_runs, terms, usual_runs
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
+from ddenv.text import plain
 from ddenv.words import isolating
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import plain
 
 
 def certifying(snapshot: Snapshot) -> tuple[str, ...]:

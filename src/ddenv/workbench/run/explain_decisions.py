@@ -6,8 +6,9 @@ from ddenv.claims import drift, has_dropped
 from ddenv.guiding.situation import named
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.text import plain
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import count, plain
+from ddenv.workbench.shared.wording import count
 
 HOW = {
     "adopted": "You adopted {what}",

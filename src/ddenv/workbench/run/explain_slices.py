@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ddenv.runfile.state import RunState
+from ddenv.text import plain
 from ddenv.took_part import TEACHING, refuted_words, slice_words
-from ddenv.workbench.shared.wording import plain
 
 
 def sliced(state: RunState) -> tuple[str, ...]:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
+from ddenv.text import plain
 from ddenv.words import first_of
 from ddenv.workbench.playback.met import how_it_ended, met
-from ddenv.workbench.shared.wording import count, metres, plain
+from ddenv.workbench.shared.wording import count, metres
 
 # The maximum number of models to name.
 NAMED = 12

@@ -14,9 +14,9 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.runfile.position import Position
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.facts import Facts, facts
-from ddenv.workbench.shared.wording import plain
 
 WIDTH = 11
 

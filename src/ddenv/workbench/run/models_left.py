@@ -12,8 +12,8 @@ from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.widgets import Static
 
-from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState, partition_letter
+from ddenv.text import padded, shortened
 from ddenv.workbench.widgets.lines import Lines
 
 if TYPE_CHECKING:

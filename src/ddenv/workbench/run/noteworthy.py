@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ddenv.claims import ended
 from ddenv.runs.tests_left import remaining
+from ddenv.text import plain, shortened
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import STATUS, count, plain, shorten
+from ddenv.workbench.shared.wording import STATUS, count
 
 # Which states end with a notification: the first one of these that follows another state.
 WORTH = ("finished", "failed", "lost", "waiting", "stopped")
@@ -16,7 +17,7 @@ STEP = 5
 def title(snapshot: Snapshot) -> str:
     """The run, its state and how far it is, as short as a tab's title has to be."""
     state = snapshot.state
-    name = shorten(plain(state.scenario.get("name", "")), 40)
+    name = shortened(plain(state.scenario.get("name", "")), 40)
     if not state.elements:
         return f"ddenv {name}"
     sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))

@@ -20,6 +20,7 @@ from ddenv.runfile.position import Step
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
@@ -43,7 +44,6 @@ from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_
 from ddenv.workbench.shared.messages import Attention
 from ddenv.workbench.shared.poll import Poll, Snapshot
 from ddenv.workbench.shared.processes import Engine, Scene
-from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
 

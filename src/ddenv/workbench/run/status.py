@@ -15,11 +15,12 @@ from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
+from ddenv.text import plain, shortened, truncated
 from ddenv.version import __version__
 from ddenv.workbench.run.methods import GROUPS, labels
 from ddenv.workbench.shared.branches import path
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.workbench.shared.wording import STATUS, about, count, duration, plain, shorten
+from ddenv.workbench.shared.wording import STATUS, about, count, duration
 from ddenv.workbench.terminal.themes import ink
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
@@ -67,7 +68,7 @@ class Header(Widget):
         right = next((each for each in rights if len(name) + shortest + len(each) + 6 <= width), rights[-1])
         room = max(0, width - 2 - len(name) - len(right) - 4)
         left = next((each for each in self._heading.lefts if len(each) <= room), "")
-        left = left or shorten(next(reversed(self._heading.lefts), ""), room)
+        left = left or truncated(next(reversed(self._heading.lefts), ""), room)
         space = max(1, width - 4 - len(name) - len(left) - len(right))
         text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
         return text.append(f"  {left}", "bold").append(" " * space).append(right)
@@ -264,7 +265,7 @@ def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
     if version in ("", __version__):
         return ("engine ●", "")
     age = "older" if _numbers(version) < _numbers(__version__) else "newer"
-    return (f"engine ● {shorten(version, 12)}, {age}", f"engine {age}")
+    return (f"engine ● {shortened(version, 12)}, {age}", f"engine {age}")
 
 
 def _numbers(version: str) -> list[int]:

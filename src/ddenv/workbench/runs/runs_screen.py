@@ -14,6 +14,7 @@ from textual.screen import Screen
 from textual.widgets import DataTable, Input, Static
 
 from ddenv.errors import UserError
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.deleted_runs import bring_back, delete_run
@@ -21,7 +22,7 @@ from ddenv.workbench.runs.recent_runs import Recent, RunsFolder, named
 from ddenv.workbench.runs.runs_table import ORDERS, RunTable, about, in_few_lines
 from ddenv.workbench.shared.background import call_if_open, is_open
 from ddenv.workbench.shared.messages import ShowRun, ShowSetup
-from ddenv.workbench.shared.wording import count, plain, shorten
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 # The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
@@ -131,7 +132,7 @@ class RunsScreen(Screen[None]):
         panel.border_title = Text(f"Runs: {len(shown)} of {len(self._runs)}" if part else f"Runs: {len(self._runs)}")
         said = [f"{count(works, 'engine')} at work"] if works else []
         if self._marked is not None:
-            said.append(f"marked: {shorten(plain(self._marked.stem), 20)}")
+            said.append(f"marked: {shortened(plain(self._marked.stem), 20)}")
         panel.border_subtitle = Text(" · ".join(said))
         self._show_title()
 

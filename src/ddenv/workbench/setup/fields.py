@@ -18,11 +18,11 @@ from textual.widgets import Button, Input, Label, OptionList, Select, Static
 from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.schemas import Kind, names, uses
+from ddenv.text import plain
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
 from ddenv.workbench.setup.places import remembered_jobs
-from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.entry import Entry
 
 if TYPE_CHECKING:

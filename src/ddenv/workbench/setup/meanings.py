@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ddenv.text import plain
 from ddenv.workbench.setup.form import Field
-from ddenv.workbench.shared.wording import count, plain
+from ddenv.workbench.shared.wording import count
 
 OURS = ("ddenv", "ddmin", "probdd", "splitting")
 

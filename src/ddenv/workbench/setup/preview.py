@@ -17,6 +17,7 @@ from textual.widgets import Static
 
 from ddenv.errors import UserError
 from ddenv.map.raster import arrow
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.map.place import Place, place_of
 from ddenv.workbench.map.world_map import WorldMap
@@ -30,7 +31,6 @@ from ddenv.workbench.setup.places import places_of, remember_places
 from ddenv.workbench.setup.remedies import remember_remedies
 from ddenv.workbench.setup.start_notes import StartNotes
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.wording import plain, shorten
 
 KEYS = {"start": "s", "heading": "h", "goal": "g"}
 ASKS = {
@@ -131,7 +131,7 @@ class Preview(Vertical):
         self.choice = self.picker.choice = choice
 
     def _title(self, name: str) -> None:
-        self.border_title, self.border_subtitle = Text(shorten(plain(name), 40)), ""
+        self.border_title, self.border_subtitle = Text(shortened(plain(name), 40)), ""
 
     @work(thread=True, group="world", exclusive=True)
     def _read(self, path: Path, opened: bool, again: bool = False) -> None:

@@ -13,9 +13,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.path_entry import PathEntry
 
 if TYPE_CHECKING:

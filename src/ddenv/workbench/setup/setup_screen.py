@@ -17,6 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.runs_table import RunList
@@ -31,7 +32,6 @@ from ddenv.workbench.setup.setup_keys import KEYS, SHOWN, keys_at
 from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.messages import ShowRun
-from ddenv.workbench.shared.wording import plain
 from ddenv.workbench.widgets.panes import Panes
 
 if TYPE_CHECKING:

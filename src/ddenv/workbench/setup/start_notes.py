@@ -10,8 +10,8 @@ from textual.widgets import Static
 from textual.worker import get_current_worker
 
 from ddenv.errors import UserError
+from ddenv.text import plain
 from ddenv.workbench.shared.background import call_if_open
-from ddenv.workbench.shared.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.workbench.setup.choice import Choice

@@ -10,8 +10,8 @@ from textwrap import wrap
 from rich.text import Text
 
 from ddenv.runfile.state import Decision, RunState
+from ddenv.text import plain
 from ddenv.words import news
-from ddenv.workbench.shared.wording import plain
 
 # Where the words begin, after the time.
 BEGIN = " " * 10

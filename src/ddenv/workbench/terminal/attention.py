@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ddenv.workbench.shared.wording import plain
+from ddenv.text import plain
 
 BELL = "\x07"
 

@@ -22,6 +22,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import played
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
@@ -31,7 +32,7 @@ from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.observed import Observed
-from ddenv.workbench.shared.wording import attach_name, plain
+from ddenv.workbench.shared.wording import attach_name
 from ddenv.workbench.why.entries import Entry, entries
 from ddenv.workbench.why.why_words import head, head_of, nothing_yet, remedy, row, said
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from ddenv.claims import current, in_the_making, made_of_usual, rate
-from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
 from ddenv.runs.reasons import no_reasons
+from ddenv.text import padded, plain, shortened
 from ddenv.words import isolating
-from ddenv.workbench.shared.wording import CLAIM, percent, plain
+from ddenv.workbench.shared.wording import CLAIM, percent
 from ddenv.workbench.why.entries import NEAREST, Entry
 
 # The width of a row without the model's name.
