@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.learn.recorded_oracle import Oracle
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Event, RunFile
@@ -109,8 +109,7 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
 def _play_of_run(run: Path, events: Sequence[Event]) -> Play:
     """The search of a run. Tests that others imply cost nothing, and are no turns."""
     state, turns, begun = RunState(), list[Turn](), dict[int, tuple[Candidate | Trial, bool]]()
-    for event in events:
-        state = apply(state, event)
+    for event, _, state in steps(events):
         if event.kind == "test_started":
             test = state.tests[event.data["test"] - 1]
             candidate = made_for(state, test)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.claims import current
 from ddenv.errors import UserError
 from ddenv.page.blocks import section
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Event, RunFile
@@ -93,16 +93,14 @@ def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
     state = RunState()
     rounds: dict[int, Round] = {}
     trouble = ""
-    for event in events:
-        try:
-            after = apply(state, event)
-        except UserError as error:
-            trouble = f"{error}; the report shows what came before it"
-            break
-        # A round does not change after its end.
-        if event.kind == "round_started" and state.round is not None:
-            rounds[state.round.number] = state.round
-        state = after
+    try:
+        for event, before, after in steps(events):
+            # A round does not change after its end.
+            if event.kind == "round_started" and before.round is not None:
+                rounds[before.round.number] = before.round
+            state = after
+    except UserError as error:
+        trouble = f"{error}; the report shows what came before it"
     if state.round is not None:
         rounds[state.round.number] = state.round
     return state, tuple(rounds.values()), trouble

@@ -10,7 +10,7 @@ from pathlib import Path
 from ddenv.claims import current, is_minimal
 from ddenv.errors import UserError
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import FRESH, RunState, Test
 from ddenv.runfile.store import Event, RunFile
@@ -172,8 +172,8 @@ def _story(events: Iterable[Event]) -> _Story:
     certificates: dict[int, None] = {}
     sizes: list[tuple[int, int]] = []
     misses: list[int] = []
-    for event in events:
-        state, data = apply(state, event), event.data
+    for event, _, state in steps(events):
+        data = event.data
         match event.kind:
             case "test_finished" if state.tests[data["test"] - 1].phase == "baseline":
                 search[data["test"]] = None

@@ -46,7 +46,7 @@ class LineMode:
         self._news: deque[str] = deque(maxlen=BEFORE)
         self._engine = Engine(path)
         self._poll = Poll(path, starting=lambda: self._engine.starting, watch=watch, on_event=self._happened)
-        self._revision, self._error = 0, ""
+        self._error = ""
         # What a yes would send.
         self._asked: Command | None = None
 
@@ -67,9 +67,6 @@ class LineMode:
         self._poll.close()
 
     def _happened(self, kind: str, before: RunState, after: RunState) -> None:
-        if after.revision <= self._revision:
-            return
-        self._revision = after.revision
         if words := news(kind, before, after, attached=True):
             self._news.append(words)
 

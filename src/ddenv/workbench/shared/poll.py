@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import Follower
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
@@ -104,7 +104,7 @@ class Poll:
     """One open run file, which is only ever read.
 
     `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written.
-    `on_event` is called with each event's kind and the states before and after it; twice with the same if a look was cut short.
+    `on_event` is called once with each event's kind and the states before and after it.
     """
 
     def __init__(
@@ -120,6 +120,7 @@ class Poll:
         self.watch = watch
         self._on_event = on_event
         self.file = Observed(path, strictly=watch)
+        self._follower = Follower(self.file)
         self._starting = starting
         self._snapshot: Snapshot | None = None
         self._behind = self._catching_up = True
@@ -173,7 +174,8 @@ class Poll:
             if (engine, spent) == (last.engine, last.spent):
                 return last
             return replace(last, engine=engine, spent=spent)
-        state, error, more = self._fold(last.state if last else RunState())
+        error, more = self._follow()
+        state = self._follower.state
         spent = self._spent(state, engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
@@ -191,23 +193,22 @@ class Poll:
         error = f"{why}; what you see is what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
-    def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
-        """The state after the new events, up to the first invalid one; what is wrong with that; whether there are more."""
+    def _follow(self) -> tuple[str, bool]:
+        """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
         begun, more = time.monotonic(), True
         try:
             while more:
-                events = self.file.events(state.revision, SOME_EVENTS)
-                for event in events:
-                    before, state = state, apply(state, event)
-                    self._on_event(event.kind, before, state)
-                more = len(events) == SOME_EVENTS
+                more = False
+                for event, before, after in self._follower.new(SOME_EVENTS):
+                    self._on_event(event.kind, before, after)
+                    more = True
                 if time.monotonic() - begun > PATIENCE:
                     break
         except Busy:
             raise
         except UserError as error:
-            return state, str(error), False
-        return state, "", more
+            return str(error), False
+        return "", more
 
     def _engine(self) -> EngineIs:
         moment = time.monotonic()
