@@ -1,4 +1,4 @@
-"""The user's own theme, keys and notifications, from a file in the folder for settings; and the lines of `ddenv config`."""
+"""The user's own theme, keys and notifications, from a file; all actions that have keys; the lines of `ddenv config`."""
 
 from __future__ import annotations
 

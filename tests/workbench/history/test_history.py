@@ -10,8 +10,7 @@ from textual.widgets import DataTable
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Node
-from ddenv.workbench.history.compare import Compare, compare
-from ddenv.workbench.history.history_screen import History
+from ddenv.workbench.history.history_screen import Compare, History, compare
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared import branches
 from ddenv.workbench.widgets.lines import Lines

@@ -9,10 +9,9 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.lesson_pane import LessonPane
+from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.lessons_screen import LessonsScreen
-from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 from tests.tiers import slow

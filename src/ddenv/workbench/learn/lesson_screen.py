@@ -26,10 +26,9 @@ from ddenv.runfile.tested import told
 from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.lesson_pane import LessonPane
+from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.race_screen import RaceScreen
 from ddenv.workbench.learn.try_screen import TryScreen
-from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap

@@ -32,13 +32,10 @@ from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
 from ddenv.workbench.run.happening import Happening
-from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.models_chart import Chart
-from ddenv.workbench.run.models_left import ModelsLeft
-from ddenv.workbench.run.noteworthy import title, worth_a_look
+from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
-from ddenv.workbench.run.status import Header, Status
+from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.status import Header, Status, title, worth_a_look
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
 from ddenv.workbench.shared.messages import Attention

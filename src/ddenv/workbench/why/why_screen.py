@@ -33,8 +33,7 @@ from ddenv.workbench.playback.playback_screen import Playback
 from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.shared.observed import Observed
 from ddenv.workbench.shared.wording import attach_name
-from ddenv.workbench.why.entries import Entry, entries
-from ddenv.workbench.why.why_words import head, head_of, nothing_yet, remedy, row, said
+from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.
