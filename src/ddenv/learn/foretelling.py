@@ -19,6 +19,59 @@ SAID = {
 }
 # Candidates of a round to choose from, and models of a candidate that are named there.
 MOST, FEW = 5, 3
+# By the setting `growth`, what n does.
+_GROWTH = {
+    "paper": "After each round n grows by one, but never above the number of models.",
+    "steady": "n grows by one after a round without f, but never above the number of models. After a reduction it stays.",
+}
+_OF_OTHER = (
+    Answer(
+        "It may have another cause, so it does not count as f.",
+        True,
+        "Only an end like that of f counts. This one is elsewhere, or came about otherwise.",
+    ),
+    Answer("Any failure is good enough: this is f.", False, "Only the same failure counts, close to f's end.", "any"),
+    Answer(
+        "The test is broken: fewer models cannot make the robot fail.",
+        False,
+        "With fewer models the robot can take another path, and find another trap.",
+        "fewer",
+    ),
+)
+_ALWAYS_THROUGH = Answer(
+    "With fewer models the robot always gets through.",
+    False,
+    "Not always: fewer models can open a path into another trap.",
+    "fewer",
+)
+_OF_MISS = (
+    Answer(
+        "Something that f needs is probably gone.",
+        True,
+        "Probably: one miss can be bad luck where a failure is flaky. That is why tests are repeated.",
+    ),
+    Answer(
+        "Now it is proved that f needs what was left out.",
+        False,
+        "It may have been bad luck: one test proves little.",
+        "proof",
+    ),
+    _ALWAYS_THROUGH,
+)
+# Where each candidate has one run.
+_OF_ONLY_MISS = (
+    Answer(
+        "Something that f needs is gone.",
+        True,
+        "This search runs each candidate once, so a single miss decides.",
+    ),
+    Answer(
+        "It was bad luck: another run would show f.",
+        False,
+        "That can happen where a failure is flaky. This search runs each candidate once, and takes the miss as its answer.",
+    ),
+    _ALWAYS_THROUGH,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +221,6 @@ def _name(one: Candidate) -> str:
 
 # How E is split next.
 
-# By the setting `growth`, what n does.
-_GROWTH = {
-    "paper": "After each round n grows by one, but never above the number of models.",
-    "steady": "n grows by one after a round without f, but never above the number of models. After a reduction it stays.",
-}
-
 
 def _parts(position: Position, moment: Moment) -> Foretelling | None:
     found = _chapter(position, moment)
@@ -284,56 +331,6 @@ def _of_f(gone: str, options: Settings) -> tuple[Answer, ...]:
             "smallest",
         ),
     )
-
-
-_OF_OTHER = (
-    Answer(
-        "It may have another cause, so it does not count as f.",
-        True,
-        "Only an end like that of f counts. This one is elsewhere, or came about otherwise.",
-    ),
-    Answer("Any failure is good enough: this is f.", False, "Only the same failure counts, close to f's end.", "any"),
-    Answer(
-        "The test is broken: fewer models cannot make the robot fail.",
-        False,
-        "With fewer models the robot can take another path, and find another trap.",
-        "fewer",
-    ),
-)
-_ALWAYS_THROUGH = Answer(
-    "With fewer models the robot always gets through.",
-    False,
-    "Not always: fewer models can open a path into another trap.",
-    "fewer",
-)
-_OF_MISS = (
-    Answer(
-        "Something that f needs is probably gone.",
-        True,
-        "Probably: one miss can be bad luck where a failure is flaky. That is why tests are repeated.",
-    ),
-    Answer(
-        "Now it is proved that f needs what was left out.",
-        False,
-        "It may have been bad luck: one test proves little.",
-        "proof",
-    ),
-    _ALWAYS_THROUGH,
-)
-# Where each candidate has one run.
-_OF_ONLY_MISS = (
-    Answer(
-        "Something that f needs is gone.",
-        True,
-        "This search runs each candidate once, so a single miss decides.",
-    ),
-    Answer(
-        "It was bad luck: another run would show f.",
-        False,
-        "That can happen where a failure is flaky. This search runs each candidate once, and takes the miss as its answer.",
-    ),
-    _ALWAYS_THROUGH,
-)
 
 
 def is_last(round: Round) -> bool:

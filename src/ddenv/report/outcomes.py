@@ -21,6 +21,26 @@ from ddenv.words import count, failed_in
 # The maximum number of models with a row each.
 MOST_ROWS = 200
 WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
+MEANING = {
+    "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
+    "other": "another failure",
+    "pass": "the goal was reached",
+    "error": "the simulation broke",
+    "timeout": "the test took too long on the clock",
+    "failed": "failed, before f was fixed",
+}
+PHASES = (
+    ("baseline", "whole world"),
+    ("round", "in rounds"),
+    (AHEAD, "ahead of their rounds"),
+    ("hand", "by hand"),
+    ("audit", "audits of slices"),
+    ("certify", "fresh runs"),
+    ("isolate", "isolation"),
+    ("confirm", "full runs at the end"),
+)
+# The maximum number of failures in the table, and of models by name.
+MOST, MOST_NAMES = 30, 6
 
 
 def interval(base: Baseline) -> str:
@@ -41,26 +61,6 @@ def interval(base: Baseline) -> str:
         f'<circle class="dot" cx="{at(base.rate):.1f}" cy="{LINE}" r="6"/>'
         f'<text class="said" x="{at(base.rate):.1f}" y="{LINE - 13}" text-anchor="middle">{percent(base.rate)}</text></svg>'
     )
-
-
-MEANING = {
-    "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
-    "other": "another failure",
-    "pass": "the goal was reached",
-    "error": "the simulation broke",
-    "timeout": "the test took too long on the clock",
-    "failed": "failed, before f was fixed",
-}
-PHASES = (
-    ("baseline", "whole world"),
-    ("round", "in rounds"),
-    (AHEAD, "ahead of their rounds"),
-    ("hand", "by hand"),
-    ("audit", "audits of slices"),
-    ("certify", "fresh runs"),
-    ("isolate", "isolation"),
-    ("confirm", "full runs at the end"),
-)
 
 
 def sureness(record: Record) -> Section | None:
@@ -175,10 +175,6 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
     return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
-
-
-# The maximum number of failures in the table, and of models by name.
-MOST, MOST_NAMES = 30, 6
 
 
 def others_met(record: Record) -> Section | None:

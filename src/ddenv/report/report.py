@@ -40,6 +40,11 @@ from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.files.access import write_file
 
+KINDS = (".html", ".htm", ".md")
+PICTURES = ("map", "near", "chart", "interval")
+# Models are named up to this number.
+MOST_NAMES = 6
+
 
 def content(record: Record) -> Report:
     """The report on a run."""
@@ -167,10 +172,6 @@ def _foot(record: Record) -> str:
     return f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m."
 
 
-KINDS = (".html", ".htm", ".md")
-PICTURES = ("map", "near", "chart", "interval")
-
-
 def files_of(file: Path) -> list[Path]:
     """The files that a report called `file` may consist of."""
     beside = PICTURES if file.suffix.lower() == ".md" else ()
@@ -216,10 +217,6 @@ def _check(file: Path) -> None:
             raise UserError(f"{file}: there is no folder {file.parent}")
     except OSError as error:
         raise UserError(f"{file}: cannot be written: {error.strerror}") from None
-
-
-# Models are named up to this number.
-MOST_NAMES = 6
 
 
 def in_short(record: Record) -> list[Paragraph]:

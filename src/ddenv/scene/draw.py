@@ -20,6 +20,19 @@ from ddenv.world.pose import Pose, Vector
 
 # With more elements than this, those that never move are drawn together. A browser takes some 10 ms for each object of its own.
 MOST_SINGLE = 300
+WORLD: Path = ("world",)
+MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
+ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
+# The robot of a second run, its path, and where the two runs part.
+GHOST, GHOST_TRAIL, PARTING = (*WORLD, "ghost"), (*WORLD, "ghost-trail"), (*WORLD, "parting")
+PARTS: Path = (*WORLD, "parts")
+MOST_LETTERS = 200  # of partitions
+# Points in one piece of a growing trail: only the last piece is sent again.
+PIECE = 24
+GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
+STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
+LINE = 0.025  # radius of drawn trajectories, m
+ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 
 class Crowd:
@@ -50,21 +63,6 @@ class Crowd:
     def _outlines(self, names: Iterable[str], color: colors.Color) -> Object | None:
         ends = [self._edges[name] for name in sorted(names) if name in self._edges]
         return lines(np.concatenate(ends), color) if ends else None
-
-
-WORLD: Path = ("world",)
-MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
-ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
-# The robot of a second run, its path, and where the two runs part.
-GHOST, GHOST_TRAIL, PARTING = (*WORLD, "ghost"), (*WORLD, "ghost-trail"), (*WORLD, "parting")
-PARTS: Path = (*WORLD, "parts")
-MOST_LETTERS = 200  # of partitions
-# Points in one piece of a growing trail: only the last piece is sent again.
-PIECE = 24
-GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
-STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
-LINE = 0.025  # radius of drawn trajectories, m
-ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
 
 
 def safe_name(number: int, name: str) -> str:

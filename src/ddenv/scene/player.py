@@ -34,6 +34,8 @@ from ddenv.world.scenario import Goal, Spawn
 
 # Digits after the point: a hundredth of a millimetre.
 DIGITS = 5
+READ_EVERY = 0.1  # time between reads of the run file, s
+LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
 
 
 def rows_of(samples: array[float]) -> np.ndarray:
@@ -96,10 +98,6 @@ def pairs_of(run: RunFile, state: RunState) -> list[dict[str, Any]]:
         }
         for words, one in found
     ]
-
-
-READ_EVERY = 0.1  # time between reads of the run file, s
-LOOK_FOR_ENGINE = 1.0  # time between checks for a working engine, s
 
 
 class Player:

@@ -37,6 +37,53 @@ from ddenv.words import count
 from ddenv.world.files.access import write_file
 from ddenv.world.scenario import Scenario
 
+STEM = "study"
+# The columns of `study.csv`.
+HEADER = (
+    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "slices", "certified", "problem"),
+    *("models", "left", "reduction", "names", "tests", "simulated", "reruns"),
+    *("certificate_tests", "certificate_simulated", "ahead", "taken_over"),
+    *("seconds", "certificate_seconds", "steps_back", "baseline_runs", "baseline_f", "least_to_show", "least_to_find"),
+    *("keep_rate", "whole_runs", "whole_f", "left_runs", "left_f", "left_low", "left_high", "without_most"),
+    *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
+)
+# These differ between cells.
+OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
+COLUMNS = (
+    (
+        "search tests",
+        "runs of the robot: the baseline, and those behind each verdict of the search. Runs that idle workers made ahead of time "
+        "and that were not needed do not count.",
+    ),
+    (
+        "certificate tests",
+        "runs with fresh seeds that the certificate rests on: of what is left, of that without each of its models, and of the "
+        "whole world; with steps back, those of all certificates.",
+    ),
+    (
+        "with slices",
+        "the tests of another reduction, which makes no test that a finished run implies: those that were simulated, with the "
+        "audits. All other columns are without slices, as the paper's.",
+    ),
+    ("% reduction", "the part of the models that was removed."),
+    ("search minutes, certificate minutes", "the time of these tests, one after another, as the paper made its tests."),
+    (
+        "certified",
+        "whether the certificate shows that what is left keeps the rate of f (keep rate, above), and that it does not without any "
+        "one of its models.",
+    ),
+    ("re-runs", "the share of the search tests that repeat a candidate (the paper's deflaking)."),
+    ("f in the whole world", "all runs of the whole world that ended as f did, with Wilson's 95 % interval."),
+    ("f in what is left", "runs with fresh seeds that ended so, with the interval."),
+    ("f without one of them", "the highest of these rates without one of the models that are left."),
+    ("steps back", "how often the search went back because a certificate showed that the rate of f was lost."),
+    (
+        "least tests",
+        "the minimum for any search: the baseline, f once in what is left, and each of its models left out without success, with "
+        "as many runs as a candidate without f takes.",
+    ),
+)
+
 
 def content(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Report:
     """The page of a study; `found` are the cells of `plan` in its order."""
@@ -119,18 +166,6 @@ def _figures(
     return tuple(figures)
 
 
-STEM = "study"
-# The columns of `study.csv`.
-HEADER = (
-    *("scenario", "algorithm", "partitioning", "prioritization", "seed", "slices", "certified", "problem"),
-    *("models", "left", "reduction", "names", "tests", "simulated", "reruns"),
-    *("certificate_tests", "certificate_simulated", "ahead", "taken_over"),
-    *("seconds", "certificate_seconds", "steps_back", "baseline_runs", "baseline_f", "least_to_show", "least_to_find"),
-    *("keep_rate", "whole_runs", "whole_f", "left_runs", "left_f", "left_low", "left_high", "without_most"),
-    *("paper_tests", "paper_reduction", "paper_minutes", "ddenv", "simulator", "run"),
-)
-
-
 def write_study(plan: Plan, folder: Path, sittings: Sequence[Sitting]) -> tuple[Path, tuple[Found, ...]]:
     """Writes `study.html`, `study.md` with its figures, and `study.csv`; returns the page and its cells. Raises UserError."""
     found = tuple(read_cell(folder, cell) for cell in plan.cells)
@@ -189,44 +224,6 @@ def _of_certificate(each: Found) -> tuple[object, ...]:
     of_left = (left.runs, left.shown, round(left.low, 4), round(left.high, 4))
     whole = (each.certificate.keep_rate, each.whole_runs, each.whole_shown)
     return (*whole, *of_left, "" if most is None else round(most, 4))
-
-
-# These differ between cells.
-OF_A_CELL = ("algorithm", "pair", "seed", "budget", "slice")
-COLUMNS = (
-    (
-        "search tests",
-        "runs of the robot: the baseline, and those behind each verdict of the search. Runs that idle workers made ahead of time "
-        "and that were not needed do not count.",
-    ),
-    (
-        "certificate tests",
-        "runs with fresh seeds that the certificate rests on: of what is left, of that without each of its models, and of the "
-        "whole world; with steps back, those of all certificates.",
-    ),
-    (
-        "with slices",
-        "the tests of another reduction, which makes no test that a finished run implies: those that were simulated, with the "
-        "audits. All other columns are without slices, as the paper's.",
-    ),
-    ("% reduction", "the part of the models that was removed."),
-    ("search minutes, certificate minutes", "the time of these tests, one after another, as the paper made its tests."),
-    (
-        "certified",
-        "whether the certificate shows that what is left keeps the rate of f (keep rate, above), and that it does not without any "
-        "one of its models.",
-    ),
-    ("re-runs", "the share of the search tests that repeat a candidate (the paper's deflaking)."),
-    ("f in the whole world", "all runs of the whole world that ended as f did, with Wilson's 95 % interval."),
-    ("f in what is left", "runs with fresh seeds that ended so, with the interval."),
-    ("f without one of them", "the highest of these rates without one of the models that are left."),
-    ("steps back", "how often the search went back because a certificate showed that the rate of f was lost."),
-    (
-        "least tests",
-        "the minimum for any search: the baseline, f once in what is left, and each of its models left out without success, with "
-        "as many runs as a candidate without f takes.",
-    ),
-)
 
 
 def making(plan: Plan, found: Sequence[Found], sittings: Sequence[Sitting], folder: Path) -> Section:

@@ -25,6 +25,20 @@ HEIGHT = 320.0
 LINE, SAMPLE = 22.0, 30.0
 # Widths of the lines of methods with their own colour: where lines coincide, the wider first ones stay visible.
 WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
+# The maximum number of worlds drawn for a scenario, and of models named for each.
+MOST_WORLDS, MOST_LEFT = 4, 12
+# The maximum number of models that are named.
+MOST_NAMES = 8
+# With more methods than this, the details are not a table but a sentence for each set of models that is left.
+MOST_ROWS = 12
+# The maximum number of cells with the same problem that are named.
+MOST_CELLS = 3
+BEHIND = (
+    *("method", "re-runs", "models left", "f in the whole world", "f in what is left", "f without one of them"),
+    *("steps back", "least tests"),
+)
+# A comparison needs at least this many methods.
+FEWEST = 4
 
 
 def chart(group: Group) -> str:
@@ -94,10 +108,6 @@ def _line_end(row: Row) -> str:
     return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}{doubt}"
 
 
-# The maximum number of worlds drawn for a scenario, and of models named for each.
-MOST_WORLDS, MOST_LEFT = 4, 12
-
-
 def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
     """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
     sets: dict[tuple[str, ...], list[Found]] = {}
@@ -138,14 +148,6 @@ def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
         f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
     )
     yield Picture(name, picture(record, plan(record.world, CORNERS), name), alternative)
-
-
-# The maximum number of models that are named.
-MOST_NAMES = 8
-# With more methods than this, the details are not a table but a sentence for each set of models that is left.
-MOST_ROWS = 12
-# The maximum number of cells with the same problem that are named.
-MOST_CELLS = 3
 
 
 def section(folder: Path, group: Group) -> Section:
@@ -224,12 +226,6 @@ def _minutes(value: float) -> str:
 
 def _has_theirs(group: Group) -> bool:
     return any(theirs(row.found[0].cell) is not None for row in group.rows)
-
-
-BEHIND = (
-    *("method", "re-runs", "models left", "f in the whole world", "f in what is left", "f without one of them"),
-    *("steps back", "least tests"),
-)
 
 
 def behind(group: Group) -> Table:
@@ -322,10 +318,6 @@ def _problems(group: Group) -> Iterator[Paragraph]:
     for problem, names in cells.items():
         which = "; ".join(names) if len(names) <= MOST_CELLS else count(len(names), "cell")
         yield say(f"Not certified: {which}: {problem}.", notice=True)
-
-
-# A comparison needs at least this many methods.
-FEWEST = 4
 
 
 def best(groups: Sequence[Group]) -> Section | None:

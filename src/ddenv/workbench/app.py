@@ -28,14 +28,19 @@ from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, 
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
 
+BELL = "\x07"
+# New objects until garbage is collected, then how often until older ones are looked through, too.
+THRESHOLDS = (20_000, 20, 20)
+# The keys that move the focus, with Textual's actions for them.
+TABS = {"tab": ("app.focus_next",), "shift+tab": ("app.focus_previous",)}
+# So many notices wait for a dialog to close, the latest ones.
+HELD = 3
+
 
 def classes_at(screen: type[Screen[Any]], size: Size) -> str:
     """The classes of its breakpoints. A screen that begins with them computes its styles and its layout once, not twice."""
     sides = (screen.HORIZONTAL_BREAKPOINTS or (), size.width), (screen.VERTICAL_BREAKPOINTS or (), size.height)
     return " ".join(max(each for each in steps if each[0] <= length)[1] for steps, length in sides if steps)
-
-
-BELL = "\x07"
 
 
 def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
@@ -55,14 +60,6 @@ class ParsedOnce(Stylesheet):
     def reparse(self) -> None:
         """Parses what is new. Raises what `Stylesheet.parse` raises."""
         self.parse()
-
-
-# New objects until garbage is collected, then how often until older ones are looked through, too.
-THRESHOLDS = (20_000, 20, 20)
-# The keys that move the focus, with Textual's actions for them.
-TABS = {"tab": ("app.focus_next",), "shift+tab": ("app.focus_previous",)}
-# So many notices wait for a dialog to close, the latest ones.
-HELD = 3
 
 
 @dataclass(frozen=True, slots=True)

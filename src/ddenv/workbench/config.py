@@ -20,6 +20,20 @@ from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.help.key_names import shown_key, textual_keys, written
 from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
 
+KNOWN = ("theme", "notify", "keys")
+# The head of the example.
+INTRODUCTION = """# Settings of the ddenv workbench: {path}
+# Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
+
+# {themes}
+# theme: {theme}
+
+# Whether the terminal rings and shows a notification when a run ends, or waits for you.
+# notify: yes
+
+# The key of each action. Several keys are separated by commas.
+keys:"""
+
 
 @dataclass(frozen=True, slots=True)
 class Action:
@@ -94,9 +108,6 @@ def _bindings(owner: type[DOMNode]) -> Iterator[Binding]:
             yield from (binding for binding in vars(each).get("BINDINGS", ()) if isinstance(binding, Binding))
 
 
-KNOWN = ("theme", "notify", "keys")
-
-
 def config_path() -> Path:
     """The path of the file: `$DDENV_CONFIG`, or `config.yaml` in the user's folder for settings."""
     named = os.environ.get("DDENV_CONFIG")
@@ -168,20 +179,6 @@ def _wanted(keys: Any, path: Path) -> dict[str, str]:
                 f"{path}: keys: {id}: expected a key such as p, in quotes if it is punctuation; found {value!r}"
             )
     return {str(id): str(value) for id, value in keys.items()}
-
-
-# The head of the example.
-INTRODUCTION = """# Settings of the ddenv workbench: {path}
-# Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
-
-# {themes}
-# theme: {theme}
-
-# Whether the terminal rings and shows a notification when a run ends, or waits for you.
-# notify: yes
-
-# The key of each action. Several keys are separated by commas.
-keys:"""
 
 
 def lines() -> list[str]:

@@ -43,6 +43,15 @@ TREE = 15
 MARK = "marked"
 # Where the words of a decision begin, after its time.
 INDENT = 10
+HOW = {
+    "start": "where the run began",
+    "reduced": "reduced to what shows f",
+    "adopted": "a try by hand that showed f",
+    "accepted": "another failure, accepted as f, too",
+    "instead": "a branch: the failure of this test is f here",
+    "certified": "reduced by a certificate: fresh runs show f as often",
+    "sliced": "reduced without a test to what took part",
+}
 
 
 class Tree(DataTable[Text]):
@@ -231,17 +240,6 @@ def decision_lines(decision: Decision, width: int) -> list[Text]:
 
 def _side(name: str) -> Literal["left", "right"]:
     return "right" if name in ("#", "tests", "f shown") else "left"
-
-
-HOW = {
-    "start": "where the run began",
-    "reduced": "reduced to what shows f",
-    "adopted": "a try by hand that showed f",
-    "accepted": "another failure, accepted as f, too",
-    "instead": "a branch: the failure of this test is f here",
-    "certified": "reduced by a certificate: fresh runs show f as often",
-    "sliced": "reduced without a test to what took part",
-}
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ from ddenv.text import plain, truncated
 # The widths of what stands before an entry of a list, an answer, and a remark on it: longer lines go on below the words.
 BULLET, ANSWER, REMARK = 2, 6, 4
 STYLES = {"": "", "strong": "bold", "emphasis": "italic", "code": "bold"}
+CHANGED = "▸"
+WIDTH = 15
 
 
 class LessonPane(VerticalScroll):
@@ -137,10 +139,6 @@ def _verdict(question: Question, page: Page, room: int) -> Text:
     for mark, why in page.remarks:
         text.append("\n").append_text(_hung(Text(f"{mark} {plain(why)}"), REMARK, room))
     return text
-
-
-CHANGED = "▸"
-WIDTH = 15
 
 
 class Variables(Widget):

@@ -27,6 +27,15 @@ from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import count
 
 IN, OUT, GONE = "■", "□", "·"
+SMALLEST = (64, 20)
+# Time between two tests while the race runs, s.
+PACE = 0.7
+# Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
+BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
+LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
+# What the tests were good for; the rest is rare.
+COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
+NAME = 24
 
 
 class RacerPane(Vertical):
@@ -88,17 +97,6 @@ def _signs(turns: tuple[Turn, ...], room: int) -> Text:
     cut = len(turns) > room
     shown = turns[-(room - 1) :] if cut else turns
     return Text(("…" if cut else "") + "".join(SIGNS.get(turn.outcome, "?") for turn in shown), no_wrap=True)
-
-
-SMALLEST = (64, 20)
-# Time between two tests while the race runs, s.
-PACE = 0.7
-# Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
-BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
-LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
-# What the tests were good for; the rest is rare.
-COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
-NAME = 24
 
 
 def _ids(names: str) -> tuple[str, ...]:

@@ -34,6 +34,26 @@ from ddenv.workbench.shared.wording import about, count, percent
 NAMED = 50
 # The tries that are listed, the latest ones.
 TRIES = 5
+# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and what it does.
+GUIDES = {
+    "pause": ("pause", "space", "start no new test; again to go on"),
+    "step": ("step", "s", "run one test, then pause"),
+    "round": ("step_round", "S", "run to the end of the round, then pause"),
+    "accept": ("accept", "a", "accept the reduction that waits; 'accept try 1' adopts a try that shows f"),
+    "reject": ("reject", "x", "reject the reduction that waits"),
+    "veto": ("veto", "v", "leave out a candidate: 'veto part B'; again takes that back"),
+    "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
+    "without": ("without", "w", "try the environment without models: 'without crate_01'"),
+    "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
+    "undo": ("undo", "u", "take back the last reduction"),
+    "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
+    "resume": ("resume", "r", "start the engine again"),
+}
+_KEYS = {key: words for words, (_, key, _) in GUIDES.items()}
+# How often the run file is read, s, and how many lines of what happened before are said first.
+PERIOD, BEFORE = 0.2, 10
+YES = ("y", "yes")
+WATCHING = "watching only: nothing that you type changes the run"
 
 
 def status(snapshot: Snapshot) -> Iterator[str]:
@@ -111,23 +131,6 @@ QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
     "decisions": (decisions, "what you decided"),
 }
 
-# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and what it does.
-GUIDES = {
-    "pause": ("pause", "space", "start no new test; again to go on"),
-    "step": ("step", "s", "run one test, then pause"),
-    "round": ("step_round", "S", "run to the end of the round, then pause"),
-    "accept": ("accept", "a", "accept the reduction that waits; 'accept try 1' adopts a try that shows f"),
-    "reject": ("reject", "x", "reject the reduction that waits"),
-    "veto": ("veto", "v", "leave out a candidate: 'veto part B'; again takes that back"),
-    "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
-    "without": ("without", "w", "try the environment without models: 'without crate_01'"),
-    "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
-    "undo": ("undo", "u", "take back the last reduction"),
-    "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
-    "resume": ("resume", "r", "start the engine again"),
-}
-_KEYS = {key: words for words, (_, key, _) in GUIDES.items()}
-
 
 def meaning(line: str, now: Situation) -> Offer | None:
     """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model that there is not."""
@@ -157,12 +160,6 @@ def _row(typed: str, state: RunState) -> Row:
     if found is None:
         raise UserError(f"there is no '{typed}' in this round; 'table' lists the candidates and tries")
     return found
-
-
-# How often the run file is read, s, and how many lines of what happened before are said first.
-PERIOD, BEFORE = 0.2, 10
-YES = ("y", "yes")
-WATCHING = "watching only: nothing that you type changes the run"
 
 
 def follow_in_lines(path: Path, watch: bool, typed: TextIO, out: TextIO) -> None:

@@ -38,6 +38,9 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 USUAL = 4.0
 # One long step, simulated s.
 STEP = 1.0
+SMALLEST = (64, 18)
+# Time between two pictures, s: more would only send more to the terminal.
+PERIOD = 0.1
 
 
 class Playing:
@@ -80,11 +83,6 @@ class Playing:
         if self.on:
             self.time = min(self.length, self.time + seconds * self.speed)
             self.on = not self.at_end
-
-
-SMALLEST = (64, 18)
-# Time between two pictures, s: more would only send more to the terminal.
-PERIOD = 0.1
 
 
 def now() -> float:

@@ -26,6 +26,8 @@ from ddenv.workbench.shared.wording import count
 if TYPE_CHECKING:
     from ddenv.schemas import Kind
 
+NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
+
 
 class Method(ModalScreen[None]):
     """Algorithm, partitioning and prioritization of a run, each with its explanation."""
@@ -145,9 +147,6 @@ def ssh_line(url: str) -> str:
     """The command that makes the scene of this machine reachable from another one."""
     port = urlsplit(url).port
     return f"ssh -L {port}:127.0.0.1:{port} {getpass.getuser()}@{socket.gethostname()}"
-
-
-NAME, MODELS, LEFT, TESTS = 16, 8, 10, 14
 
 
 class Rounds(ModalScreen[Chapter | None]):

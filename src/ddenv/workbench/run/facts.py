@@ -26,6 +26,7 @@ from ddenv.workbench.shared.wording import count, metres
 
 # The maximum number of models to name.
 NAMED = 12
+WIDTH = 11
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +101,6 @@ def _counts(position: Position, state: RunState, test: Test) -> str:
     one = round.candidates[test.candidate]
     numbers = ", ".join(map(str, one.tests[:NAMED]))
     return f"{one.label} of round {round.number}: {one.verdict or 'not judged yet'}, tests {numbers}"
-
-
-WIDTH = 11
 
 
 class FactsDialog(ModalScreen[None]):

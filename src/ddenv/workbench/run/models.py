@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 # Columns behind the name: part, distance, first sensed.
 REST = 3 + 9 + 9
+LEVELS = " ▁▂▃▄▅▆▇█"
+NEEDED, DECIDED, FREE = "╌", "▲", "▽"
+PLAIN, DIM = Style.null(), Style(dim=True)
 
 
 class ModelsLeft(Vertical):
@@ -110,11 +113,6 @@ def _sensed(state: RunState) -> dict[str, float]:
     if test is None or not 0 < test <= len(state.tests):
         return {}
     return dict(state.tests[test - 1].first_sensed)
-
-
-LEVELS = " ▁▂▃▄▅▆▇█"
-NEEDED, DECIDED, FREE = "╌", "▲", "▽"
-PLAIN, DIM = Style.null(), Style(dim=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,76 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.opening import Opening
 from ddenv.workbench.shared.poll import Poll
 
+# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
+MORE = (
+    "run.signs",
+    "run.facts",
+    "run.play",
+    "run.rounds",
+    "run.find",
+    "run.layers",
+    "run.copy",
+    "run.scene",
+    "run.runs",
+)
+FIRST = (
+    "run.help",
+    "run.quit",
+    "run.pause",
+    "run.accept",
+    "run.reject",
+    "run.step",
+    "run.veto",
+    "run.pin",
+    "run.without",
+    "run.undo",
+    "run.history",
+    "run.export",
+    "run.why",
+    "run.change",
+    "run.only",
+    *MORE,
+)
+# While an earlier moment is shown, and while the map has the focus.
+BROWSING = (
+    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
+    *("run.quit", "run.play", "run.signs"),
+)
+ON_MAP = (
+    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
+    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
+)
+# The footer of a screen that only watches.
+LOOKING = (
+    *(
+        "run.history",
+        "run.rounds",
+        "run.facts",
+        "run.play",
+        "run.why",
+        "run.export",
+        "run.find",
+        "run.copy",
+        "run.layers",
+        "run.signs",
+        "run.help",
+    ),
+    "run.quit",
+)
+# What the pointer shows over the parts that take no keys, by their ids.
+TOOLTIPS = {
+    "header": "scenario and method; the round, and how many models are left",
+    "status": "the state of the run, its tests by outcome, how often f shows, time, and what is left",
+    "map-lines": "the signs on the map; k explains all of them",
+    "chart": "how many models were left after each test; the dashed line: how many seem to be needed",
+}
+# These ask for models if none are selected. A pin always asks: it ends the search.
+TITLES = {
+    "pin": "Pin or unpin models (+): pinned ones stay; a new search begins",
+    "without": "Try without these models",
+    "only": "Try only these models",
+}
+
 
 def _hidden(key: str, action: str, words: str, id: str, tooltip: str, display: str | None = None) -> Binding:
     return Binding(key, action, words, id=id, tooltip=tooltip, show=False, key_display=display)
@@ -184,82 +254,12 @@ KEYS: list[BindingType] = [*_KEYS]
 # The names of the actions that guide the run, and their bindings by these names.
 GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
 GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
-# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = (
-    "run.signs",
-    "run.facts",
-    "run.play",
-    "run.rounds",
-    "run.find",
-    "run.layers",
-    "run.copy",
-    "run.scene",
-    "run.runs",
-)
 SHOWN = tuple(
     id
     for binding in _KEYS
     if binding.show
     for id in ((*MORE, "run.help") if binding.id == "run.help" else (binding.id or "",))
 )
-FIRST = (
-    "run.help",
-    "run.quit",
-    "run.pause",
-    "run.accept",
-    "run.reject",
-    "run.step",
-    "run.veto",
-    "run.pin",
-    "run.without",
-    "run.undo",
-    "run.history",
-    "run.export",
-    "run.why",
-    "run.change",
-    "run.only",
-    *MORE,
-)
-# While an earlier moment is shown, and while the map has the focus.
-BROWSING = (
-    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
-    *("run.quit", "run.play", "run.signs"),
-)
-ON_MAP = (
-    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
-    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
-)
-# The footer of a screen that only watches.
-LOOKING = (
-    *(
-        "run.history",
-        "run.rounds",
-        "run.facts",
-        "run.play",
-        "run.why",
-        "run.export",
-        "run.find",
-        "run.copy",
-        "run.layers",
-        "run.signs",
-        "run.help",
-    ),
-    "run.quit",
-)
-# What the pointer shows over the parts that take no keys, by their ids.
-TOOLTIPS = {
-    "header": "scenario and method; the round, and how many models are left",
-    "status": "the state of the run, its tests by outcome, how often f shows, time, and what is left",
-    "map-lines": "the signs on the map; k explains all of them",
-    "chart": "how many models were left after each test; the dashed line: how many seem to be needed",
-}
-
-# These ask for models if none are selected. A pin always asks: it ends the search.
-TITLES = {
-    "pin": "Pin or unpin models (+): pinned ones stay; a new search begins",
-    "without": "Try without these models",
-    "only": "Try only these models",
-}
 
 
 class KeyOffers:

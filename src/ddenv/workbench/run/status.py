@@ -29,6 +29,10 @@ SHRINK = (
     *("cut", "time", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
     *("asked", "engine", "tests", "drift", "state"),
 )
+# Which states end with a notification: the first one of these that follows another state.
+WORTH = ("finished", "failed", "lost", "waiting", "stopped")
+# The title goes in steps of so many per cent: each change is sent to the terminal.
+STEP = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,12 +274,6 @@ def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
 
 def _numbers(version: str) -> list[int]:
     return [int("".join(filter(str.isdigit, part)) or 0) for part in version.split(".")]
-
-
-# Which states end with a notification: the first one of these that follows another state.
-WORTH = ("finished", "failed", "lost", "waiting", "stopped")
-# The title goes in steps of so many per cent: each change is sent to the terminal.
-STEP = 5
 
 
 def title(snapshot: Snapshot) -> str:

@@ -34,6 +34,19 @@ FOLDER = ".deleted"
 BESIDE = (*LOGS, ".log", ".scene.log", ".place")
 # How long a deleted run is kept, s.
 KEPT = 7 * 86_400.0
+# The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
+PERIOD, PATIENCE = 1.0, 0.3
+# From this width on what is said of a run stands beside the table, else below it.
+WIDE = 110
+# The footer's keys in the order of the screen, then by priority.
+SHOWN = (
+    *("runs.open", "runs.watch", "runs.like", "runs.filter", "runs.sort", "runs.mark", "runs.compare", "runs.delete"),
+    *("runs.undo", "runs.path", "runs.help", "runs.back"),
+)
+FIRST = (
+    *("runs.help", "runs.back", "runs.open", "runs.sort", "runs.filter", "runs.delete", "runs.undo", "runs.mark"),
+    *("runs.compare", "runs.path", "runs.watch", "runs.like"),
+)
 
 
 def delete_run(path: Path) -> None:
@@ -84,21 +97,6 @@ def _clear(home: Path) -> None:
     for place in _places(home):
         if int(place.name) / 1e9 < time.time() - KEPT:
             shutil.rmtree(place, ignore_errors=True)
-
-
-# The time between two reads of the folder, and the maximum time of a read before it shows its first results, s.
-PERIOD, PATIENCE = 1.0, 0.3
-# From this width on what is said of a run stands beside the table, else below it.
-WIDE = 110
-# The footer's keys in the order of the screen, then by priority.
-SHOWN = (
-    *("runs.open", "runs.watch", "runs.like", "runs.filter", "runs.sort", "runs.mark", "runs.compare", "runs.delete"),
-    *("runs.undo", "runs.path", "runs.help", "runs.back"),
-)
-FIRST = (
-    *("runs.help", "runs.back", "runs.open", "runs.sort", "runs.filter", "runs.delete", "runs.undo", "runs.mark"),
-    *("runs.compare", "runs.path", "runs.watch", "runs.like"),
-)
 
 
 class RunsScreen(Screen[None]):

@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
 
 OURS = ("ddenv", "ddmin", "probdd", "splitting")
+MARK = "✗ "
+METHOD: dict[Kind, str] = {
+    "algorithm": "how the environment is searched",
+    "partitioning": "how the environment is split",
+    "prioritization": "in which order the parts are tried",
+}
+MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
+FIELDS = {field.id: field for field in form.ALL}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,16 +143,6 @@ class Explained(VerticalScroll):
             text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
         self.query_one(Static).update(text.append(words, "not bold"))
         self.scroll_home(animate=False)
-
-
-MARK = "✗ "
-METHOD: dict[Kind, str] = {
-    "algorithm": "how the environment is searched",
-    "partitioning": "how the environment is split",
-    "prioritization": "in which order the parts are tried",
-}
-MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
-FIELDS = {field.id: field for field in form.ALL}
 
 
 class OptionsForm(Vertical):

@@ -34,6 +34,15 @@ from ddenv.workbench.shared.background import call_if_open
 
 # What to do about each kind of note; it comes first, since the end of a line may not fit.
 REMEDIES = {"drop": "lower the spawn's z", "inside": "move one model, or make both static"}
+KEYS = {"start": "s", "heading": "h", "goal": "g"}
+ASKS = {
+    "start": "the start: move the crosshair and press enter, or click",
+    "heading": "the heading: pick a place for the robot to look at",
+    "goal": "the goal: move the crosshair and press enter, or click",
+}
+# The same while the focus is elsewhere, where the arrows and enter mean something else.
+ASKS_FROM_AFAR = "the {what} comes next: {key} goes to the map, or click there"
+MORE = " …"
 
 
 class StartNotes(Static):
@@ -86,17 +95,6 @@ def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[str, s
         return tuple(note_inside(choice.world))
     x, y, z, yaw = spawn
     return tuple(notes_on_start(choice.world, robot, Spawn(x=x, y=y, z=z, yaw=yaw)))
-
-
-KEYS = {"start": "s", "heading": "h", "goal": "g"}
-ASKS = {
-    "start": "the start: move the crosshair and press enter, or click",
-    "heading": "the heading: pick a place for the robot to look at",
-    "goal": "the goal: move the crosshair and press enter, or click",
-}
-# The same while the focus is elsewhere, where the arrows and enter mean something else.
-ASKS_FROM_AFAR = "the {what} comes next: {key} goes to the map, or click there"
-MORE = " …"
 
 
 class Preview(Vertical):

@@ -26,6 +26,7 @@ PLACES = {
     "spawn": ("robot.spawn.x", "robot.spawn.y", "robot.spawn.z", "robot.spawn.yaw"),
     "goal": ("goal.x", "goal.y"),
 }
+NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
 def command(
@@ -78,9 +79,6 @@ def _name(name: str) -> list[str]:
     if not name:
         return []
     return ["--output", str(Path(name).absolute())] if len(Path(name).parts) > 1 else ["--name", name]
-
-
-NO_COMMAND = "the scenario of a run has no command; f7 saves it as a file, which has one"
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,8 @@ from ddenv.workbench.shared.wording import CLAIM, percent
 # The maximum number of models in the list.
 LISTED = 200
 NEAREST = "nearest world that passes"
+# The width of a row without the model's name.
+FIGURES = 23
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +96,6 @@ def _of_nearest(state: RunState, one: Nearest) -> Entry:
 
 def _place(point: tuple[float, float]) -> str:
     return f"{point[0]:6.2f} {point[1]:6.2f}"
-
-
-# The width of a row without the model's name.
-FIGURES = 23
 
 
 def head(width: int) -> Text:
