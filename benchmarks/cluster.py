@@ -30,8 +30,8 @@ from ddenv.engine.worker import Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
-from ddenv.runs.scenarios import scenario_for_world
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts, scenario_for_world
 
 SHORTEST, LONGEST_TEST = 20.0, 60.0  # s
 NEEDED = 3

@@ -15,12 +15,12 @@ import numpy as np
 
 from ddenv import processor
 from ddenv.engine.baseline import fix_failure
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
 from ddenv.runfile.state import Test
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -84,7 +84,7 @@ def both_runs(asked: Asked) -> Both:
 def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
     """f as the engine fixes it from the runs of the whole world."""
     ran = [
-        Test(number, "baseline", None, None, number, result.seed, result.outcome, end_pose=result.end_pose)
+        Test(number, 0, "baseline", None, None, number, result.seed, result.outcome, end_pose=result.end_pose)
         for number, result in enumerate(results)
     ]
     trajectories = {number: result.trajectory for number, result in enumerate(results)}
@@ -92,7 +92,7 @@ def fixed(scenario: Scenario, results: list[RunResult]) -> Failure:
     found = fix_failure(ran, trajectories, spec, scenario.reduction.iterations)
     if isinstance(found, str):
         raise SystemExit(found)
-    return Failure(found["position"], trajectories[found["failure_test"]], spec.epsilon, spec.similarity)
+    return Failure(found.position, trajectories[found.failure_test], spec.epsilon, spec.similarity)
 
 
 def differs(pair: Both, failure: Failure) -> bool:

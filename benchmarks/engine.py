@@ -35,9 +35,9 @@ from ddenv.engine.pool import Pool
 from ddenv.reduction import partitionings  # noqa: F401
 from ddenv.robot.result import Progress, RunResult
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.runs.scenarios import with_options
+from ddenv.runs.subject import read_parts, with_options
 from ddenv.version import __version__
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Model, World

@@ -15,11 +15,11 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.drake.template import Template
 from ddenv.robot.result import RunResult
 from ddenv.runfile.failures import alike
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
 from ddenv.world.read import parse_world

@@ -12,17 +12,17 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from statistics import fmean
 
 import numpy as np
 
 import ddenv
-from ddenv.reduction.acceptance import estimated_rate
-from ddenv.reduction.calls import Calls
-from ddenv.reduction.certificate import Terms, error_of
-from ddenv.reduction.rate_claims import certified
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import Claim, Terms, error_of, falls, keeps, settle
+from ddenv.evidence.rates import estimated_rate, wilson_interval
+from ddenv.reduction.reduce import RateClaim
 
 KEEP_RATE, ITERATIONS, BASELINE_RUNS = 0.8, 3, 10
 # Rates that are products must not fall below a limit by rounding.
@@ -137,18 +137,10 @@ def reduction(task: Task) -> list[float]:
         check=False,
         seed=task.seed,
     )
-    baseline, certificate, claims, minimal = (
-        found.baseline_tests,
-        found.certificate_tests,
-        found.claims,
-        found.minimal,
-    )
+    baseline, certificate, claims = found.baseline_tests, found.certificate_tests, found.claims
     if task.rule == "first":
-        calls = Calls(test)
-        rate = estimated_rate(sum(calls.once(whole) for _ in range(BASELINE_RUNS)), BASELINE_RUNS)
-        claims = certified(found.kept, whole, Terms(KEEP_RATE, rate, error_of(1), BASELINE_RUNS), calls.fresh())
-        baseline, certificate = BASELINE_RUNS, calls.others - BASELINE_RUNS
-        minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
+        baseline, certificate, claims = certified(names, found.kept, test)
+    minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
     left = frozenset(found.kept)
     least = KEEP_RATE * oracle.rate(whole)
 
@@ -169,6 +161,32 @@ def reduction(task: Task) -> list[float]:
         100.0 * any(true_rate(claim.without) >= least - ROUNDING for claim in needed) if needed else float("nan"),
         100.0 * fmean(claim.low <= true_rate(claim.without) <= claim.high for claim in claims),
     ]
+
+
+def certified(
+    names: list[str], kept: Sequence[str], test: Callable[[frozenset[str]], bool]
+) -> tuple[int, int, list[RateClaim]]:
+    """The certificate of what a search without one has `kept`: the runs of all models before it, its own, and its claims."""
+    whole, left = Environment.whole(len(names)), Environment.of(map(names.index, kept))
+    fresh: dict[tuple[Environment, int], bool] = {}
+
+    def shown(environment: Environment, run: int) -> bool:
+        if (environment, run) not in fresh:
+            fresh[environment, run] = test(frozenset(environment.names(names)))
+        return fresh[environment, run]
+
+    def said(without: str | None, environment: Environment, claim: Claim) -> RateClaim:
+        hits = sum(shown(environment, run) for run in range(claim.runs))
+        return RateClaim(without, claim.verdict, hits, claim.runs, *wilson_interval(hits, claim.runs))
+
+    rate = estimated_rate(sum(test(frozenset(names)) for _ in range(BASELINE_RUNS)), BASELINE_RUNS)
+    terms = Terms(KEEP_RATE, rate, error_of(1) / 2, BASELINE_RUNS)
+    claims = [said(None, left, settle(keeps(left, whole, terms), shown))]
+    each = replace(terms, error=terms.error / max(1, len(left)))
+    for model in left if claims[0].verdict != "lost" else ():
+        rest = left - Environment.of((model,))
+        claims.append(said(names[model], rest, settle(falls(rest, whole, each), shown)))
+    return BASELINE_RUNS, len(fresh), claims
 
 
 def cells(results: Sequence[Sequence[float]]) -> list[str]:

@@ -39,7 +39,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import FRESH
 from ddenv.runfile.store import RunFile
-from ddenv.runs.scenarios import with_options
+from ddenv.runs.subject import with_options
 from ddenv.study.plan import PAIRS
 from ddenv.words import first_of
 from ddenv.world.load import find_scenario, load_scenario

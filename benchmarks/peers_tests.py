@@ -14,12 +14,11 @@ from pathlib import Path
 
 from early_stop import fixed
 
-from ddenv.reduction.acceptance import Acceptance
-from ddenv.reduction.verdict import standing
+from ddenv.reduction.verdict import Acceptance, standing
 from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.scenario import Scenario
 
 Keep = frozenset[str]

@@ -27,7 +27,7 @@ from ddenv.robot.drake.template import Variants
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.runs.scenarios import load_parts, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.scenario import Scenario
 

@@ -24,16 +24,16 @@ from pathlib import Path
 from large_worlds import among_things
 from real_worlds import largest
 
+from ddenv.evidence.took_part import simulated
 from ddenv.robot.drake.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.runs.scenarios import load_parts, with_options
+from ddenv.runs.subject import load_parts, with_options
 from ddenv.settings import SETTINGS
 from ddenv.study.plan import PAIRS
-from ddenv.took_part import simulated
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.scenario import Scenario
 

@@ -19,7 +19,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.robot.drake.template import Template, Variants
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
 
 TARGETS = {"ditch": 60, "friction": 80, "rubble": 10}

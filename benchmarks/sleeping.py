@@ -22,9 +22,9 @@ from pathlib import Path
 
 from small_worlds import small_scenario, small_world
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.drake.template import Template
-from ddenv.runs.scenarios import load_parts, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import World
 from ddenv.world.pose import Vector

@@ -23,14 +23,15 @@ from pathlib import Path
 
 from small_worlds import KINDS, small_scenario, small_world
 
+from ddenv.environment import Environment
+from ddenv.evidence.slices import Ties
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
-from ddenv.slices import Ties
+from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World
 from ddenv.world.read import read_model
@@ -120,7 +121,9 @@ def row(kind: str, worlds: Iterable[tuple[World, Model, Scenario]], tests: int, 
 def audit(simulator: Variants, everything: frozenset[str], tests: int, first: int, found: Count) -> None:
     """Simulates implied tests in one world, and counts them in `found`."""
     chance = random.Random(first)
-    ties = Ties.among(simulator.ties(everything) or ())
+    elements = sorted(everything)
+    number = {name: place for place, name in enumerate(elements)}
+    ties = Ties.among((number[name], number[other]) for name, other in simulator.ties(everything) or ())
     found.worlds += 1
     found.recording += cost(simulator, everything)
     for seed in range(first, first + tests // PARTS):
@@ -131,7 +134,9 @@ def audit(simulator: Variants, everything: frozenset[str], tests: int, first: in
             continue
         took_part, tried = made.took_part & there, {there}
         for _ in range(DRAWS):
-            keep = ties.closed(took_part | part(there, chance), there)
+            drawn = Environment.of(number[name] for name in took_part | part(there, chance))
+            closed = ties.closed(drawn, Environment.of(number[name] for name in there))
+            keep = frozenset(closed.names(elements))
             if keep not in tried and len(tried) <= PARTS:
                 tried.add(keep)
                 found.tests += 1

@@ -207,12 +207,13 @@ def planning() -> None:
 
 def _planned(known: Evidence, pair: str, n: int) -> float:
     guide = make_guide(*split_pair(pair), lambda: known)
-    guide.split(known.elements[:9], 3)
-    guide.rank([known.elements[:9]])
+    models = tuple(range(len(known.elements)))
+    guide.split(models[:9], 3)
+    guide.rank([models[:9]])
     started = time.perf_counter()
-    partitions = one_model_partitions(known.elements) if n == len(known.elements) else guide.split(known.elements, n)
+    partitions = one_model_partitions(models) if n == len(models) else guide.split(models, n)
     ranked = sorted(zip(partitions, guide.rank(partitions), strict=True), key=lambda one: one[1])
-    make_round(n, known.elements, ranked)
+    make_round(n, models, ranked)
     return time.perf_counter() - started
 
 

@@ -8,6 +8,7 @@ import sqlite3
 import pytest
 
 from ddenv.cli.summary import summary_lines
+from ddenv.runfile.events import EngineFailed, Noted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
@@ -48,8 +49,8 @@ def evil(tmp_path, home):
     database.close()
     with RunFile(run.path) as file:
         file.own()
-        file.append("noted", {"about": "speed", "words": f"slow {ESCAPES}"})
-        file.append("engine_failed", {"reason": f"broke {ESCAPES}"})
+        file.append(Noted("speed", f"slow {ESCAPES}"))
+        file.append(EngineFailed(f"broke {ESCAPES}"))
     (tmp_path / "a.ddenv.log").write_text(f"ddenv engine: died {ESCAPES}\nValueError: {ESCAPES}\n")
     return run.path
 

@@ -167,7 +167,6 @@ EARLIER = {
 
 @pytest.mark.parametrize("changed", [{}, {"growth": "steady", "complement_order": "far-first"}], ids=str)
 def test_an_earlier_run_keeps_its_settings(changed):
-    from ddenv.runfile.events import as_it_was
     from ddenv.runfile.run_settings import Settings
 
     data = load_scenario(DATA / "wall.yaml").model_dump(mode="json") | {"reduction": EARLIER | changed}
@@ -176,7 +175,6 @@ def test_an_earlier_run_keeps_its_settings(changed):
     now = resumed.model_dump(mode="json")["reduction"]
     assert {name: now[name] for name in EARLIER} == EARLIER | changed
     assert Settings(data).growth == (EARLIER | changed)["growth"]
-    assert Settings(as_it_was(data)).as_printed is not bool(changed)
 
 
 def test_what_is_damaged_has_its_default():

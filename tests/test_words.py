@@ -3,8 +3,9 @@
 from ddenv.cli.summary import broken
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Recorded
 from ddenv.words import baseline, headline, news
+from tests.shorthand import typed
 
 
 def states(*happened: tuple[str, dict], scenario: dict | None = None) -> list[RunState]:
@@ -14,8 +15,10 @@ def states(*happened: tuple[str, dict], scenario: dict | None = None) -> list[Ru
     parts = {"environment": [0, 1, 2, 3], "partitions": [[0], [1, 2]], "candidates": candidates}
     found, state = [], RunState()
     before = (("created", elements), ("round_started", {"round": 1, "n_partitions": 2, **parts}))
-    for number, (kind, data) in enumerate((*before, *happened)):
-        state = apply(state, Event(number + 1, 0.0, kind, data))
+    for kind, data in (*before, *happened):
+        command = data.get("command")
+        for event in typed(state, kind, {key: value for key, value in data.items() if key != "command"}):
+            state = apply(state, Recorded(state.revision + 1, 0.0, event, command))
         found.append(state)
     return found[1:]
 
@@ -89,7 +92,7 @@ def claim(without: int | None, verdict: str, shown: int, runs: int) -> dict:
 
 
 def test_a_certificate_is_told_with_what_follows_from_it():
-    lost = {"claims": [claim(None, "lost", 3, 9)]}
+    lost = {"claims": [claim(None, "lost", 3, 9)], "tests": []}
     _, before, after = states(started(1), ("certificate_started", STARTED))
     assert news("certificate_started", before, after).startswith("certificate 1: fresh runs of what is left (4 models)")
     assert "certificate: 0 of about 70 to 300 runs · 4 of 4 models" in headline(after)
@@ -99,7 +102,7 @@ def test_a_certificate_is_told_with_what_follows_from_it():
         "  certificate 1: f is rarer in what is left, not shown to keep 80 % of the whole world's rate: "
         "f in 3 of 9 fresh runs (10 % to 90 %)"
     )
-    _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": []}))
+    _, _, before, after = states(*both, ("rate_lost", {"node": 0, "lost": 0, "again": [], "tests": []}))
     assert news("rate_lost", before, after) == "  back to 4 models, the last environment that seems to keep the rate"
     _, _, before, after = states(*both, ("left_out", {"without": 1, "environment": [0, 2, 3], "evidence_test": 1}))
     assert news("left_out", before, after) == "  reduced to 3 models after 0 tests: without b f shows about as often"

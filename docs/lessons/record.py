@@ -23,6 +23,7 @@ from typing import Any
 import yaml
 from docs.lessons.delivery import outcome
 from docs.lessons.quay import rate
+from docs.lessons.record_plays import record_plays
 from docs.lessons.toys import DELIVERY, QUAY, SIMULATOR, TOYS, Box, Toy
 
 from ddenv.runfile.fold import fold
@@ -88,8 +89,7 @@ def record(name: str) -> None:
     if name in ORACLES:
         (LESSONS / f"{recorded.world}.oracle.json").write_text(ORACLES[name](), encoding="utf-8")
     if name == "delivery":
-        lesson = LESSONS / "1-what-delta-debugging-is.yaml"
-        subprocess.run((sys.executable, "-m", "ddenv", "learn", "--record", str(lesson)), check=True)
+        record_plays(LESSONS / "1-what-delta-debugging-is.yaml")
 
 
 def written(toy: Toy, folder: Path, reduction: Mapping[str, Any]) -> Path:
@@ -166,7 +166,7 @@ def slim(run: Path, shown: bool, told: set[int]) -> None:
         events = file.events()
     if state.status != "finished":
         sys.exit(f"{run.name}: did not come to its end")
-    kept = {event.data["evidence_test"] for event in events if event.data.get("evidence_test")}
+    kept = {test for one in events if (test := getattr(one.event, "evidence_test", None))}
     kept |= set(state.failures) | ({state.baseline.failure_test} if state.baseline else set())
     made_for = {(test.round, test.candidate) for test in state.tests if test.id in told}
     kept |= {test.id for test in state.tests if (test.round, test.candidate) in made_for}

@@ -7,12 +7,11 @@ new setting is one line in a class below. Nothing heavy is imported: the command
 from __future__ import annotations
 
 import math
-import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from ddenv.errors import UserError, printable
+from ddenv.errors import printable
 
 Value = int | float | str | bool | None
 
@@ -99,12 +98,6 @@ class Setting:
             return [self.option if value else f"--no-{self.option[2:]}"]
         # No limit has no number of its own.
         return [self.option, number_text(0 if value is None else value)]
-
-    def check(self, value: Value, where: str = "") -> None:
-        """Raises UserError for a number out of range; `where` is what the user knows it as, by default its option or its key."""
-        if not isinstance(value, bool | str) and not self.allows(value):
-            found = "" if value is None else number_text(value)
-            raise UserError(f"{where or self.option or self.key}: expected {self.range}, found {found}")
 
     def allows(self, value: Any) -> bool:
         """Whether `value` has the right type and is in range."""
@@ -326,20 +319,13 @@ class Simulation:
     )
 
 
-def _kind(hint: Any) -> type:
-    """The type of a value that is there."""
-    if get_origin(hint) is Literal:
-        return str
-    if get_origin(hint) in (Union, types.UnionType):
-        return _kind(next(each for each in get_args(hint) if each is not type(None)))
-    return hint if isinstance(hint, type) else str
-
-
 def declared(section: str, declaration: type) -> Iterator[Setting]:
     """The settings of a class, with their names and types."""
     for name, hint in get_type_hints(declaration).items():
         choices = get_args(hint) if get_origin(hint) is Literal else ()
-        yield replace(vars(declaration)[name], section=section, name=name, kind=_kind(hint), choices=choices)
+        # The first type of a union with None is that of a value.
+        kind = str if choices else (*get_args(hint), hint)[0]
+        yield replace(vars(declaration)[name], section=section, name=name, kind=kind, choices=choices)
 
 
 SECTIONS: dict[str, type] = {"reduction": Reduction, "failure": Failure, "simulation": Simulation}

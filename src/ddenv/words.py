@@ -9,7 +9,7 @@ from ddenv.amounts import count as count
 from ddenv.amounts import duration as duration
 from ddenv.amounts import first_of as first_of
 from ddenv.amounts import percent as percent
-from ddenv.claims import (
+from ddenv.evidence.claims import (
     in_the_making,
     made_of_usual,
     missed,
@@ -19,12 +19,12 @@ from ddenv.claims import (
     usual_runs,
     verdict_on,
 )
+from ddenv.evidence.took_part import implied_words, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.removals import Removal
+from ddenv.runfile.progress import Removal
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import ISOLATE, Candidate, RunState, Trial
-from ddenv.took_part import implied_words, refuted_words, slice_words
 
 SETTLING = "finding what rests on what"
 ISOLATING = "finding the nearest world that passes"
@@ -35,7 +35,6 @@ MOST_FAILURES = 3
 SAID = {
     "paused": "paused",
     "resumed": "resumed",
-    "confirm_started": CONFIRMING,
     "supports_started": SETTLING,
 }
 # Hints for readers who see only these lines.
@@ -145,9 +144,9 @@ def _night(kind: str, before: RunState, after: RunState) -> str:
     """What came to an engine from outside."""
     if kind == "clock_jumped":
         return "  the machine slept, or its clock was set: that time does not count"
-    if kind == "room" and after.needs_room:
+    if kind == "disk_space" and after.needs_room:
         return f"  no room on the disk: waits until {after.needs_room / 1e6:.0f} MB are free"
-    return "  there is room on the disk again" if kind == "room" and before.needs_room else ""
+    return "  there is room on the disk again" if kind == "disk_space" and before.needs_room else ""
 
 
 def _certificate(kind: str, after: RunState) -> str:

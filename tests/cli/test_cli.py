@@ -208,7 +208,7 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_happened(home, reduced
 def _engines(run):
     """The processes of all engines so far."""
     with RunFile(run) as file:
-        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"]
+        return [one.event.pid for one in file.events() if one.kind == "engine_started"]
 
 
 def _finished(run):
@@ -301,8 +301,7 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(home, monkeypatch, capsys, w
 
 def test_options_on_the_reduction_reach_the_run(home, monkeypatch):
     from ddenv.cli.command_line import app
-    from ddenv.runs.creation import read_parts
-    from ddenv.runs.scenarios import with_options
+    from ddenv.runs.subject import read_parts, with_options
 
     monkeypatch.setattr("ddenv.runs.programs.start_engine", lambda *_: None)
     monkeypatch.setattr("ddenv.cli.follow.follow_to_summary", lambda *_: (0, RunState()))

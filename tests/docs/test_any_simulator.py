@@ -11,7 +11,7 @@ import yaml
 from ddenv.robot.external.pose_log import COLUMNS, EXPECTED, TOO_LARGE, PoseLog
 from ddenv.robot.external.simulator import ExternalSimulator
 from ddenv.robot.external.supervise import GRACE
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.command import PLACEHOLDERS
 from ddenv.world.load import load_scenario
 from tests.command import ddenv

@@ -10,6 +10,7 @@ from ddenv.doctor import machine
 from ddenv.doctor.finding import is_well
 from ddenv.doctor.run_health import repair, run_health
 from ddenv.errors import UserError
+from ddenv.runfile.events import AcceptModeChanged, EngineStarted, Paused
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
@@ -68,7 +69,7 @@ def test_what_a_killed_engine_left_is_part_of_the_run_and_stays_where_it_is(tmp_
     copy.mkdir()
     with RunFile(path) as file:
         file.own()
-        file.append("engine_started", {"pid": 1, "jobs": 1, "version": "1", "simulator": "x"})
+        file.append(EngineStarted(1, 1, "1", "x"))
         events = len(file.events())
         for each in (path, path.with_name(f"{path.name}-wal")):
             shutil.copy(each, copy)
@@ -126,7 +127,7 @@ def test_a_log_of_another_run_does_not_hide_what_is_whole(run):
     with RunFile(run.parent / "b.ddenv") as other:
         other.own()
         for _ in range(30):
-            other.append("paused", {})
+            other.append(Paused())
         shutil.copy(run.parent / "b.ddenv-wal", f"{run}-wal")
     change_log = run.with_name("a.ddenv-wal")
     change_log.write_bytes(change_log.read_bytes()[:-100] + bytes(100))
@@ -140,7 +141,7 @@ def test_a_log_of_another_run_does_not_hide_what_is_whole(run):
 def test_a_run_at_work_is_checked_and_copied_whole(run):
     with RunFile(run) as file, engine_lock(run):
         file.own()
-        file.append("accept_mode", {"mode": "ask"})
+        file.append(AcceptModeChanged("ask"))
         found = {finding.what: finding for finding in run_health(run)}
         assert found["engine"].says == "at work" and found["log"].state == "ok"
         repair(run, run.parent / "copy.ddenv")

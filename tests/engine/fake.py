@@ -138,7 +138,7 @@ def drive(
 ) -> RunState:
     """Works on a run as the engine program does, in this process."""
     from ddenv.engine.__main__ import _begin
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)

@@ -1,6 +1,6 @@
 """An engine that is killed at a moment, and what is to be the same when another one goes on."""
 
-from ddenv.engine.journal import Journal
+from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 
 
@@ -22,12 +22,17 @@ def kill_after(file, after):
 
 
 def finished_tests(path):
-    """Each finished test as (models, run)."""
+    """Each finished test as (environment, run)."""
     with RunFile(path) as file:
-        journal = Journal(file)
-        return [(journal._keeps[test.id], test.run) for test in journal.state.finished_tests]
+        state = fold(file.events())
+        return [(test.environment, test.run) for test in state.finished_tests]
 
 
 def story(state):
     """What a run's rounds came to: all that must not depend on who worked on it."""
     return state.environment, state.minimal, state.rounds_done, [point.models for point in state.history]
+
+
+def models_in(state, test):
+    """The models in the world of a test, given by its number."""
+    return frozenset(state.models_of(state.tests[test - 1]))

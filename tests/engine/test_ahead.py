@@ -1,18 +1,19 @@
 """What idle workers make ahead of time: it changes no result, whatever their number, and what nobody needs is counted."""
 
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 from zlib import crc32
 
 import pytest
+from ddenv.engine.ahead import LONGEST, Ahead
+from ddenv.reduction.rounds_ahead import Place, RoundsAhead
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ddenv.engine.ahead import LONGEST, Ahead
 from ddenv.engine.journal import Journal
 from ddenv.reduction.round import make_round
-from ddenv.reduction.rounds_ahead import Place, RoundsAhead
 from ddenv.runfile.state import AHEAD, BROKEN, FRESH
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import FakePool, drive, new_run
@@ -47,7 +48,9 @@ def decided(path):
                 "certificate_finished",
                 "finished",
             ):
-                data = {key: value for key, value in event.data.items() if key not in ("known", "evidence_test")}
+                data = {
+                    key: value for key, value in asdict(event.event).items() if key not in ("known", "evidence_test")
+                }
                 if "tests" in data:
                     tests = [journal.state.tests[test - 1] for test in data["tests"]]
                     data["tests"] = sorted((sorted(journal.keep_of_test(one.id)), one.run) for one in tests)
@@ -158,7 +161,7 @@ def test_the_next_test_of_the_search_never_waits_for_those_of_later_rounds(tmp_p
     path = sliced_run(tmp_path, accept_rate="first", iterations=25)
     drive(path, FakePool(needs(MODELS[0], MODELS[3]), workers))
     with RunFile(path) as file:
-        begun = [event.data for event in file.events() if event.kind == "test_started"]
+        begun = [asdict(event.event) for event in file.events() if event.kind == "test_started"]
     # Nobody looks so far ahead in the runs of one candidate.
     first = [(one["phase"], one["candidate"], one["run"]) for one in begun]
     late = first.index(("round", 0, 12))

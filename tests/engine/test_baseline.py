@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ddenv.engine.baseline import fix_failure
-from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.runfile.events import BaselineFinished
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Test as Ran
 from ddenv.runfile.store import RunFile
@@ -33,7 +34,7 @@ def ran(*outcomes, spec: FailureSpec = SPEC, wanted: int = 1):
             (one, "broken" if one == "error" else "", None) if isinstance(one, str) else ("failed", *one)
         )
         end = None if rows is None else tuple(rows[-1, 1:])
-        tests.append(Ran(run + 1, "baseline", None, None, run, run, outcome, kind, end_pose=end))
+        tests.append(Ran(run + 1, 0, "baseline", None, None, run, run, outcome, kind, end_pose=end))
         if rows is not None:
             ways[run + 1] = rows
     return fix_failure(tests, ways, spec, 3, wanted)
@@ -45,23 +46,23 @@ def stuck(x: float, kind: str = "stuck"):
 
 def test_f_is_the_end_that_most_runs_share():
     found = ran(stuck(9), stuck(20), stuck(30), stuck(0.2), stuck(0.1), stuck(-20), stuck(-30), stuck(0), stuck(0.1))
-    assert (found["failure_test"], found["failures"], found["runs"]) == (5, 4, 9)
-    assert found["position"] == (0.1, 0.0, 0.0)
-    assert [each["runs"] for each in found["seen"]] == [4, 1, 1, 1, 1, 1]
+    assert (found.failure_test, found.failures, found.runs) == (5, 4, 9)
+    assert found.position == (0.1, 0.0, 0.0)
+    assert [each.runs for each in found.seen] == [4, 1, 1, 1, 1, 1]
 
 
 def test_runs_that_broke_are_not_in_the_rate():
     found = ran("error", stuck(1), "pass", stuck(1), "error")
-    assert (found["failures"], found["runs"], found["broken"], found["rate"]) == (2, 3, 2, pytest.approx(2 / 3))
+    assert (found.failures, found.runs, found.broken, found.rate) == (2, 3, 2, pytest.approx(2 / 3))
     assert "all 1 baseline runs (1 more broke" in ran("error", "pass")
 
 
 def test_the_way_there_decides_where_the_oracle_asks_for_it():
     detours = [("stuck", way((0, 0), (1, side), (2, 0))) for side in (-5, 5, 5, -5, 5)]
     found = ran(*detours, spec=FailureSpec(epsilon=0.5, similarity="trajectory"))
-    assert (found["failure_test"], found["failures"]) == (2, 3)
-    assert [each["runs"] for each in found["seen"]] == [3, 2]
-    assert ran(*detours)["failures"] == 5
+    assert (found.failure_test, found.failures) == (2, 3)
+    assert [each.runs for each in found.seen] == [3, 2]
+    assert ran(*detours).failures == 5
 
 
 def test_another_failure_can_be_chosen_by_its_number():
@@ -74,13 +75,13 @@ def test_another_failure_can_be_chosen_by_its_number():
         stuck(5, "fell"),
         stuck(-9, "lost"),
     )
-    assert [(each["test"], each["runs"], each["kinds"]) for each in ran(*runs)["seen"]] == [
+    assert [(each.test, each.runs, each.kinds) for each in ran(*runs).seen] == [
         (2, 3, ("stuck", "out of time")),
         (1, 2, ("fell",)),
         (7, 1, ("lost",)),
     ]
     second = ran(*runs, wanted=2)
-    assert (second["failure_test"], second["failures"], second["position"]) == (1, 2, (5.0, 0.0, 0.0))
+    assert (second.failure_test, second.failures, second.position) == (1, 2, (5.0, 0.0, 0.0))
     assert second["outcomes"] == {
         "1": "similar",
         "2": "other",
@@ -133,12 +134,12 @@ def _kill_at_end_of_baseline(file: RunFile, events: int) -> None:
     """No more than so many events are written, and none after the baseline."""
     append, written = file.append, []
 
-    def appended(kind, data, motions=None):
-        written.append(kind)
-        event = append(kind, data, motions)
-        if len(written) > events or kind == "baseline_finished":
+    def appended(event, *values):
+        written.append(event)
+        recorded = append(event, *values)
+        if len(written) > events or isinstance(event, BaselineFinished):
             raise Killed
-        return event
+        return recorded
 
     file.append = appended
 

@@ -2,8 +2,8 @@
 
 import random
 
-from ddenv.claims import ended, meaning, smaller_known
-from ddenv.runfile.atlas import atlas, models_of
+from ddenv.evidence.claims import ended, meaning, smaller_known
+from ddenv.runfile.atlas import atlas
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.guided import Guided, at_once, guided, numbers, until  # noqa: F401
 from tests.engine.oracles import needs
@@ -24,7 +24,7 @@ def test_another_failure_is_reduced_in_a_branch_and_f_is_f_again_outside_of_it(t
         yield "pin", {"models": numbers("beam")}
         yield "accept_other", {"test": test.id, "instead": True}
         state = yield from until(lambda state: state.here.how == "instead")
-        assert set(state.environment) == set(models_of(state, test)) > {"wall"}
+        assert set(state.environment) == set(state.models_of(test)) > {"wall"}
         assert (state.here.parent, state.failures, state.f_position) == (test.node, (test.id,), test.end_pose[:3])
         # What was f is another failure here.
         assert {state.tests[one - 1].outcome for one in whole} == {"other"}

@@ -17,7 +17,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.runs.trust import program_of, trust
 from ddenv.world.scenario import Scenario
 from tests.engine.test_pool import EVERYTHING, result, workers

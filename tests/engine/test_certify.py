@@ -3,6 +3,7 @@
 import tempfile
 import threading
 import time
+from dataclasses import asdict
 from pathlib import Path
 from zlib import crc32
 
@@ -14,13 +15,12 @@ from ddenv.engine.__main__ import _begin
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.driver import Driver
-from ddenv.engine.journal import Journal
+from ddenv.engine.journal import FIRST_FRESH_RUN, Journal
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import CHEAP, ELEMENTS, FakePool, drive, new_run
-from tests.engine.killing import Killed, kill_after, story
+from tests.engine.killing import Killed, kill_after, models_in, story
 from tests.engine.oracles import needs
 from tests.tiers import examples
 
@@ -166,12 +166,12 @@ def test_tests_that_break_leave_a_candidate_unknown_and_no_model_is_called_neede
     assert "tests broke without wall" in state.reason
     assert state.lower_bound == 0
     with RunFile(path) as file:
-        judged = [event.data["verdict"] for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event)["verdict"] for event in file.events() if event.kind == "candidate_judged"]
         journal = Journal(file)
     assert "unknown" in judged
     # Each was made again once.
     broken = [test for test in state.tests if test.outcome == "error"]
-    keys = [(journal.keep_of_test(test.id), test.run) for test in broken]
+    keys = [(models_in(journal.state, test.id), test.run) for test in broken]
     assert all(keys.count(key) == 2 for key in keys)
 
 
@@ -262,7 +262,7 @@ def test_fresh_runs_of_an_earlier_environment_are_read_back_as_such(tmp_path):
         journal = Journal(file)
     for test in state.tests:
         if test.phase == "certify" and test.is_finished:
-            assert (oracle(journal.keep_of_test(test.id), test.seed) == "similar") == (test.outcome == "similar")
+            assert (oracle(models_in(journal.state, test.id), test.seed) == "similar") == (test.outcome == "similar")
 
 
 def test_the_budget_counts_the_tests_of_the_certificate(tmp_path):
@@ -307,7 +307,7 @@ def test_killed_at_moments_of_every_kind_it_goes_on_and_makes_no_test_twice(tmp_
         assert (*story(state), state.reason) == (*story(undisturbed), undisturbed.reason)
         with RunFile(path) as file:
             journal = Journal(file)
-        made = [(journal.keep_of_test(test.id), test.run) for test in state.finished_tests]
+        made = [(models_in(journal.state, test.id), test.run) for test in state.finished_tests]
         assert len(made) == len(set(made))
 
 
@@ -334,7 +334,9 @@ def test_what_a_certificate_rests_on_does_not_depend_on_the_workers(tmp_path):
         state = drive(path, FakePool(oracle, jobs))
         with RunFile(path) as file:
             named = [
-                event.data["tests"] for event in file.events() if event.kind in ("certificate_finished", "rate_lost")
+                asdict(event.event)["tests"]
+                for event in file.events()
+                if event.kind in ("certificate_finished", "rate_lost")
             ]
         tests = [[state.tests[number - 1] for number in tests] for tests in named]
         assert all(test.phase == "certify" for certificate in tests for test in certificate)

@@ -4,6 +4,7 @@ import json
 import math
 import sqlite3
 import tempfile
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,11 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.engine import thinking
+from ddenv.engine import background
 from ddenv.engine.control import Stopped
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.runfile.events import RoundStarted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.schemas import names, pairs
@@ -75,7 +77,7 @@ def test_where_f_is_flaky_splitting_looks_once_and_a_miss_shows_nothing_yet(tmp_
     state = drive(path, FakePool(flaky(5, "wall", "ball"), 2))
     assert set(state.environment) == {"wall", "ball"}
     with RunFile(path) as file:
-        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
     looked = [data for data in judged if data["verdict"] == "missed"]
     assert looked
     assert judged[0]["verdict"] in ("similar", "missed")
@@ -90,7 +92,7 @@ def test_what_a_run_noticed_is_recorded_and_looked_at(tmp_path):
     assert dict(state.tests[0].first_touched) == {"beam": 1.5}
     # The partition of the wall, which was sensed first, is tried first in each round.
     with RunFile(path) as file:
-        rounds = [event.data for event in file.events() if event.kind == "round_started"]
+        rounds = [asdict(event.event) for event in file.events() if event.kind == "round_started"]
     wall = ELEMENTS.index("wall")
     assert all(wall in data["partitions"][0] for data in rounds)
 
@@ -119,15 +121,15 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
     learnt = []
     learn = Driver._learn
 
-    def noted(self, number, round, winner):
-        learn(self, number, round, winner)
-        learnt.append((number, len(self._trials)))
+    def noted(self, tests):
+        learn(self, tests)
+        learnt.append(len(self._trials))
 
     monkeypatch.setattr(Driver, "_learn", noted)
     oracle, method = needs("deck", "wall"), {"pair": "timeseg/sequential", "iterations": 0}
     drive(path := new_run(tmp_path, **method), FakePool(oracle, 1))
     with RunFile(path) as file:
-        known = [e.data for e in file.events() if e.kind == "candidate_judged" and e.data["known"]]
+        known = [asdict(e.event) for e in file.events() if e.kind == "candidate_judged" and asdict(e.event)["known"]]
     # Behind one that has to be tested: there is time for a veto.
     again = next(data for data in known if data["candidate"] > 1)
     path = new_run(tmp_path, **method)
@@ -136,7 +138,7 @@ def test_a_veto_of_what_was_known_teaches_a_resumed_run_nothing_else(tmp_path, m
         drive(path, FakePool(oracle, 1), prepare=lambda file: _veto_in(file, again["round"], again["candidate"]))
     first = list(learnt)
     with RunFile(path) as file:
-        assert Journal(file).refused
+        assert Journal(file).state.refused
     learnt.clear()
     drive(path, FakePool(oracle, 1))
     assert learnt[: len(first)] == first
@@ -146,13 +148,13 @@ def _veto_in(file, round, candidate):
     """The user vetoes a candidate as soon as its round begins; the engine is killed when the next one begins."""
     append = file.append
 
-    def watched(kind, data, *rest):
-        if kind == "round_started" and data["round"] == round + 1:
+    def watched(event, *rest):
+        if isinstance(event, RoundStarted) and event.round == round + 1:
             raise Killed
-        event = append(kind, data, *rest)
-        if kind == "round_started" and data["round"] == round:
+        recorded = append(event, *rest)
+        if isinstance(event, RoundStarted) and event.round == round:
             file.send("veto", round=round, candidate=candidate)
-        return event
+        return recorded
 
     file.append = watched
 
@@ -168,7 +170,9 @@ def test_one_worker_makes_no_test_for_nothing(tmp_path):
     state = drive(new_run(tmp_path), pool := FakePool(flaky(1, "wall"), 1))
     assert len(pool.made) == len(set(pool.made)) == len(state.tests)
     with RunFile(path := Path(tmp_path / "run-0.ddenv")) as file:
-        judged = {test for event in file.events() if event.kind == "candidate_judged" for test in event.data["tests"]}
+        judged = {
+            test for event in file.events() if event.kind == "candidate_judged" for test in asdict(event.event)["tests"]
+        }
     assert path.exists()
     assert judged == {test.id for test in state.tests if test.phase == "round"}
 
@@ -268,8 +272,12 @@ def test_ask_mode_waits_and_a_rejected_candidate_is_left_alone(tmp_path):
     assert len(asked) >= 2
     assert state.environment == ("wall",)
     with RunFile(path) as file:
-        decided = [event.data["decision"] for event in file.events() if event.kind == "decided"]
-        reduced = [(event.data["round"], event.data["candidate"]) for event in file.events() if event.kind == "reduced"]
+        decided = [asdict(event.event)["decision"] for event in file.events() if event.kind == "decided"]
+        reduced = [
+            (asdict(event.event)["round"], asdict(event.event)["candidate"])
+            for event in file.events()
+            if event.kind == "reduced"
+        ]
     assert decided[0] == "reject"
     assert asked[0] not in reduced
     assert reduced == asked[1:]
@@ -361,11 +369,11 @@ class SlowPool(FakePool):
 
 def forecasts(path):
     with RunFile(path) as file:
-        return [event.data for event in file.events() if event.kind == "forecast"]
+        return [asdict(event.event) for event in file.events() if event.kind == "forecast"]
 
 
 def test_each_round_is_forecast_while_tests_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(thinking, "FIRST", math.inf)
+    monkeypatch.setattr(background, "FIRST", math.inf)
     paths = [new_run(tmp_path) for _ in range(3)]
     for path, pool in zip(paths, (SlowPool, SlowPool, FakePool), strict=True):
         state = drive(path, pool(needs("wall", "beam"), 2))

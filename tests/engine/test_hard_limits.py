@@ -1,17 +1,19 @@
 """Simulators that hang, die, take all memory or babble: each is one broken test, and says how it ended."""
 
 from collections import Counter
+from dataclasses import asdict
 
 import pytest
 
 from ddenv.engine.journal import Journal
-from ddenv.engine.memory_limit import memory_limit
+from ddenv.engine.limits import memory_limit
 from ddenv.engine.pool import Broken, Pool
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import drive, new_run
 from tests.engine.hostile_simulators import DiesWithoutTheBeam, Hostile, dies_at_once
+from tests.engine.killing import models_in
 from tests.engine.test_pool import EVERYTHING, parts, result
 from tests.tiers import slow
 
@@ -75,13 +77,13 @@ def test_a_sub_environment_that_kills_its_worker_twice_is_unknown(tmp_path):
     broke = [test for test in state.tests if test.outcome == "error"]
     assert {test.failure for test in broke} == {"the simulator's process died (SIGABRT)"}
     with RunFile(path) as file:
-        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
         journal = Journal(file)
     # What was made ahead of its round, and then not needed, is not made again.
-    times = Counter((journal.keep_of_test(test.id), test.run) for test in broke)
+    times = Counter((models_in(journal.state, test.id), test.run) for test in broke)
     assert set(times.values()) <= {1, 2}
     decisive = {test for data in judged if data["verdict"] == "unknown" for test in data["tests"]}
-    assert {times[journal.keep_of_test(test.id), test.run] for test in broke if test.id in decisive} == {2}
+    assert {times[models_in(journal.state, test.id), test.run] for test in broke if test.id in decisive} == {2}
     assert {"wall", "beam"} <= set(state.environment) and not state.minimal
 
 

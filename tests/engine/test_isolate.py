@@ -20,7 +20,7 @@ from ddenv.engine.journal import Journal
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import ISOLATE
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.killing import Killed, kill_after
 from tests.engine.oracles import needs

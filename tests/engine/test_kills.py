@@ -7,6 +7,7 @@ import signal
 import time
 from collections import Counter
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ from ddenv.runs.trust import program_of, trust
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Oracle
 from tests.conftest import DATA
-from tests.engine.killing import story
+from tests.engine.killing import models_in, story
 from tests.waiting import PATIENCE, PERIOD
 
 KILLS = int(os.environ.get("DDENV_KILLS", "6"))
@@ -100,10 +101,10 @@ def lives(run: Path, dice: random.Random, most: int) -> int:
 def what_became(run: Path):
     with RunFile(run) as file:
         journal = Journal(file)
-        judged = [event.data for event in file.events() if event.kind == "candidate_judged"]
+        judged = [asdict(event.event) for event in file.events() if event.kind == "candidate_judged"]
     verdicts = [(data["round"], data["candidate"], data["verdict"]) for data in judged]
     sound = [test for test in journal.state.finished_tests if test.outcome not in BROKEN]
-    made = Counter((journal.keep_of_test(test.id), test.run) for test in sound)
+    made = Counter((models_in(journal.state, test.id), test.run) for test in sound)
     assert set(made.values()) == {1}, "a finished test was made again"
     assert journal.state.status == "finished"
     return story(journal.state), verdicts

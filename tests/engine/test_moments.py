@@ -1,5 +1,7 @@
 """What the user decides at awkward moments: while a reduction waits, one thing right after another, or as the engine is killed."""
 
+from dataclasses import asdict
+
 import pytest
 
 from ddenv.engine.control import Stopped
@@ -57,7 +59,7 @@ def test_while_one_waits_an_earlier_one_is_wanted_after_all(tmp_path, refused):
 
     path = new_run(tmp_path)
     state = guided(path, lambda *_: "similar", guide())
-    assert next(event.data["candidate"] for event in events(path) if event.kind == "reduced") == 0
+    assert next(asdict(event.event)["candidate"] for event in events(path) if event.kind == "reduced") == 0
     # Resumed, it goes the same way.
     again = FakePool(lambda *_: "similar", 1)
     assert drive(path, again).environment == state.environment
@@ -198,7 +200,9 @@ def test_with_more_budget_the_search_goes_on_as_it_was(tmp_path):
         viewer.send("change", settings={"budget": 500})
     drive(path, FakePool(needs("wall", "beam"), 1))
     drive(undisturbed, FakePool(needs("wall", "beam"), 1))
-    rounds = [[event.data for event in events(each) if event.kind == "round_started"] for each in (path, undisturbed)]
+    rounds = [
+        [asdict(event.event) for event in events(each) if event.kind == "round_started"] for each in (path, undisturbed)
+    ]
     assert rounds[0] == rounds[1]
 
 

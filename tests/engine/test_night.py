@@ -6,23 +6,24 @@ import sqlite3
 import threading
 import time
 from collections import namedtuple
+from dataclasses import asdict
 
 import pytest
 
-from ddenv.engine import room
+from ddenv.engine import disk_space
 from ddenv.engine.bench import Bench
 from ddenv.engine.clock_jumps import ClockJumps
 from ddenv.engine.control import Control
+from ddenv.engine.disk_space import NEEDED, DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
-from ddenv.engine.room import NEEDED, Room
 from ddenv.errors import UserError
 from ddenv.runfile import lock
 from ddenv.runfile.fold import fold
 from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import LOGS, NoRoom, RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from ddenv.words import news
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story
@@ -41,7 +42,7 @@ def watched(path, terminated=None):
     terminated = terminated or threading.Event()
     with RunFile(path) as file:
         scenario, world, _ = read_parts(file)
-        watch = Room(file, terminated)
+        watch = DiskSpace(file, terminated)
         file.own(watch.wait)
         journal = Journal(file)
         pool = FakePool(oracle, 2)
@@ -60,8 +61,8 @@ def undisturbed(tmp_path):
 
 
 def disk(monkeypatch, free):
-    monkeypatch.setattr(room, "PERIOD", 0.0)
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(free()))
+    monkeypatch.setattr(disk_space, "PERIOD", 0.0)
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(free()))
 
 
 def told(path):
@@ -112,9 +113,9 @@ def test_a_result_that_finds_no_room_waits_and_nothing_is_half_written(tmp_path,
             self._file._db.execute("PRAGMA max_page_count = 1000000")
         return again
 
-    original_wait = Room.wait
+    original_wait = DiskSpace.wait
     monkeypatch.setattr(RunFile, "_append", full_for_a_while)
-    monkeypatch.setattr(Room, "wait", waits)
+    monkeypatch.setattr(DiskSpace, "wait", waits)
     disk(monkeypatch, lambda: 10 * NEEDED)
     assert story(watched(path)) == undisturbed
     assert capsys.readouterr().err.count("waits until 32 MB are free") == 1
@@ -147,7 +148,7 @@ def test_a_clock_that_jumps_is_told_and_its_time_does_not_count(tmp_path):
         for jump, passed in ((0.1, 0.1), (-1.0, 600.0), (8 * 3600.0, 0.1), (0.0, 0.1), (-3 * 86400.0, 0.1)):
             now[0], now[1] = now[0] + jump, now[1] + passed
             jumps.look()
-        found = [event.data["seconds"] for event in file.events() if event.kind == "clock_jumped"]
+        found = [asdict(event.event)["seconds"] for event in file.events() if event.kind == "clock_jumped"]
         assert found == pytest.approx([8 * 3600.0, -3 * 86400.0])
     assert "the machine slept, or its clock was set: that time does not count" in told(path)[0]
 

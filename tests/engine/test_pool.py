@@ -13,7 +13,7 @@ from ddenv.engine.pool import PREPARATION, Broken, Pool
 from ddenv.engine.worker import MODELS_PERIOD, POSE, Run, Shared, answered
 from ddenv.errors import UserError
 from ddenv.runfile.store import COLUMNS
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.read import read_world
 from tests.conftest import DATA

@@ -12,11 +12,12 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken
 from ddenv.engine.settle import note_start
 from ddenv.errors import UserError
-from ddenv.resting import stacks
 from ddenv.robot.settled import Settled, notes_on
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runfile.supports import stacks
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts
 from ddenv.words import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose

@@ -3,6 +3,7 @@
 import json
 import shutil
 import sqlite3
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,8 @@ import pytest
 from ddenv.engine import shared
 from ddenv.engine.shared import SharingPool
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runs.creation import create_run
+from ddenv.runs.subject import read_parts
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import Controller, Oracle, Sensors
 from tests.conftest import DATA
@@ -37,7 +39,7 @@ def share(path, pool, found=None):
 def events(path):
     """The finished tests of a run as they are written down."""
     with RunFile(path) as file:
-        return [event.data for event in file.events() if event.kind == "test_finished"]
+        return [asdict(event.event) for event in file.events() if event.kind == "test_finished"]
 
 
 @pytest.fixture(scope="module")

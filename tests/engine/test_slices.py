@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.runfile.events import SlicesRefuted
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import FRESH
+from ddenv.runfile.state import CERTIFY
 from ddenv.runfile.store import RunFile
-from tests.conftest import DATA
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.guided import Guided, until
-from tests.engine.killing import Killed, kill_after
+from tests.engine.killing import Killed, kill_after, models_in
 from tests.engine.oracles import needs
 from tests.engine.participation import MODELS, Participation, sliced_run
 from tests.engine.test_certify import _killed, _resumed
@@ -44,7 +44,7 @@ def worlds_of(path):
 
     with RunFile(path) as file:
         journal = Journal(file)
-        return [(test, journal.keep_of_test(test.id)) for test in journal.state.tests]
+        return [(test, models_in(journal.state, test.id)) for test in journal.state.tests]
 
 
 def journey(state):
@@ -57,14 +57,9 @@ def test_who_took_part_is_recorded_with_each_test(tmp_path):
     pool.took_part = lambda keep, seed: keep & {"wall", "ball"} | {"ground_plane"} if seed else None
     with pytest.raises(Exception, match="budget"):
         drive(path, pool)
-    took_part = [test.took_part for test in state_of(path).tests]
-    assert took_part == [None, frozenset({"wall", "ball"}), frozenset({"wall", "ball"})]
-
-
-def test_an_old_run_file_has_no_slices():
-    state = state_of(DATA / "format4.ddenv")
-    assert state.ties is None
-    assert state.tests and all(test.took_part is None for test in state.tests)
+    state = state_of(path)
+    took_part = [test.took_part and set(test.took_part.names(state.elements)) for test in state.tests]
+    assert took_part == [None, {"wall", "ball"}, {"wall", "ball"}]
 
 
 @given(made_by=SIMULATORS, accept=st.sampled_from(["first", "kept"]), seed=st.integers(0, 9))
@@ -78,7 +73,7 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
             for test, keep in worlds_of(path):
                 outcome, met, _ = made_by.run(keep, test.seed)
                 assert test.outcome == outcome
-                assert test.took_part == met
+                assert test.took_part is not None and set(test.took_part.names(state.elements)) == met
             ends.append((state.environment, state.minimal))
             assert state.made == len(pool.made)
             assert state.refuted is None
@@ -89,10 +84,10 @@ def test_every_outcome_is_that_of_a_simulation_and_the_end_is_the_same(made_by, 
 @pytest.mark.parametrize(("share", "simulated"), [(0.1, 1), (-1.0, 0)])
 def test_what_a_certificate_rests_on_is_simulated_where_that_is_cheap(tmp_path, monkeypatch, share, simulated):
     """One of the fresh runs of this simulator follows from another one."""
-    monkeypatch.setattr("ddenv.engine.auditing.CHEAP", share)
+    monkeypatch.setattr("ddenv.engine.slicing.CHEAP", share)
     made_by = Participation(salt=2, needed=(MODELS[0], MODELS[3]))
     state = drive(sliced_run(tmp_path, accept_rate="kept", audit=1_000_000), made_by.pool())
-    fresh = [test for test in state.finished_tests if test.phase in FRESH]
+    fresh = [test for test in state.finished_tests if test.phase == CERTIFY]
     audits, implied = (sum(getattr(test, kind) is not None for test in fresh) for kind in ("audits", "implied_by"))
     assert (audits, implied) == (simulated, 1 - simulated)
 
@@ -152,10 +147,10 @@ def test_an_engine_that_is_killed_before_it_compares_does_so_when_it_resumes(tmp
     def stop_at_once(file):
         append = file.append
 
-        def limited(kind, *values):
-            if kind == "slices_refuted":
+        def limited(event, *values):
+            if isinstance(event, SlicesRefuted):
                 raise Killed
-            return append(kind, *values)
+            return append(event, *values)
 
         file.append = limited
 

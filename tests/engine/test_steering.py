@@ -1,6 +1,7 @@
 """A reduction that the user guides by hand: on a simulator that costs nothing."""
 
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import COMMANDS, Disturbed, Guided, at_once, events, guided, numbers, until  # noqa: F401
-from tests.engine.killing import Killed, finished_tests, kill_after
+from tests.engine.killing import Killed, finished_tests, kill_after, models_in
 from tests.engine.oracles import flaky, needs
 from tests.tiers import examples
 
@@ -29,11 +30,11 @@ def test_a_pinned_model_stays_and_is_part_of_every_candidate(tmp_path):
     assert set(state.environment) == {"wall", "ball"}
     assert state.minimal
     assert state.reason.endswith("; 1 pinned model was never left out")
-    leg = next(event.id for event in events(path) if event.kind == "leg_started")
-    started = [event.data["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
+    leg = [event.id for event in events(path) if event.kind == "leg_started"][-1]
+    started = [asdict(event.event)["test"] for event in events(path) if event.kind == "test_started" and event.id > leg]
     with RunFile(path) as file:
         journal = Journal(file)
-    assert all("ball" in journal.keep_of_test(test) for test in started)
+    assert all("ball" in models_in(journal.state, test) for test in started)
     assert [one.kind for one in state.decisions] == ["pin"]
 
 

@@ -12,9 +12,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
-from ddenv.engine.mcap_file import _chosen
+from ddenv.engine.mcap_file import Chosen, Streams, _chosen, messages
 from ddenv.engine.ros_messages import DEFINITIONS, header, marker, nanoseconds
-from ddenv.engine.streams import Chosen, Streams, messages
 from ddenv.robot.protocol import Reading, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Estimate
 from ddenv.robot.sensing.sensors import Imu, Scan

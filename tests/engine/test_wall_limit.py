@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from ddenv.engine.limits import FACTOR, GENEROUS, LEAST
 from ddenv.engine.noting import KNOWN_AFTER, MOST_LATE
 from ddenv.engine.pool import Broken, Pace
-from ddenv.engine.wall_limit import FACTOR, GENEROUS, LEAST
 from ddenv.errors import UserError
 from ddenv.report.report import content
 from ddenv.report.run_data import read_run

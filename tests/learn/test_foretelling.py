@@ -7,10 +7,8 @@ from ddenv.learn.lesson_course import Course
 from ddenv.runfile.position import position_in
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
-from tests.conftest import DATA
 from tests.learn.lessons import RUNS, opened
 
-ALL = [*RUNS, *sorted(DATA.glob("*.ddenv"))]
 REASONS = {"similar": "still there", "other": "another cause", "pass": "is gone|is probably gone"}
 
 
@@ -28,8 +26,8 @@ def sound(question):
 def of_outcome(position, moment, found):
     number = len(moment.after.tests)
     test = position.end.tests[number - 1]
-    until = position.moment(found.until).event
-    assert (until.kind, until.data["test"]) == ("test_finished", number)
+    until = position.moment(found.until).recorded
+    assert (until.kind, until.event.test) == ("test_finished", number)
     right = found.question.answers[found.question.right]
     assert right.text == SAID[test.outcome]
     assert ("The robot reached the goal" in right.why) == (test.outcome == "pass")
@@ -81,7 +79,7 @@ def of_parts(position, moment, found):
 CHECKS = {"outcome": of_outcome, "winner": of_winner, "parts": of_parts}
 
 
-@pytest.mark.parametrize("run", ALL, ids=lambda run: run.stem)
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.stem)
 def test_every_answer_fits_what_the_run_did(run):
     with RunFile(run) as file:
         position = position_in(file.events())
@@ -89,7 +87,7 @@ def test_every_answer_fits_what_the_run_did(run):
     for id in position.ids:
         moment = position.moment(id)
         hand = at_hand(moment)
-        for what in {hand} - {None} | ({"parts"} if moment.event.kind == "round_started" else set()):
+        for what in {hand} - {None} | ({"parts"} if moment.recorded.kind == "round_started" else set()):
             found = foretelling(position, id, what)
             if found is None:
                 continue

@@ -8,16 +8,15 @@ import zipfile
 import pytest
 from docs.lessons import delivery, quay, toys
 
+from ddenv.evidence.rates import wilson_interval
 from ddenv.learn.handout import handout
 from ddenv.learn.lesson import Answer
 from ddenv.learn.recorded_oracle import read_oracle
 from ddenv.learn.score import Score, data_of, score_of, summary
 from ddenv.learn.shelf import LESSONS
 from ddenv.page.html import html
-from ddenv.rates import wilson_interval
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.tested import purpose
 from tests.learn.lessons import FILES, RUNS, course, opened, through
 
 NUMBERS = range(len(FILES))
@@ -124,7 +123,7 @@ def test_the_oracle_of_the_toy_world_knows_every_part_and_agrees_with_the_run():
     tests = [test for test in position.end.tests if test.outcome in ("similar", "other", "pass")]
     assert len(tests) > 100
     for test in tests:
-        models = purpose(position.start_of(test.id).after, test).models
+        models = position.end.models_of(test)
         assert oracle.outcome(models) == delivery.outcome(models) == test.outcome
     assert {frozenset(kept) for kept in oracle.minimal} == {
         frozenset({"sign", "crate"}),
@@ -152,7 +151,7 @@ def test_the_runs_on_the_quay_follow_the_rule_of_its_robot(run):
     with RunFile(LESSONS / f"{run}.ddenv") as file:
         position = position_in(file.events())
     for test in position.end.tests:
-        models = {*purpose(position.start_of(test.id).after, test).models, *walls}
+        models = {*position.end.models_of(test), *walls}
         corners, reached = quay.way(models, test.seed)
         stuck = "similar" if corners[-1] == (quay.GATE_STOP, quay.OFF) else "other"
         assert test.outcome == ("pass" if reached else stuck)

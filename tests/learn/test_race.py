@@ -6,8 +6,8 @@ import sqlite3
 
 import pytest
 from docs.lessons import delivery
+from docs.lessons.record_plays import record_plays
 
-from ddenv.cli.record_plays import record_plays
 from ddenv.errors import UserError
 from ddenv.learn.plays import Play, plays_of_runs, recorded_play
 from ddenv.learn.race import KINDS, Race, bet, result, tally, why
@@ -75,10 +75,10 @@ def test_a_recorded_search_that_does_not_fit_is_refused():
 def test_a_run_file_has_the_search_that_was_recorded():
     play = plays_of_runs([DELIVERY])[0]
     with RunFile(DELIVERY) as file:
-        kinds = [event.data for event in file.events() if event.kind == "test_started"]
-    assert play.tests == sum(each["phase"] == "round" for each in kinds) == 38
+        tests = [one.event for one in file.events() if one.kind == "test_started" and one.event.phase == "round"]
+    assert play.tests == len(tests) == 38
     assert play.left == ("sign", "barrel", "cone") and play.ended
-    assert sum(turn.again for turn in play.turns) == sum(each["run"] > 0 for each in kinds if each["phase"] == "round")
+    assert sum(turn.again for turn in play.turns) == sum(each.run > 0 for each in tests)
 
 
 def test_only_runs_of_one_world_race(tmp_path):

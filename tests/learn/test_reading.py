@@ -90,7 +90,7 @@ WRONG_ALONE = [
         "[ddmin, splitting]",
         "[ddmin, timeseg/random]",
         21,
-        "'timeseg/random' is not recorded yet; 'ddenv learn --record",
+        "'timeseg/random' is not recorded yet; 'python -m docs.lessons.record_plays",
     ),
 ]
 

@@ -21,11 +21,12 @@ def test_variables_say_what_is_so_and_what_changed(run):
         assert now["n_partitions"].value == ("" if state.round is None else str(state.round.n_partitions))
         if before is not None:
             assert now["E"].changed == (now["E"].value != before["E"].value)
-        if moment.event.kind == "test_started" and moment.event.data["phase"] == "round":
+        kind, event = moment.recorded.kind, moment.recorded.event
+        if kind == "test_started" and event.phase == "round":
             assert now["result"].value == "..." and now["result"].changed
             assert "[" in now["subenvironments"].value
-        if moment.event.kind == "test_finished" and state.tests[moment.event.data["test"] - 1].phase == "round":
-            outcome = state.tests[moment.event.data["test"] - 1].outcome
+        if kind == "test_finished" and state.tests[event.test - 1].phase == "round":
+            outcome = state.tests[event.test - 1].outcome
             wanted = {"similar": "f again", "pass": "the goal was reached", "other": "not f"}[outcome]
             assert now["result"].value.startswith(wanted)
         before = now

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.reduction.acceptance import Acceptance
 from ddenv.reduction.evidence import Evidence, Trial
 from ddenv.reduction.forecast import Memory, Moment, interval, playing, plays
 from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.verdict import Acceptance
 from ddenv.schemas import split_pair
 
 NEAR = "model2model/failure-proximal"

@@ -1,21 +1,24 @@
 """Isolation as a pure search: what it removes lets the robot pass, and not with any one model of it put back."""
 
 import random
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.reduction.acceptance import estimated_rate
-from ddenv.reduction.certificate import settle
-from ddenv.reduction.isolation import MOST_RUNS, Passing, isolating, passes
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.certificate import settle
+from ddenv.evidence.rates import estimated_rate
+from ddenv.reduction.isolation import MOST_RUNS, Asked, Checked, Passing, isolating, isolation, passes
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.verdict import standing
+from tests.reduction.driving import Driver, Known, World
 from tests.tiers import examples
 
-NAMES = tuple(f"m{number}" for number in range(12))
-groups = st.lists(st.frozensets(st.sampled_from(NAMES), min_size=1, max_size=4), min_size=1, max_size=4)
+MODELS = tuple(range(12))
+groups = st.lists(st.sets(st.sampled_from(MODELS), min_size=1, max_size=4).map(Environment.of), min_size=1, max_size=4)
 
 
 def search(searching, passing):
@@ -39,47 +42,46 @@ def hits(groups):
     return lambda removed: all(not group.isdisjoint(removed) for group in groups)
 
 
-@given(groups=groups, first=st.integers(0, 14), order=st.permutations(NAMES))
+@given(groups=groups, first=st.integers(0, 14), order=st.permutations(MODELS))
 @examples(3)
 def test_what_goes_lets_the_robot_pass_and_not_with_any_one_model_put_back(groups, first, order):
     passing = hits(groups)
     removed, tried = search(isolating(tuple(order), first), passing)
     assert passing(removed)
-    assert not any(passing(removed - {name}) for name in removed)
+    put_back = {removed - Environment.of((model,)) for model in removed}
+    assert not any(map(passing, put_back))
     # Tests showed it: each of these was tried, unless nothing would be removed.
     assert removed in tried
-    assert {removed - {name} for name in removed} - {frozenset()} <= set(tried)
+    assert put_back - {NOTHING} <= set(tried)
 
 
 @given(
-    passing=st.sets(st.frozensets(st.sampled_from(NAMES[:5]), min_size=1)),
+    passing=st.sets(st.integers(1, 31).map(Environment)),
     first=st.integers(1, 5),
 )
 @examples(3)
 def test_it_is_one_minimal_whatever_passes(passing, first):
     """Also where a larger removal fails again."""
-    removed, _ = search(isolating(NAMES[:5], first), lambda each: each in passing)
+    removed, _ = search(isolating(MODELS[:5], first), passing.__contains__)
     if removed:
         assert removed in passing
-        assert not any(removed - {name} in passing for name in removed)
+        assert not any(removed - Environment.of((model,)) in passing for model in removed)
     else:
-        assert frozenset(NAMES[:5]) not in passing
+        assert Environment.whole(5) not in passing
 
 
 def test_what_the_reduction_left_goes_first_and_then_twice_as_many():
-    _, tried = search(isolating(NAMES, 2), lambda _: False)
+    _, tried = search(isolating(MODELS, 2), lambda _: False)
     assert [len(each) for each in tried] == [2, 4, 8, 12]
     assert all(few < many for few, many in pairwise(tried))
-    assert search(isolating((), 3), lambda _: True) == (frozenset(), [])
+    assert search(isolating((), 3), lambda _: True) == (NOTHING, [])
 
 
 def test_a_stack_goes_or_stays_as_a_whole():
-    stacks = Stacks.of([("m0",), ("m1", "m2", "m3"), ("m4", "m5")])
-    removed, tried = search(stacks.expand(isolating(stacks.representatives, 1)), hits([frozenset({"m2", "m9"})]))
-    assert removed == {"m1", "m2", "m3"}
-    assert all(
-        each & stack in (frozenset(), stack) for each in tried for stack in map(frozenset, stacks.by_first.values())
-    )
+    stacks = Stacks.of(map(Environment.of, ([0], [1, 2, 3], [4, 5])))
+    removed, tried = search(stacks.expand(isolating(stacks.representatives, 1)), hits([Environment.of((2, 9))]))
+    assert removed == Environment.of((1, 2, 3))
+    assert all(each & stack in (NOTHING, stack) for each in tried for stack in stacks.by_first.values())
 
 
 @pytest.mark.parametrize(("reached", "runs"), [(0, 5), (3, 10), (8, 10), (55, 60)])
@@ -105,10 +107,67 @@ def test_the_rule_is_seldom_wrong_at_either_of_its_rates():
 
 
 def test_fresh_runs_that_do_not_decide_show_nothing():
-    rule, world = Passing(0.9, 0.45, 0.01), frozenset({"m0"})
+    rule, world = Passing(0.9, 0.45, 0.01), Environment.of((0,))
     every = settle(passes(world, rule, 20), lambda *_: True)
     assert (every.verdict, every.runs) == ("passes", 20)
     assert settle(passes(world, rule, 20), lambda *_: False).verdict == "fails"
     some = settle(passes(world, rule, 20), lambda _, run: run % 7 not in (2, 5))
     assert (some.verdict, some.runs) == ("not shown", MOST_RUNS)
     assert settle(passes(world, rule, 20), lambda *_: "broken").verdict == "unknown"
+
+
+def isolated(world, passing, rates=(1.0, 0.0), checks=(), **options):
+    """A driver of the isolation of a world, and what has to go; runs reach the goal at one rate or the other."""
+    driver = Driver(world, **options)
+
+    def reached(environment, run):
+        draw = random.Random(f"{world.seed} {environment.bits} {run}")
+        return (
+            "broken" if draw.random() < world.breaks else draw.random() < rates[not passing(world.whole - environment)]
+        )
+
+    driver.outcome = reached
+    stacks = Stacks.of(world.stack(label) for label in dict.fromkeys(world.labels))
+    asked = Asked(world.whole, stacks.representatives[::-1], stacks, 1, Passing.of(0, 10), 0.8, 5, 10_000, 1_000)
+    return driver, driver.drive(isolation(driver, asked, checks)), stacks
+
+
+isolations = st.builds(
+    World,
+    labels=st.lists(st.integers(0, 5), min_size=1, max_size=7).map(tuple),
+    needed=st.just(NOTHING),
+    useful=st.just(NOTHING),
+    algorithm=st.just("ddmin"),
+    seed=st.integers(0, 10**6),
+    breaks=st.sampled_from([0.0, 0.02]),
+)
+causes = st.lists(st.sets(st.integers(0, 7), min_size=1, max_size=3).map(Environment.of), min_size=1, max_size=3)
+
+
+@given(world=isolations.map(lambda world: replace(world, breaks=0.0)), causes=causes)
+def test_fresh_runs_show_that_what_goes_is_enough_and_each_of_it_needed(world, causes):
+    """Model 7 stands in no world: a cause of it alone cannot be taken away."""
+    passing = hits(causes)
+    driver, removed, stacks = isolated(world, passing)
+    if removed is None:
+        assert not passing(world.whole)
+        return
+    assert passing(removed)
+    gone = [stack for stack in stacks.by_first.values() if not stack.isdisjoint(removed)]
+    assert removed == Environment.of(model for stack in gone for model in stack)
+    assert not any(passing(removed - stack) for stack in gone)
+    passes, *backs = driver.facts[-1].claims
+    assert passes.claim.verdict == "passes"
+    assert [claim.claim.verdict for claim in backs] == ["needed"] * len(gone)
+
+
+@given(world=isolations, causes=causes, workers=st.integers(2, 9))
+def test_an_isolation_does_not_depend_on_what_ends_first_and_is_taken_up_again(world, causes, workers):
+    passing, rates = hits(causes), (0.97, 0.1)
+    alone, removed, _ = isolated(world, passing, rates)
+    together, same, _ = isolated(world, passing, rates, workers=workers, order=1)
+    assert (together.facts, same) == (alone.facts, removed)
+    checks = [fact for fact in alone.facts if isinstance(fact, Checked)]
+    for known in range(len(checks) + 1):
+        again, same, _ = isolated(world, passing, rates, checks[:known], known=Known(dict(alone.known.outcomes)))
+        assert (again.made, same) == ([], removed)

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
 from ddenv.reduction.chance import beliefs, spatial_prior, undominated
 from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
@@ -82,7 +83,11 @@ def test_it_learns_what_needed_models_are_like():
     positions = {name: (*rng.uniform(-5, 5, 2), 0.0) for name in elements}
     slippery = set(elements[::5])
     traits = {name: Traits(1.0, 0.01 if name in slippery else 1.0) for name in elements}
-    trials = [Trial(frozenset(elements) - {name}, name not in slippery) for name in elements[:20]]
+    whole = Environment.whole(len(elements))
+    trials = [
+        Trial(whole - Environment.of((number,)), name not in slippery, elements)
+        for number, name in enumerate(elements[:20])
+    ]
     left = tuple(name for name in elements if name in slippery or name not in elements[:20])
     learner = Learner()
     for made in range(1, len(trials) + 1):
@@ -108,20 +113,22 @@ def followed(weights):
         end = known.failure_position
         near = sorted(known.elements, key=lambda name: np.linalg.norm(np.subtract(known.positions[name], end)))
         ranks = np.random.default_rng(seed).choice(30, 3, replace=False, p=weights / weights.sum())
-        needed, learner, trials = {near[rank] for rank in ranks}, Learner(), []
+        needed = Environment.of(known.elements.index(near[rank]) for rank in ranks)
+        learner, trials = Learner(), []
         guide = make_guide(
             "model2model", "failure-proximal", lambda known=known: known, growth="steady", skip="implied"
         )
-        searching, winner = search("ddenv", known.elements, guide), None
+        searching, winner = search("ddenv", range(30), guide), None
         for _ in range(8):
             round = searching.send(winner)
             if len(round.environment) < 6:
                 break
-            learnt += learner.chances(round.environment, replace(known, trials=tuple(trials))).tolist()
-            at_first += spatial_prior(round.environment, known).tolist()
-            truth += [name in needed for name in round.environment]
+            there = tuple(map(known.elements.__getitem__, round.environment))
+            learnt += learner.chances(there, replace(known, trials=tuple(trials))).tolist()
+            at_first += spatial_prior(there, known).tolist()
+            truth += [model in needed for model in round.environment]
             winner = next((one for one in round.candidates if needed <= one.models), None)
-            trials += [Trial(one.models, one is winner) for one in tried(round, winner)]
+            trials += [Trial(one.models, one is winner, known.elements) for one in tried(round, winner)]
     return np.array(learnt), np.array(at_first), np.array(truth)
 
 

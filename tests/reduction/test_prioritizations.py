@@ -15,7 +15,6 @@ from ddenv.reduction.prioritizations import (
     sequential,
     timestep,
 )
-from ddenv.reduction.round import one_model_partitions
 from tests.reduction.worlds import evidence
 
 PATH = np.array([[0.0, 0, 0, 0, 0], [1.0, 4, 0, 0, 0]])
@@ -42,7 +41,7 @@ def test_timestep_goes_by_the_first_model_sensed_and_puts_the_others_last():
 
 def test_random_is_a_shuffle_that_the_seed_fixes():
     known = evidence(8, 3)
-    partitions = one_model_partitions(known.elements)
+    partitions = [(name,) for name in known.elements]
     scores = random(partitions, known)
     assert scores == random(partitions, known)
     assert scores != sorted(scores)

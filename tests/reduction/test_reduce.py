@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tomllib
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -11,9 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ddenv
-from ddenv.reduction.walk import Step
+from ddenv.environment import NOTHING, Environment
+from ddenv.reduction.guide import make_guide
+from ddenv.reduction.reduce import Step
+from ddenv.reduction.round import Candidate
 from ddenv.schemas import names
 from tests.conftest import ROOT
+from tests.reduction.worlds import line
 from tests.tiers import examples
 
 ELEMENTS = tuple("abcdefgh")
@@ -128,6 +133,47 @@ def test_the_rate_is_kept_and_each_claim_says_what_its_fresh_runs_showed(salt, a
         shown = [result for kept, result in fresh if kept == frozenset(found.kept) - {claim.without}][-claim.runs :]
         assert (claim.shown, claim.runs) == (sum(shown), len(shown))
         assert claim.low <= claim.shown / claim.runs <= claim.high
+
+
+def stepping_back(salt):
+    """A reduction that drifts: what is found, its rounds, and the environments to which it went back."""
+    rounds, options = [], {"skip": "known", "accept_rate": "kept"}
+    found = ddenv.reduce(ELEMENTS, drifting(salt), on_round=rounds.append, **options, **ALL)
+    steps = zip(found.history, found.history[1:], strict=False)
+    return found, rounds, [after.kept for before, after in steps if set(after.kept) > set(before.kept)]
+
+
+def test_after_a_certificate_the_chosen_algorithm_goes_on_with_the_n_that_it_had():
+    """A round of ddenv begins with a partition; one that leaves out again what had gone has one candidate; a sweep does neither."""
+    again = 0
+    for salt in range(20):
+        _, rounds, reached = stepping_back(salt)
+        assert all(len(one.candidates) == 1 or one.candidates[0][0] == "partition" for one in rounds)
+        for environment in reached:
+            there = [one for one in rounds if one.environment == environment]
+            # What leaves out again has two parts: the group and the rest.
+            assert all(
+                len(before.partitions) <= len(after.partitions)
+                for before, after in pairwise(there)
+                if len(after.candidates) > 1
+            )
+            again += any(len(after.candidates) > 1 for after in there[1:])
+    assert again
+
+
+def test_what_lost_the_rate_is_not_taken_again():
+    backs = 0
+    for salt in range(20):
+        lost, chain = [], []
+        for kept in (set(step.kept) for step in stepping_back(salt)[0].history):
+            assert not any(kept <= one for one in lost)
+            if chain and kept > chain[-1]:
+                place = chain.index(kept)
+                lost.append(chain[place + 1])
+                del chain[place:]
+                backs += 1
+            chain.append(kept)
+    assert backs
 
 
 def line_of(count):
@@ -326,6 +372,23 @@ def test_the_guides_examples_run():
         assert done.returncode == 0, done.stderr
         shown = [line.split("# prints ", 1)[1] for line in block.splitlines() if "# prints " in line]
         assert done.stdout.splitlines() == shown
+
+
+@pytest.mark.examples
+def test_the_guides_algorithm_works_as_printed():
+    page = (ROOT / "docs" / "library.md").read_text()
+    blocks = (part.split("```")[0] for part in page.split("```python\n"))
+    found = {}
+    exec(next(block for block in blocks if block.startswith("# file farthest_half.py")), found)
+    known = line(a=0, b=1, c=2, d=3, e=4, f=5, g=6, h=7)
+    searching = found["farthest_half"](tuple(range(8)), make_guide("model2model", "failure-proximal", lambda: known))
+    assert [one.models for one in next(searching).candidates] == [Environment.of(range(4))]
+    assert [
+        one.models for one in searching.send(Candidate("", 0, (), Environment.of(range(4)), NOTHING)).candidates
+    ] == [Environment.of(range(2))]
+    with pytest.raises(StopIteration) as end:
+        searching.send(None)
+    assert end.value.value == Environment.of(range(4))
 
 
 @pytest.mark.examples

@@ -1,24 +1,24 @@
 """After its end has lost the rate, a search goes back as far as it must, and no farther."""
 
 import random
-from string import ascii_lowercase
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import good_enough, settle
 from ddenv.reduction.algorithms import sweep
-from ddenv.reduction.certificate import good_enough, settle
-from ddenv.reduction.stepping_back import Refused, groups_again, last_good, tried_again
+from ddenv.reduction.stepping_back import groups_again, last_good, tried_again
 
-CHAIN = [frozenset(ascii_lowercase[:length]) for length in range(12, 0, -1)]
+CHAIN = [Environment.whole(length) for length in range(12, 0, -1)]
 
 
 def outcomes(rate_of, seed=0):
     """Independent runs, the same whenever they are asked for."""
 
     def shown(subject, run):
-        return random.Random(f"{seed} {sorted(subject)} {run}").random() < rate_of(subject)
+        return random.Random(f"{seed} {list(subject)} {run}").random() < rate_of(subject)
 
     return shown
 
@@ -29,7 +29,7 @@ def place(shown, rate=0.9, lost_rate=0.3, ahead=1):
 
 @given(last=st.integers(0, 10), salt=st.integers(0, 10**6))
 def test_it_goes_back_to_the_last_environment_that_keeps_the_rate(last, salt):
-    shown = outcomes(lambda subject: 1.0 if subject >= CHAIN[last] else 0.0, salt)
+    shown = outcomes(lambda subject: 1.0 if CHAIN[last] <= subject else 0.0, salt)
     assert place(shown, 0.95, 0.0) == last
 
 
@@ -49,16 +49,6 @@ def test_where_runs_break_nothing_shows_that_the_rate_is_kept():
     assert place(lambda *_: "broken") == 0
 
 
-def test_what_lost_the_rate_is_refused_with_all_its_parts():
-    refused = Refused()
-    refused[frozenset("xyz")] = "vetoed"
-    refused.lose(frozenset("abc"))
-    assert frozenset("xyz") in refused
-    assert all(frozenset(part) in refused for part in ("abc", "ac", ""))
-    assert frozenset("xy") not in refused
-    assert frozenset("abcd") not in refused
-
-
 def carried_through(searching, is_similar):
     """The end of a search."""
     winner = None
@@ -70,26 +60,23 @@ def carried_through(searching, is_similar):
         winner = next((one for one in round.candidates if is_similar(one.models)), None)
 
 
-@given(needed=st.sets(st.sampled_from(ascii_lowercase[:12]), min_size=1), step=st.integers(0, 10))
+@given(needed=st.sets(st.sampled_from(range(12)), min_size=1).map(Environment.of), step=st.integers(0, 10))
 def test_models_that_went_too_early_are_found_and_all_others_go_again(needed, step):
     """The end lacked a needed model since step + 1."""
     good, bad, end = CHAIN[step], CHAIN[step + 1], CHAIN[-1]
     needed = (needed & good) | (good - bad)
-    refused = Refused()
-    refused.lose(bad)
-    order = tuple(sorted(good))
-    groups = groups_again(good, bad, end, order)
-    left = carried_through(tried_again(order, groups, sweep), lambda models: models not in refused and needed <= models)
-    assert left == needed
+    again = tried_again(tuple(good), groups_again(good, bad, end), sweep)
+    assert carried_through(again, lambda models: not models <= bad and needed <= models) == needed
 
 
 @pytest.mark.parametrize(
     ("good", "bad", "end", "groups"),
     [
-        ("abcdef", "abcd", "a", [("b", "c", "d"), ("e",), ("f",)]),
-        ("abcd", "abc", "a", [("b", "c")]),
-        ("abcd", "a", "a", [("b",), ("c", "d")]),
+        (6, 4, 1, [(1, 2, 3), (4,), (5,)]),
+        (4, 3, 1, [(1, 2)]),
+        (4, 1, 1, [(1,), (2, 3)]),
     ],
 )
 def test_first_goes_what_went_later_then_halves_of_the_step_that_lost_it(good, bad, end, groups):
-    assert groups_again(frozenset(good), frozenset(bad), frozenset(end), "abcdef") == groups
+    """Environments of the first so many models."""
+    assert groups_again(*map(Environment.whole, (good, bad, end))) == groups

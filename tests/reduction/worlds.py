@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
 from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.reduction.guide import make_guide, search
 from ddenv.schemas import names, pairs
@@ -39,14 +40,14 @@ def run(known, is_similar, pair=("model2model", "failure-proximal"), algorithm="
     """What is left, and the rounds with their winners. The schemas see every test that was made."""
     trials = []
     guide = make_guide(*pair, lambda: replace(known, trials=trials), **options)
-    searching = search(algorithm, known.elements, guide)
+    searching = search(algorithm, range(len(known.elements)), guide)
     rounds, winner = [], None
     try:
         while True:
             round = searching.send(winner)
             winner = next((one for one in round.candidates if is_similar(one.models)), None)
             rounds.append((round, winner))
-            trials += [Trial(one.models, one is winner) for one in tried(round, winner)]
+            trials += [Trial(one.models, one is winner, known.elements) for one in tried(round, winner)]
             assert len(rounds) < 2000, "it does not end"
     except StopIteration as end:
         return end.value, rounds
@@ -57,9 +58,17 @@ def tried(round, winner):
     return round.candidates if winner is None else round.candidates[: round.candidates.index(winner) + 1]
 
 
+def needing(known, *names):
+    """An oracle that shows the failure where all models of these names are there."""
+    needed = Environment.of(map(known.elements.index, names))
+    return lambda models: needed <= models
+
+
 # How many models, which of them f needs, and a seed.
 worlds = st.integers(1, 14).flatmap(
     lambda count: st.tuples(
-        st.just(count), st.sets(st.integers(0, count - 1), min_size=1, max_size=5), st.integers(0, 1000)
+        st.just(count),
+        st.sets(st.integers(0, count - 1), min_size=1, max_size=5).map(Environment.of),
+        st.integers(0, 1000),
     )
 )

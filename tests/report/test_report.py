@@ -1,6 +1,5 @@
 """A report tells what a run came to, whatever state it is in, and whatever its names hold."""
 
-import json
 import re
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -340,10 +339,8 @@ def many_rounds(run, rounds, won):
             left = left[1:]
             events.append(("reduced", {"candidate": 0, "environment": left, "evidence_test": test}))
         events.append(("round_finished", {}))
-    rows = [(0.0, kind, json.dumps(data)) for kind, data in events]
-    run.file._db.execute("BEGIN")
-    run.file._db.executemany("INSERT INTO event (time, kind, data) VALUES (?, ?, ?)", rows)
-    run.file._db.execute("COMMIT")
+    for kind, data in events:
+        run.write(kind, **data)
 
 
 def test_very_many_rounds_are_summed_up(run, tmp_path):

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.environment import Environment
+from ddenv.evidence.slices import Ties
 from ddenv.robot import reached
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
 from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
-from ddenv.slices import Ties
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of
@@ -59,7 +60,11 @@ def bits(result: RunResult, keep: frozenset[str]) -> tuple:
 
 def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
     """`models` with all of `there` that they are tied to."""
-    return Ties.among(world.ties(there)).closed(models, there)
+    elements = sorted(there)
+    number = {name: place for place, name in enumerate(elements)}
+    ties = Ties.among((number[name], number[other]) for name, other in world.ties(there))
+    closed = ties.closed(Environment.of(number[name] for name in models), Environment.whole(len(elements)))
+    return frozenset(closed.names(elements))
 
 
 def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:

@@ -17,7 +17,7 @@ from ddenv.robot.drake.template import Template
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
 from ddenv.runfile.failures import alike
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.read import parse_world

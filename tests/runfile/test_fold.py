@@ -1,5 +1,6 @@
 """Events to state: what is told of tests and candidates is right, and no state is ever changed by a later event."""
 
+import json
 import tracemalloc
 from collections.abc import Iterator
 from dataclasses import fields
@@ -14,19 +15,28 @@ from ddenv.errors import UserError
 from ddenv.runfile.fold import apply, fold
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import OUTCOMES, RunState
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Recorded, recorded
+from tests.shorthand import story, typed
 
 NAMES = [f"box {number}" for number in range(6)]
 
 
 def state_after(*happened: tuple[str, dict], names=NAMES) -> RunState:
     """The state after these events of a run of six boxes."""
-    first = ("created", {"scenario": {}, "elements": list(names)})
-    return fold(Event(number + 1, 0.0, *each) for number, each in enumerate((first, *happened)))
+    return fold(story((("created", {"scenario": {}, "elements": list(names)}), *happened)))
 
 
 def with_event(state: RunState, kind: str, **data) -> RunState:
-    return apply(state, Event(state.revision + 1, float(state.revision), kind, data))
+    for event in typed(state, kind, data):
+        state = apply(state, Recorded(state.revision + 1, float(state.revision), event))
+    return state
+
+
+def read_back(*happened: tuple[str, dict]) -> RunState:
+    """The same of events as they stand in a file, whether they make sense or not."""
+    first = ("created", {"scenario": {}, "elements": NAMES})
+    rows = enumerate((first, *happened), 1)
+    return fold([recorded(number, 0.0, kind, json.dumps(data)) for number, (kind, data) in rows])
 
 
 def round_event(partitions: list[list[int]], environment=range(6), number: int = 1) -> tuple[str, dict]:
@@ -52,15 +62,15 @@ def finished(test: int = 1, outcome: str = "pass", **more) -> tuple[str, dict]:
 
 
 def test_a_candidate_has_the_models_of_its_partition_or_all_others_in_their_order():
-    state = state_after(round_event([[4, 1], [0], [5, 3]], environment=[5, 4, 3, 1, 0]))
+    state = state_after(round_event([[4, 1], [0], [5, 3]], environment=[0, 1, 3, 4, 5]))
     models = [candidate.models for candidate in state.round.candidates]
     assert models == [
         ("box 4", "box 1"),
-        ("box 5", "box 3", "box 0"),
+        ("box 0", "box 3", "box 5"),
         ("box 0",),
-        ("box 5", "box 4", "box 3", "box 1"),
+        ("box 1", "box 3", "box 4", "box 5"),
         ("box 5", "box 3"),
-        ("box 4", "box 1", "box 0"),
+        ("box 0", "box 1", "box 4"),
     ]
     assert [candidate.size for candidate in state.round.candidates] == [len(each) for each in models]
 
@@ -80,10 +90,10 @@ def test_candidates_are_equal_if_they_and_their_rounds_environment_are():
 def test_a_round_of_many_one_model_partitions_is_small():
     """The names of all 4,000 candidates, half of them of 1,999 models, would take 32 MB."""
     before = state_after(names=[str(number) for number in range(2000)])
-    kind, data = round_event([[number] for number in range(2000)], range(2000))
+    [event] = typed(before, *round_event([[number] for number in range(2000)], range(2000)))
     tracemalloc.start()
     try:
-        state = with_event(before, kind, **data)
+        state = apply(before, Recorded(2, 0.0, event))
         assert len(state.round.candidates) == 4000
         assert tracemalloc.get_traced_memory()[1] < 4e6
     finally:
@@ -103,20 +113,27 @@ def test_a_verdict_copies_a_small_part_of_the_candidates():
     assert [one.index for one in after.round.candidates.changed_since(before.round.candidates)] == [1234]
 
 
-def test_a_verdict_by_a_test_that_cannot_be_takes_no_memory():
+@pytest.mark.parametrize("test", [0, 1, 10**14])
+def test_a_verdict_by_a_test_that_cannot_be_is_told(test):
     before = state_after(round_event([[0], [1]]))
-    judged = {"candidate": 0, "verdict": "dissimilar", "known": 0}
-    assert with_event(before, "candidate_judged", tests=[10**14], **judged).rests_on == 0
+    with pytest.raises(UserError, match="candidate_judged"):
+        judged = {"round": 1, "candidate": 0, "verdict": "dissimilar", "tests": [test]}
+        apply(before, recorded(3, 0.0, "candidate_judged", json.dumps(judged)))
 
 
 @pytest.mark.parametrize(
     "changed",
     [
-        {"environment": [0, 0, 1]},
-        {"environment": [0, 1, 6]},
-        {"environment": [0, 1, -1]},
+        {"environment": 1},
+        {"environment": -1},
+        {"environment": [0, 1]},
         {"partitions": [[0], [0]]},
-        {"partitions": [[0], [5]]},
+        {"partitions": [[0], [6]]},
+        {"partitions": [[0], [10**12]]},
+        {"partitions": [[0], [-1]]},
+        {"pinned": "3"},
+        {"pinned": "40"},
+        {"pinned": [2]},
         {"partitions": [[0], []]},
         {"candidates": [["partition", 2, None]]},
         {"candidates": [["partition", 1.0, None]]},
@@ -128,10 +145,11 @@ def test_a_verdict_by_a_test_that_cannot_be_takes_no_memory():
     ids=str,
 )
 def test_rounds_that_make_no_sense_are_told(changed):
-    kind, data = round_event([[0], [1]], [0, 1, 2])
-    state_after((kind, data))
+    kind, data = round_event([[0], [1]])
+    data["environment"] = 0
+    read_back((kind, data))
     with pytest.raises(UserError, match=r"damaged run file: event 2 \(round_started\)"):
-        state_after((kind, data | changed))
+        read_back((kind, data | changed))
 
 
 # Tests.
@@ -152,16 +170,16 @@ def test_when_models_were_first_sensed_and_touched_is_kept():
 )
 def test_sensed_models_that_make_no_sense_are_told(key, pair):
     with pytest.raises(UserError, match=r"damaged run file: event 3 \(test_finished\)"):
-        state_after(started(), finished(**{key: [[1, 1.0], pair]}))
+        read_back((started()[0], started()[1] | {"environment": 0}), finished(**{key: [[1, 1.0], pair]}))
 
 
 def test_full_runs_of_what_is_left_are_told_apart():
-    whole, one = ({**started(test)[1], "phase": "confirm", "without": left} for test, left in ((2, None), (3, 4)))
-    state = state_after(
-        started(1), ("confirm_started", {"round": None}), ("test_started", whole), ("test_started", one)
-    )
+    whole, one = ({**started(test)[1], "phase": "certify", "without": left} for test, left in ((2, None), (3, 4)))
+    terms = {"certificate": 1, "run": 0, "keep_rate": 0.8, "rate": 0.9, "error": 0.05, "at_least": 10}
+    state = state_after(started(1), ("certificate_started", terms), ("test_started", whole), ("test_started", one))
     assert state.confirming
     assert [(test.id, test.without) for test in state.confirm_tests] == [(2, None), (3, "box 4")]
+    assert [len(state.models_of(test)) for test in state.confirm_tests] == [6, 5]
     assert state.deflake_runs == 0
 
 
@@ -197,8 +215,8 @@ def test_the_tests_of_a_certificate_are_found_without_a_look_at_all_others():
 
 
 def test_an_outcome_that_nobody_knows_is_told():
-    with pytest.raises(UserError, match="is invalid here"):
-        state_after(started(), finished(outcome="splendid"))
+    with pytest.raises(UserError, match=r"outcome: expected one of similar, .*, found 'splendid'"):
+        read_back((started()[0], started()[1] | {"environment": 0}), finished(outcome="splendid"))
 
 
 def test_baseline_runs_count_as_what_they_turned_out_to_be():

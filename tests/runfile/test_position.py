@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from ddenv.runfile.fold import fold
 from ddenv.runfile.position import position_in
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Recorded
 from ddenv.runfile.tested import purpose
+from tests.shorthand import story
 
 ELEMENTS = [f"box {number}" for number in range(8)]
 
 
-def happened(rounds: list[list[int]]) -> list[Event]:
+def happened(rounds: list[list[int]]) -> list[Recorded]:
     """A run whose rounds halve the environment: for each round the numbers of tests of its candidates; the last one wins."""
     found = [("created", {"scenario": {}, "elements": ELEMENTS})]
     found.append(("engine_started", {"pid": 1, "jobs": 1, "version": "0", "simulator": "none"}))
@@ -41,7 +42,7 @@ def happened(rounds: list[list[int]]) -> list[Event]:
             found.append(("reduced", {"candidate": 0, "environment": kept, "evidence_test": test}))
         found.append(("round_finished", {}))
     # Ids of events need not follow each other.
-    return [Event(3 * place + 1, float(place), *each) for place, each in enumerate(found)]
+    return [Recorded(3 * place + 1, float(place), one.event) for place, one in enumerate(story(found))]
 
 
 ENDED = {"outcome": "pass", "failure": "", "distance": None, "end_pose": None, "simulated_seconds": 1.0}
@@ -93,19 +94,20 @@ def test_a_round_ends_with_what_it_showed():
 def test_a_test_is_found_with_its_models_after_its_round_is_over():
     position = position_in(happened([[1, 1], [1, 1]]))
     start = position.start_of(2)
-    made = purpose(start.after, start.after.tests[1])
-    assert (made.words, made.models) == ("round 1 · part B", tuple(ELEMENTS[4:]))
-    assert purpose(position.end, position.end.tests[1]).models is None
+    test = position.end.tests[1]
+    assert purpose(start.after, start.after.tests[1]) == "round 1 · part B"
+    assert purpose(position.end, test) == "round 1"
+    assert position.end.models_of(test) == tuple(ELEMENTS[4:])
     assert position.start_of(0) is position.start_of(5) is None
 
 
 def test_the_place_stays_while_the_run_goes_on():
     events = happened([[1, 1], [1, 1]])
-    growing = events[:8]
+    growing = events[:10]
     position = position_in(growing)
     assert position.step("moment", -1)
     there, number = position.now, position.place[0]
-    growing += events[8:]
+    growing += events[10:]
     position.catch_up()
     assert (position.now, position.place[0]) == (there, number)
     assert position.end == fold(events)

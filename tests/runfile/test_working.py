@@ -1,10 +1,12 @@
 """The time that a run took is that in which an engine worked: pauses and waiting for the user do not count."""
 
+from dataclasses import replace
+
 import pytest
 
-from ddenv.runfile.fold import fold
-from ddenv.runfile.store import Event
-from ddenv.runfile.working import spent
+from ddenv.runfile.fold import apply, fold, spent
+from ddenv.runfile.store import Recorded
+from tests.shorthand import typed
 from tests.workbench import fake_moments, fake_run
 
 ENGINE = {"pid": 1, "jobs": 1, "version": "1", "simulator": "x"}
@@ -20,9 +22,11 @@ def first(tmp_path):
 
 def at(first, *more):
     """The state after events at these times, s after the first ones; the engine started at 0."""
-    events = [Event(event.id, 0.0, event.kind, event.data) for event in first]
-    later = [Event(events[-1].id + number, time, kind, data) for number, (time, kind, data) in enumerate(more, 1)]
-    return fold([*events, *later])
+    state = fold(replace(one, time=0.0) for one in first)
+    for time, kind, data in more:
+        for event in typed(state, kind, data):
+            state = apply(state, Recorded(state.revision + 1, time, event))
+    return state
 
 
 def test_pauses_and_waiting_do_not_count(first):
@@ -39,8 +43,8 @@ def test_pauses_and_waiting_do_not_count(first):
 def test_a_full_disk_and_jumps_of_the_clock_do_not_count(first):
     decided = (40.0, "decided", {"candidate": 0, "decision": "reject"})
     full = (
-        (50.0, "room", {"enough": False, "needed": 10, "free": 1}),
-        (90.0, "room", {"enough": True, "needed": 10, "free": 20}),
+        (50.0, "disk_space", {"enough": False, "needed": 10, "free": 1}),
+        (90.0, "disk_space", {"enough": True, "needed": 10, "free": 20}),
     )
     assert at(first, decided, full[0]).needs_room == 10 and spent(at(first, decided, full[0]), 60.0) == 10.0
     assert at(first, decided, *full).needs_room == 0 and spent(at(first, decided, *full), 95.0) == 15.0

@@ -10,10 +10,11 @@ import yaml
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.scenario import PLAIN
 from tests.conftest import ROOT
+from tests.shorthand import Writing
 from tests.waiting import PATIENCE
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -57,20 +58,12 @@ def _reduce(run, keep):
     """One round, in which the first partition shows the failure."""
     with RunFile(run) as file:
         file.own()
-        names = file.events()[0].data["elements"]
+        names = file.events()[0].event.elements
         keep, everything = [names.index(name) for name in keep], list(range(len(names)))
         parts = [keep, [number for number in everything if number not in keep]]
-        file.append(
-            "round_started",
-            {
-                "round": 1,
-                "n_partitions": 2,
-                "environment": everything,
-                "partitions": parts,
-                "candidates": [["partition", 0, None]],
-            },
-        )
-        file.append("reduced", {"candidate": 0, "environment": keep, "evidence_test": 0})
+        writing, split = Writing(file), {"partitions": parts, "candidates": [["partition", 0, None]]}
+        writing.write("round_started", {"round": 1, "n_partitions": 2, "environment": everything} | split)
+        writing.write("reduced", {"candidate": 0, "environment": keep, "evidence_test": 1})
 
 
 def written(folder):

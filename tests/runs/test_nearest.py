@@ -74,6 +74,7 @@ def ended(run, claims, removal):
     """What is said of an isolation that ends with these claims about the world without the first three models."""
     fake_moments.finished(run).start_isolation(2)
     gone = run.remove("crate_00", "crate_01", "crate_02")
+    run.isolate_all(gone, "e")
     low_high = {"low": 0.1, "high": 0.9}
     said = [
         {"back": back, "verdict": verdict, "reached": reached, "runs": runs, **low_high}

@@ -4,9 +4,9 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_run, read_parts
+from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
-from ddenv.runs.scenarios import load_parts, reading_of, scenario_for_world, with_options
+from ddenv.runs.subject import load_parts, read_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import load_scenario
 from ddenv.world.model import Cylinder, Mesh
 

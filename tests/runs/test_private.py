@@ -7,6 +7,7 @@ import subprocess
 import pytest
 
 from ddenv.errors import UserError
+from ddenv.runfile.events import Paused
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs import programs
@@ -28,7 +29,7 @@ def test_all_files_of_a_run_are_for_whom_the_run_is(tmp_path, started, mode, bes
         path.chmod(mode)
         with RunFile(path) as file, engine_lock(path):
             file.own()
-            file.append("paused", {})
+            file.append(Paused())
             programs.start_engine(path, 1)
             programs.start_scene(path)
             files = {

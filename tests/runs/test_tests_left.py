@@ -5,8 +5,8 @@ from statistics import median
 
 import pytest
 
-from ddenv.certificate_cost import Made, certificate_tests
-from ddenv.reduction.certificate import Terms, error_of, falls, keeps, settle
+from ddenv.evidence.certificate import Terms, error_of, falls, keeps, settle
+from ddenv.evidence.certificate_cost import Made, certificate_tests
 from ddenv.runfile.fold import fold
 from ddenv.runs.tests_left import remaining, rough_run, rough_tests
 from ddenv.settings import PRINTED

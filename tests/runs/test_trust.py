@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from ddenv.errors import UserError
+from ddenv.runfile.events import AcceptModeChanged, EngineStarted
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.export import export_world
@@ -98,7 +99,7 @@ def test_a_scenario_that_ddenv_wrote_of_a_run_is_asked_about(scenario, home):
     loaded = load_scenario(scenario(BRINGS["command"]))
     create_run(loaded, run)
     with RunFile(run) as file:
-        file.append("engine_started", {"pid": 1, "jobs": 1, "version": "0.1.0", "simulator": "none"})
+        file.append(EngineStarted(1, 1, "0.1.0", "none"))
     export_world(run, written.with_suffix(".sdf"), written)
     save_scenario(loaded, saved)
     for path in (written, saved):
@@ -178,5 +179,5 @@ def test_a_run_file_is_the_users_own_until_it_is_opened_to_others(home):
     assert run.stat().st_mode & 0o777 == 0o600
     run.chmod(0o640)
     with RunFile(run) as file:
-        file.append("accept_mode", {"mode": "ask"})
+        file.append(AcceptModeChanged("ask"))
     assert run.stat().st_mode & 0o777 == 0o640

@@ -50,9 +50,19 @@ class Rows:
         begun = {data["test"]: data for kind, data in events if kind == "test_started"}
         ended = [begun[data["test"]] | data for kind, data in events if kind == "test_finished"]
         fresh = [one for one in ended if one["phase"] == "certify" and one["run"] >= first and one["end_pose"]]
-        # Runs of the whole world belong to its own node.
-        node = next((one["node"] for one in reversed(fresh) if one.get("without") is not None), fresh[-1]["node"])
-        self.all = [one for one in fresh if one["node"] == node and one["outcome"] in ("similar", "other", "pass")]
+        models = {data["environment"]: int(data["models"], 16) for kind, data in events if kind == "environment_named"}
+        models[0] = 2 ** len(self.names) - 1
+        claims = [data["claims"] for kind, data in events if kind == "certificate_finished"][-1]
+        left = claims[0]["environment"]
+        self.all = [
+            one
+            for one in fresh
+            if one["outcome"] in ("similar", "other", "pass")
+            and (
+                one["environment"] == left
+                or (models[one["environment"]] | models[left] == models[left] and "without" in one)
+            )
+        ]
 
     def without(self, name: str | None) -> list[dict[str, Any]]:
         number = None if name is None else self.names.index(name)
@@ -149,7 +159,7 @@ def _parting(rows: Rows, name: str, words: str) -> list[str]:
     ):
         wrong.append(f"they are apart at {at}")
     if said[7]:
-        met = dict(one["first_touched" if said[7] == "touches" else "first_sensed"])
+        met = dict(one.get("first_touched" if said[7] == "touches" else "first_sensed", ()))
         at_once = met.get(rows.names.index(name))
         if at_once is None or abs(at_once - float(said[8])) > 0.051:
             wrong.append(f"{said[7]} it after {at_once} s")

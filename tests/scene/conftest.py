@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.runfile.store import RunFile
+from ddenv.runfile.store import Motions, RunFile
 from ddenv.runs.creation import create_run
-from ddenv.runs.scenarios import scenario_for_world
+from ddenv.runs.subject import scenario_for_world
 from ddenv.world.read import parse_world
+from tests.shorthand import Writing
 
 NAMES = ("left wall", "tile/é <b>1</b>", "board", "asphalt")
 
@@ -62,12 +63,17 @@ class Writer:
         create_run(scenario_for_world(world, (0.0, 0.0, 0.14, 0.0), (6.0, 0.0)), path)
         self.path, self.run = path, RunFile(path)
         self.run.own()
+        self._writing = Writing(self.run)
         scenario = json.loads(self.run.document("scenario"))
-        self.run.append("created", {"scenario": scenario, "elements": list(NAMES)})
+        self.append("created", {"scenario": scenario, "elements": list(NAMES)})
+
+    def append(self, kind: str, data: dict, motions: Motions | None = None) -> None:
+        """An event in short, see `tests.shorthand`."""
+        self._writing.write(kind, data, motions)
 
     def start_test(self, test: int, *, candidate: int | None = None, run: int = 0) -> None:
         place = {"phase": "baseline", "round": None} if candidate is None else {"phase": "round", "round": 1}
-        self.run.append("test_started", place | {"test": test, "candidate": candidate, "run": run, "seed": run})
+        self.append("test_started", place | {"test": test, "candidate": candidate, "run": run, "seed": run})
 
     def finish_test(self, test: int, outcome: str, end: float = 3.0) -> None:
         rows, board = straight(end), straight(0.5)
@@ -75,10 +81,10 @@ class Writer:
         values = {"failure": "out of time", "distance": None, "end_pose": [*rows[-1, 1:]], **noticed}
         seconds = {"simulated_seconds": 8.0, "wall_seconds": 0.1}
         motions = {"": rows.tobytes(), "board": board.tobytes()}
-        self.run.append("test_finished", {"test": test, "outcome": outcome} | values | seconds, motions)
+        self.append("test_finished", {"test": test, "outcome": outcome} | values | seconds, motions)
 
     def start_engine(self) -> None:
-        self.run.append("engine_started", {"pid": 1, "jobs": 1, "version": "0", "simulator": "none"})
+        self.append("engine_started", {"pid": 1, "jobs": 1, "version": "0", "simulator": "none"})
 
     def baseline(self) -> None:
         self.start_engine()
@@ -87,20 +93,20 @@ class Writer:
         numbers = {"runs": 1, "failures": 1, "rate": 1.0, "low": 0.2, "high": 1.0, "miss_chance": 0.0}
         place = {"failure_test": 1, "position": [3.0, 0.0, 0.132], "iterations_95": 0}
         known = {"outcomes": {"1": "similar"}, "distances": {"1": 0.0}}
-        self.run.append("baseline_finished", numbers | place | known)
+        self.append("baseline_finished", numbers | place | known)
 
     def round(self) -> None:
         candidates = [["partition", 0, 1.0], ["partition", 1, 2.0]]
         parts = {"partitions": [[0, 1], [2, 3]], "candidates": candidates}
-        self.run.append("round_started", {"round": 1, "n_partitions": 2, "environment": [0, 1, 2, 3]} | parts)
+        self.append("round_started", {"round": 1, "n_partitions": 2, "environment": [0, 1, 2, 3]} | parts)
 
     def reduce(self) -> None:
         """Candidate 0 shows the failure in test 2, and is taken."""
         self.start_test(2, candidate=0)
         self.finish_test(2, "similar", end=3.1)
-        self.run.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
-        self.run.append("reduced", {"candidate": 0, "environment": [0, 1], "evidence_test": 2})
-        self.run.append("round_finished", {})
+        self.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
+        self.append("reduced", {"candidate": 0, "environment": [0, 1], "evidence_test": 2})
+        self.append("round_finished", {})
 
 
 @pytest.fixture

@@ -71,8 +71,8 @@ def test_a_chosen_row_is_shown_by_its_test_or_else_by_its_models(writer):
 
 def test_a_try_has_its_own_models(writer):
     writer.baseline()
-    writer.run.append("trial_started", {"trial": 1, "models": [0, 2]})
-    writer.run.append(
+    writer.append("trial_started", {"trial": 1, "models": [0, 2]})
+    writer.append(
         "test_started",
         {"test": 2, "phase": "hand", "round": None, "candidate": None, "trial": 1, "run": 0, "seed": 0},
     )
@@ -83,13 +83,13 @@ def test_a_try_has_its_own_models(writer):
 @pytest.mark.parametrize("together", [False, True])
 def test_a_fresh_run_shows_its_own_environment(writer, together):
     writer.baseline()
-    writer.run.append("supports", {"pairs": [[1, 0]]})
+    writer.append("supports", {"pairs": [[1, 0]]})
     number = [0]
 
     def shown(**place):
         number[0] += 1
         test = {"test": 1 + number[0], "round": None, "candidate": None, "run": 10_000, "seed": 0}
-        writer.run.append("test_started", test | {"phase": "certify"} | place)
+        writer.append("test_started", test | {"phase": "certify"} | place)
         state = state_of(writer)
         reduction = state.scenario["reduction"] | {"keep_supports": together}
         state = state.changed(scenario=state.scenario | {"reduction": reduction})
@@ -120,8 +120,8 @@ def test_a_reduction_that_waits_is_shown(writer):
     writer.round()
     writer.start_test(2, candidate=0)
     writer.finish_test(2, "similar")
-    writer.run.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
-    writer.run.append("waiting", {"candidate": 0})
+    writer.append("candidate_judged", {"candidate": 0, "verdict": "similar", "tests": [2], "known": 0})
+    writer.append("waiting", {"candidate": 0})
     found = shot(state_of(writer), [])
     assert (found.kind, found.test) == ("replay", 2)
     assert found.left_out == {"board", "asphalt"}

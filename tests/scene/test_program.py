@@ -343,7 +343,7 @@ def test_ports_that_do_not_exist(writer, start_scene, port):
 
 @pytest.mark.programs
 def test_a_damaged_run_file_is_one_line(writer, start_scene):
-    writer.run.append("nonsense", {})
+    writer.append("nonsense", {})
     process = start_scene(writer.path)
     assert process.wait(PATIENCE) == 2
     error = process.stderr.read()
@@ -355,7 +355,7 @@ def test_a_damaged_run_file_is_one_line(writer, start_scene):
 async def test_a_run_file_that_is_damaged_while_shown(writer, start_scene):
     process = start_scene(writer.path)
     connection = await websocket_connect(feed_of(url_of(process)))
-    writer.run.append("nonsense", {})
+    writer.append("nonsense", {})
     assert await asyncio.to_thread(process.wait, PATIENCE) == 2
     assert process.stderr.read().count("\n") == 1
     connection.close()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from ddenv.claims import is_minimal, verdict_on
+from ddenv.evidence.claims import is_minimal, verdict_on
 from ddenv.runfile.fold import fold
 from ddenv.study.plan import Cell, Plan, make_plan
 from ddenv.study.results import Found, read_cell

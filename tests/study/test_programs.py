@@ -61,7 +61,7 @@ def start(tmp_path, monkeypatch):
 def engine_of(run):
     """The process of the engine that was started last."""
     with RunFile(run) as file:
-        return [event.data["pid"] for event in file.events() if event.kind == "engine_started"][-1]
+        return [one.event.pid for one in file.events() if one.kind == "engine_started"][-1]
 
 
 @pytest.mark.programs

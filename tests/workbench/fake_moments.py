@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ddenv.claims import is_minimal, verdict_on
+from ddenv.evidence.claims import is_minimal, verdict_on
 from tests.workbench.fake_run import FakeRun
 
 
@@ -51,7 +51,7 @@ def piled(run: FakeRun) -> FakeRun:
 def waiting(run: FakeRun) -> FakeRun:
     """Round 1: the first part shows f, and waits for the user."""
     run.created().baseline()
-    run.write("accept_mode", mode="ask")
+    run.write("accept_mode_changed", mode="ask")
     run.start_round(3)
     run.similar(0)
     run.write("waiting", candidate=0)
@@ -147,7 +147,7 @@ def isolated(run: FakeRun) -> FakeRun:
 
 
 def uncertified(run: FakeRun) -> FakeRun:
-    """A run of a file of format 4, which ended with two models and without a certificate."""
+    """A run that ended with two models and without a certificate."""
     _rounds(run).write("finished", minimal=True, reason="no single model can be removed")
     return run
 

@@ -9,14 +9,16 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
+from ddenv.runfile.events import Created
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
-from ddenv.runfile.store import ROBOT, Live, RunFile, create
+from ddenv.runfile.store import ROBOT, Live, Motions, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
 from ddenv.world.read import parse_world
+from tests.shorthand import Writing
 
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">
 <collision name="body"><geometry><box><size>0.6 0.4 0.2</size></box></geometry></collision></link></model></sdf>"""
@@ -77,9 +79,12 @@ class FakeRun:
         self.world = world or world_text()
         documents = {"scenario": json.dumps(data).encode(), "world": self.world, "robot": ROBOT_SDF}
         self.elements = list(parse_world(self.world, path).elements(frozenset(data.get("protected", ()))))
-        create(path, documents, {"scenario": data, "elements": self.elements})
+        create(path, documents, Created(data, tuple(self.elements)))
         self.file = RunFile(path)
         self.file.own()
+        self._writing = Writing(self.file)
+        # What each removal leaves, from number 1 on.
+        self.removals: list[list[int]] = []
         self.tests = 0
         self.round = 0
         self.trials = 0
@@ -108,8 +113,12 @@ class FakeRun:
         self.let_go()
         self.file.close()
 
-    def write(self, kind: str, **data) -> None:
-        self.file.append(kind, data)
+    def write(self, kind: str, motions: Motions | None = None, **data) -> None:
+        """An event in short, see `tests.shorthand`; a `removal` stands for its environment."""
+        if "removal" in data:
+            removal = data.pop("removal")
+            data["environment"] = None if removal is None else self.removals[removal - 1]
+        self._writing.write(kind, data, motions)
 
     def created(self) -> FakeRun:
         self.write("created", scenario=self.data, elements=self.elements)
@@ -152,7 +161,7 @@ class FakeRun:
         # It turns aside in the middle of its way.
         for row in range(len(way) // 16, len(way) // 8):
             way[8 * row + 2] += aside
-        self.file.append("test_finished", event, {ROBOT: way.tobytes()})
+        self.write("test_finished", {ROBOT: way.tobytes()}, **event)
 
     def test(
         self, candidate: int | None, outcome: str, distance: float | None = None, run: int = 0, failure: str = ""
@@ -165,7 +174,7 @@ class FakeRun:
         """The first test of a candidate follows from the test `by`."""
         self.tests += 1
         place = {"phase": "round", "round": self.round, "candidate": candidate, "run": 0, "seed": 0}
-        self.file.append("implied", {"test": self.tests, "by": by, **place}, {ROBOT: by})
+        self.write("implied", {ROBOT: by}, test=self.tests, by=by, **place)
         return self.tests
 
     def start_certificate(self) -> None:
@@ -220,14 +229,13 @@ class FakeRun:
 
     def remove(self, *names: str) -> int:
         """The number of a removal that is tried now."""
-        number = len(self.state.removals) + 1
-        self.write("removal_tried", removal=number, models=self.numbers(list(names)))
-        return number
+        self.removals.append([number for number, name in enumerate(self.elements) if name not in names])
+        return len(self.removals)
 
     def isolate(self, removal: int, run: int) -> int:
         """A run of the whole world after a removal starts."""
         self.tests += 1
-        place = {"phase": "isolate", "round": None, "candidate": None, "node": 0, "removal": removal}
+        place = {"phase": "isolate", "round": None, "candidate": None, "removal": removal}
         self.write("test_started", test=self.tests, **place, run=run, seed=run)
         return self.tests
 

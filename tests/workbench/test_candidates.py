@@ -142,7 +142,7 @@ def test_a_second_certificate_counts_its_own_runs(run):
 
 
 def test_a_search_that_goes_on_has_its_candidates_again(run):
-    fake_moments.certifying(run).write("rate_lost", node=1, lost=2, again=[])
+    fake_moments.certifying(run).write("rate_lost", node=1, lost=2, again=[], tests=[])
     assert listed(snapshot(run)).of[0] == "round"
 
 
@@ -152,8 +152,8 @@ def test_tests_of_a_dead_engine_do_not_run(run):
 
 def test_trials_of_this_place_stand_above_the_candidates(run):
     state = snapshot(fake_moments.mid_round(run)).state
-    judged = [Trial(number, ("crate_00",), state.node, "dissimilar", (1,)) for number in range(1, 6)]
-    similar = Trial(6, ("crate_00", "crate_01"), state.node, "similar", (1,))
+    judged = [Trial(number, ("crate_00",), state.node, verdict="dissimilar", tests=(1,)) for number in range(1, 6)]
+    similar = Trial(6, ("crate_00", "crate_01"), state.node, verdict="similar", tests=(1,))
     trials = (*judged, similar, Trial(7, (), state.node), Trial(8, (), state.node + 1))
     rows = rows_of(Snapshot(state.changed(trials=trials), (), "alive"))
     assert [row["candidate"] for row in rows[:5]] == ["try 4", "try 5", "try 6", "try 7", "part A"]

@@ -10,6 +10,7 @@ from ddenv.runfile.fold import fold
 from ddenv.workbench.run.explain import baseline_sentence, explain
 from ddenv.workbench.run.status import facts
 from ddenv.workbench.shared.poll import Poll, Snapshot
+from tests.shorthand import raw
 
 
 def snapshot(run, engine="alive") -> Snapshot:
@@ -121,10 +122,10 @@ def test_a_round_without_f_is_line_15(run):
 
 
 def test_a_full_disk_comes_first(run):
-    fake_moments.mid_round(run).write("room", enough=False, needed=32_000_000, free=1)
+    fake_moments.mid_round(run).write("disk_space", enough=False, needed=32_000_000, free=1)
     assert told(run)[1].startswith("The disk is full: no new test starts until 32 MB are free.")
     assert facts(snapshot(run))[0].forms[0] == "! no room on the disk"
-    run.write("room", enough=True, needed=32_000_000, free=10**9)
+    run.write("disk_space", enough=True, needed=32_000_000, free=10**9)
     assert "disk" not in told(run)[1]
 
 
@@ -342,9 +343,9 @@ def test_settings_that_make_no_sense_do_no_harm(run, scenario):
 @pytest.mark.parametrize(
     ("kind", "data"),
     [
-        ("waiting", {"candidate": 99}),
-        ("waiting", {"candidate": -1}),
-        ("reduced", {"candidate": 99, "environment": [0], "evidence_test": 1}),
+        ("waiting", {"round": 1, "candidate": 99}),
+        ("waiting", {"round": 1, "candidate": -1}),
+        ("reduced", {"round": 1, "candidate": 99, "environment": 0, "evidence_test": 1}),
         ("test_started", {"test": 1}),
         ("created", {"scenario": 3, "elements": 4}),
     ],
@@ -352,7 +353,7 @@ def test_settings_that_make_no_sense_do_no_harm(run, scenario):
 def test_invalid_events_are_named_and_the_rest_is_shown(run, kind, data):
     run.created().baseline()
     run.start_round(2)
-    run.write(kind, **data)
+    raw(run.file, kind, data)
     poll = Poll(run.path)
     found = poll.look()
     poll.close()

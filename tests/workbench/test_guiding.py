@@ -42,7 +42,7 @@ async def test_pausing_stepping_and_vetoing(run):
             ("step", {"unit": "round"}),
             ("accept_mode", {"mode": "ask"}),
         ]
-        run.write("accept_mode", mode="ask")
+        run.write("accept_mode_changed", mode="ask")
         await session.look()
         assert "accept: ask" in session.text("#status")
         await session.press("t", "a", "x")
@@ -334,10 +334,11 @@ async def test_a_run_file_that_is_gone_is_told_and_can_be_left(run):
 WRITER = """
 import sys
 from pathlib import Path
+from ddenv.runfile.events import Paused
 from ddenv.runfile.store import RunFile
 file = RunFile(Path(sys.argv[1]))
 file.own()
-file.append("paused", {})
+file.append(Paused())
 print("ready", flush=True)
 sys.stdin.read()
 """

@@ -12,6 +12,7 @@ from attached import Attached
 from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.pace import Pause, Resume, Stop
+from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.shared import poll as polling
 from ddenv.workbench.shared.observed import Busy, Observed
@@ -126,7 +127,7 @@ def test_a_run_that_comes_to_life_is_followed(run, runs):
     assert look(watching).status == "lost"
     engine = fake_run.RunFile(run.path)
     engine.own()
-    engine.append("engine_started", {"pid": 1, "jobs": 2, "version": "0", "simulator": "none"})
+    engine.append(EngineStarted(1, 2, "0", "none"))
     with run.engine():
         assert look(watching).status in ("running", "baseline")
     engine.close()

@@ -161,7 +161,8 @@ def parts(run):
     fake_moments.finished(run)
     samples = fake_run.path_samples()[: 8 * 60]
     samples[1::8] = array("d", [1.2 * x + 1.2 for x in samples[1::8]])
-    run.file.append("paused", {"test": 61}, {ROBOT: samples.tobytes()})
+    run.file._db.execute("INSERT OR REPLACE INTO motion VALUES (61, ?, ?)", (ROBOT, samples.tobytes()))
+    run.write("paused")
 
 
 @pytest.mark.parametrize("size", slow(pytest.mark.screens, [SMALL, USUAL], but=[USUAL]), ids=str)

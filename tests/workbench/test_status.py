@@ -10,7 +10,7 @@ from textual.app import App
 from ddenv import __version__
 from ddenv.runfile.fold import fold
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.state import Node
+from ddenv.runfile.progress import Node
 from ddenv.workbench.run.status import Header, Status, branch_of, cut_tests, facts, fitted, heading
 from ddenv.workbench.shared.poll import Snapshot
 

@@ -24,18 +24,11 @@ from ddenv.errors import UserError
 def certify_command(run: str, runs: int | None, jobs: int, cluster: str | None, trust: bool, as_json: bool) -> int:
     """Makes one more certificate of what RUN (a name or a file) has left, with fresh seeds; it changes nothing else."""
     from ddenv.cli.follow import follow_to_summary
-    from ddenv.cli.trusting import allow_run
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.lock import engine_lock
+    from ddenv.cli.trusting import idle_run
     from ddenv.runfile.run_settings import settings
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
     from ddenv.runs.programs import start_engine
 
-    path = find_run(run)
-    allow_run(path, trust, cluster)
-    with RunFile(path) as file, engine_lock(path):
-        state = fold(file.events())
+    path, state = idle_run(run, trust, cluster)
     if state.baseline is None:
         raise UserError(
             f"{path}: f is not known yet, so there is nothing to certify; run it first: ddenv resume {path}"

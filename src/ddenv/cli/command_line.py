@@ -53,7 +53,9 @@ class Commands(click.Group):
             return super().resolve_command(ctx, args)
         # While a line is typed, the shell only asks what can follow.
         if not ctx.resilient_parsing and not _can_be_opened(word):
-            known = [*self.list_commands(ctx), *bundled()]
+            from ddenv.world.load import bundled_names
+
+            known = [*self.list_commands(ctx), *bundled_names()]
             raise UserError(f"no command, run, scenario or world '{word}'{nearest(word, known)}; see 'ddenv --help'")
         return open_command.name, open_command, args
 
@@ -67,17 +69,12 @@ class Commands(click.Group):
 
 def _can_be_opened(word: str) -> bool:
     """Whether a word names a file, there or not, a run or a bundled scenario."""
-    from ddenv.runs.folder import find_run
-
     path = Path(word)
-    return bool(path.suffix) or len(path.parts) > 1 or path.exists() or find_run(word).is_file() or word in bundled()
+    if path.suffix or len(path.parts) > 1 or path.exists():
+        return True
+    from ddenv.runs.subject import named
 
-
-def bundled() -> list[str]:
-    """The names of the bundled scenarios."""
-    from ddenv.world.load import bundled_names
-
-    return bundled_names()
+    return named(word) is not None
 
 
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,28 +11,7 @@ from click.shell_completion import CompletionItem
 
 # Files that a command can open.
 KINDS = (".ddenv", ".yaml", ".yml", ".sdf", ".world", ".urdf")
-
-
-def runs(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
-    """The names of runs, and files."""
-    return _offered(_runs(), begun)
-
-
-def scenarios(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
-    """The names of bundled scenarios, and files."""
-    return _offered(_scenarios(), begun)
-
-
-def runs_and_scenarios(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
-    """The names of runs and of bundled scenarios, and files."""
-    return _offered([*_scenarios(), *_runs()], begun)
-
-
-def _offered(names: Iterable[str], begun: str) -> list[CompletionItem]:
-    """Names beside files of this folder; if none of them fits, the shell looks for a path by itself."""
-    known = {*names, *(_files() if begun else ())}
-    found = sorted(name for name in known if name.startswith(begun))
-    return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
+Complete = Callable[[click.Context, click.Parameter | None, str], list[CompletionItem]]
 
 
 def _files() -> list[str]:
@@ -50,4 +29,18 @@ def _runs() -> list[str]:
 def _scenarios() -> list[str]:
     from ddenv.world.load import bundled_names
 
-    return list(bundled_names())
+    return bundled_names()
+
+
+def _offering(*sources: Callable[[], list[str]]) -> Complete:
+    """Offers names beside files of this folder; if none of them fits, the shell looks for a path by itself."""
+
+    def complete(context: click.Context, parameter: click.Parameter | None, begun: str) -> list[CompletionItem]:
+        known = {name for source in sources for name in source()}.union(_files() if begun else ())
+        found = sorted(name for name in known if name.startswith(begun))
+        return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
+
+    return complete
+
+
+runs, scenarios, runs_and_scenarios = _offering(_runs), _offering(_scenarios), _offering(_scenarios, _runs)

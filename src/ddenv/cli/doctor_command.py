@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from itertools import groupby
@@ -14,7 +12,7 @@ import click
 
 from ddenv.cli.completing import runs
 from ddenv.cli.options import json_option
-from ddenv.cli.wrapping import wrapped
+from ddenv.cli.wrapping import terminal_columns, wrapped
 from ddenv.doctor.finding import Finding, is_well
 from ddenv.errors import UserError, printable
 
@@ -35,7 +33,7 @@ def doctor_command(run: str | None, repair: Path | None, as_json: bool) -> int:
     if run is None and repair is not None:
         raise UserError("--repair: needs a run: ddenv doctor RUN --repair COPY")
     found = list(_found(run, repair))
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_columns()
     if as_json:
         print(json.dumps({"well": is_well(found), "findings": [asdict(finding) for finding in found]}))
     else:

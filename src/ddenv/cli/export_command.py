@@ -87,9 +87,11 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
     from ddenv.cli.trusting import allow_run
     from ddenv.engine.mcap_file import write_mcap
     from ddenv.robot.drake_installed import check_drake
+    from ddenv.runfile.store import RunFile
 
     check_drake()
-    allow_run(run, trust)
+    with RunFile(run) as opened:
+        allow_run(opened, trust)
     with announced(f"making runs of {run.stem} again ...") as say:
         lines = write_mcap(run, file, lambda name, seconds: say(f"/{name}: {seconds:.1f} s made again"))
     print("\n".join([f"wrote {file}", *(f"  {line}" for line in lines)]))

@@ -51,7 +51,7 @@ def follow_to_summary(path: Path, engine: subprocess.Popen[bytes], as_json: bool
 def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState:
     """Prints what happens until the engine ends; returns the last state. Raises UserError and Interrupted."""
     signal.signal(signal.SIGTERM, _interrupt)
-    view = _Line(out) if out.isatty() else _Plain(out)
+    view = _View(out)
     with RunFile(path) as file:
         follower = Follower(file, fold(file.events()))
         before = follower.state.revision
@@ -82,40 +82,26 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _update(file: RunFile, follower: Follower, view: _Line | _Plain) -> None:
+def _update(file: RunFile, follower: Follower, view: _View) -> None:
     for event, before, after in follower.new():
         view.happened(event.kind, before, after)
     view.now(follower.state, max((live.time for live in file.live()), default=None))
 
 
-class _Plain:
-    """For logs and pipes: one line for each important event."""
+class _View:
+    """A line for each important event; on a terminal, also the latest state below them."""
 
     def __init__(self, out: TextIO) -> None:
-        self._out = out
+        self._out, self._terminal = out, out.isatty()
+        self._begin = "\r\x1b[K" if self._terminal else ""
 
     def happened(self, kind: str, before: RunState, after: RunState) -> None:
-        line = news(kind, before, after)
-        if line:
-            print(printable(line), file=self._out, flush=True)
+        if line := news(kind, before, after):
+            print(f"{self._begin}{printable(line)}", file=self._out, flush=True)
 
     def now(self, state: RunState, simulated: float | None) -> None:
-        pass
+        if self._terminal:
+            print(f"{self._begin}{printable(headline(state, simulated))}", end="", file=self._out, flush=True)
 
     def close(self) -> None:
-        pass
-
-
-class _Line(_Plain):
-    """For terminals: the same lines, and below them the latest state."""
-
-    def happened(self, kind: str, before: RunState, after: RunState) -> None:
-        line = news(kind, before, after)
-        if line:
-            print(f"\r\x1b[K{printable(line)}", file=self._out, flush=True)
-
-    def now(self, state: RunState, simulated: float | None) -> None:
-        print(f"\r\x1b[K{printable(headline(state, simulated))}", end="", file=self._out, flush=True)
-
-    def close(self) -> None:
-        print("\r\x1b[K", end="", file=self._out, flush=True)
+        print(self._begin, end="", file=self._out, flush=True)

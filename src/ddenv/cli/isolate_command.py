@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -36,19 +35,12 @@ def isolate_command(
     robot to reach its goal. It changes nothing else.
     """
     from ddenv.cli.follow import Interrupted, follow
-    from ddenv.cli.trusting import allow_run
+    from ddenv.cli.trusting import idle_run
     from ddenv.guiding.pace import Isolate
     from ddenv.guiding.situation import Situation
-    from ddenv.runfile.fold import fold
-    from ddenv.runfile.lock import engine_lock
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
     from ddenv.runs.programs import start_engine
 
-    path = find_run(run)
-    allow_run(path, trust, cluster)
-    with RunFile(path) as file, engine_lock(path):
-        state = fold(file.events())
+    path, state = idle_run(run, trust, cluster)
     if give_up:
         if state.isolating is None:
             raise UserError(f"{path}: no search for the nearest world that passes is open, so there is none to give up")
@@ -72,7 +64,7 @@ def isolate_command(
 
 def _print(path: Path, as_json: bool) -> int:
     """Prints what was found; returns the exit code."""
-    from ddenv.cli.wrapping import wrapped
+    from ddenv.cli.wrapping import terminal_columns, wrapped
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.nearest import nearest
@@ -83,7 +75,7 @@ def _print(path: Path, as_json: bool) -> int:
     if found is None:
         # The engine was stopped from elsewhere.
         raise UserError(f"{path}: {state.reason}")
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_columns()
     print(
         json.dumps({"nearest": asdict(found)}) if as_json else "\n".join(wrapped(printable(found.sentences), columns))
     )

@@ -16,9 +16,6 @@ from ddenv.errors import UserError, printable
 @click.option("--check", type=Path, metavar="FILE", help="Check a lesson of your own; prints what is wrong with it.")
 @click.option("--new", type=Path, metavar="FILE", help="Write a lesson to start from; --run is the run it shows.")
 @click.option("--run", type=str, metavar="RUN", help="The run for --new: it is copied beside the lesson.")
-@click.option(
-    "--record", type=Path, metavar="FILE", help="Add to a lesson's oracle what the algorithms do in its world."
-)
 @click.option("--race", is_flag=True, help="Two to four runs of one world side by side, test by test.")
 @click.option("--page", type=Path, metavar="FILE", help="Write the lesson's summary as one HTML page to hand out.")
 def learn_command(
@@ -28,7 +25,6 @@ def learn_command(
     check: Path | None,
     new: Path | None,
     run: str | None,
-    record: Path | None,
     race: bool,
     page: Path | None,
 ) -> int:
@@ -36,7 +32,7 @@ def learn_command(
 
     LESSON is a number, a name or a file; with a run, that run is shown step by step. 'ddenv learn' alone shows the list.
     """
-    given = {"--list": listed, "--check": check, "--new": new, "--record": record, "--race": race, "--page": page}
+    given = {"--list": listed, "--check": check, "--new": new, "--race": race, "--page": page}
     asked = [name for name, value in given.items() if value]
     if len(asked) > 1:
         raise UserError(f"{' and '.join(asked)}: give one of them")
@@ -52,8 +48,6 @@ def learn_command(
         return _check(check)
     if new is not None:
         return _new(new, run)
-    if record is not None:
-        return _record(record)
     if page is not None:
         return _page(lesson, page)
     return _open(lesson)
@@ -86,14 +80,6 @@ def _new(file: Path, run: str | None) -> int:
         raise UserError("--new: needs the run that the lesson shows, such as --run ditch-1")
     for path in write_template(file, find_run(run)):
         print(printable(f"wrote {path}"))
-    return 0
-
-
-def _record(file: Path) -> int:
-    from ddenv.cli.record_plays import record_plays
-
-    oracle, names = record_plays(file)
-    print(f"{oracle}: has what {', '.join(names)} did")
     return 0
 
 

@@ -12,8 +12,6 @@ from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.options import given_reading, reading_options
 from ddenv.errors import UserError
 
-FILES = (".yaml", ".yml", ".sdf", ".world")
-
 
 @click.command("open")
 @click.argument("run", metavar="RUN_OR_FILE", type=click.Path(), shell_complete=runs_and_scenarios)
@@ -26,23 +24,23 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     'ddenv RUN_OR_FILE' does the same.
     """
     from ddenv.runs.folder import find_run
+    from ddenv.runs.subject import named
     from ddenv.world.files.access import is_folder
 
-    path = find_run(run)
-    if path.suffix.lower() not in FILES and path.is_file():
+    kind, path = named(run) or ("run", find_run(run))
+    if kind == "run" and path.is_file():
         if any(reading.values()):
             raise UserError("options for reading worlds: a run keeps its own")
         return _follow(path, watch) if lines else _show(path, watch=watch)
     if is_folder(Path(run)):
         raise UserError(f"{run}: is a folder; expected a run, a scenario or a world")
-    file = _scenario_or_world(run)
-    if file is None and Path(run).suffix.lower() in FILES:
-        raise UserError(f"{run}: no such file")
-    if file is None:
+    if kind == "run":
         raise UserError(f"{path}: no such run file; 'ddenv runs' lists the runs")
+    if not path.is_file():
+        raise UserError(f"{run}: no such file")
     if watch or lines:
         raise UserError(f"{'--watch' if watch else '--lines'}: only for runs")
-    return _show(None, reading=given_reading(reading), file=file)
+    return _show(None, reading=given_reading(reading), file=path.absolute())
 
 
 def _show(run: Path | None, **options: Any) -> int:
@@ -60,12 +58,3 @@ def _follow(run: Path, watch: bool) -> int:
         # As quit: the engine goes on.
         return 130
     return 0
-
-
-def _scenario_or_world(name: str) -> Path | None:
-    """The file, or the file of the bundled scenario of this name."""
-    from ddenv.world.load import SCENARIOS, bundled_names
-
-    if Path(name).suffix.lower() in FILES and Path(name).is_file():
-        return Path(name).absolute()
-    return SCENARIOS / f"{name}.yaml" if name in bundled_names() else None

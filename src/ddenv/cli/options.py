@@ -1,4 +1,4 @@
-"""What several commands share: options, reading a scenario, and announcing slow steps."""
+"""What several commands share: options, and announcing slow steps."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ddenv import processor
-from ddenv.errors import UserError, printable
+from ddenv.errors import printable
 from ddenv.settings import FARTHEST, IGNORABLE, JOBS, OPTIONS, SETTINGS, Setting
 
 
@@ -60,9 +60,6 @@ def whole(least: int, most: int | None = None) -> Number:
     """Whole numbers in a range."""
     return Number(Setting(None, "", least=least, most=most, kind=int))
 
-
-if TYPE_CHECKING:
-    from ddenv.world.scenario import Scenario
 
 Command = Callable[..., Any]
 Option = Callable[[Command], Command]
@@ -141,39 +138,14 @@ reading_options = _together(
     ),
 )
 
-READING = ("model_path", "stand_in", "ignore")
-
 
 def given_reading(reading: Mapping[str, Any]) -> Mapping[str, Any]:
     """The options for reading worlds, checked before a screen opens. Raises UserError."""
     if any(reading.values()):
-        from ddenv.runs.scenarios import reading_of
+        from ddenv.runs.subject import reading_of
 
         reading_of(**reading)
     return reading
-
-
-def chosen_scenario(name: str, given: Mapping[str, Any]) -> Scenario:
-    """The scenario of a name or a file with what the options above say. Raises UserError."""
-    from ddenv.runs.scenarios import reading_of, scenario_for_world, with_options
-    from ddenv.world.load import find_scenario, load_scenario
-    from ddenv.world.read import read_world
-
-    reading = {option: given[option] for option in READING}
-    others = {option: value for option, value in given.items() if option not in READING}
-    if Path(name).suffix.lower() not in (".sdf", ".world"):
-        scenario = load_scenario(find_scenario(name))
-        return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
-    spawn, goal, world = (others.pop(option) for option in ("spawn", "goal", "world"))
-    if spawn is None or goal is None:
-        # A file that is no world needs no places either.
-        read_world(Path(name), reading_of(**reading), announce)
-        example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
-        raise UserError(f"{name}: an SDF world needs a start and a goal, such as {example}")
-    if world is not None:
-        raise UserError(f"--world: only for a scenario; {name} is a world")
-    scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
-    return with_options(scenario, reading=reading_of(**reading), **others)
 
 
 def announce(line: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from ddenv.cli.completing import runs
@@ -32,37 +30,28 @@ def resume_command(
     from ddenv.runfile.fold import fold
     from ddenv.runfile.lock import engine_lock
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.folder import find_run
+    from ddenv.runs.creation import create_like
+    from ddenv.runs.folder import find_run, run_path
     from ddenv.runs.programs import start_engine
 
     path = find_run(run)
     if mixed and again:
         raise UserError("--mixed and --again: give one of them")
-    allow_run(path, trust, cluster)
     where = {"cluster": cluster} if cluster else {}
+    with RunFile(path) as file:
+        scenario = allow_run(file, trust, cluster)
+        if not again:
+            with engine_lock(path):
+                # Going back while no engine works ends in a pause, and without a screen nobody can end it.
+                if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
+                    file.send("resume")
     if again:
-        new = _made_again(path)
+        new = run_path(scenario.name, None, path.parent)
+        create_like(path, scenario, new)
         announce(f"makes the tests of {path} again in {new}")
         return follow_to_summary(new, start_engine(new, jobs, **where), as_json)[0]
-    with RunFile(path) as file, engine_lock(path):
-        # Going back while no engine works ends in a pause, and without a screen nobody can end it.
-        if any(command.kind == "go_back" for command in file.commands(fold(file.events()).last_command)):
-            file.send("resume")
     # Without a screen there is nobody to ask.
     bits = "mixed" if mixed else "same"
     go_on = "yes" if anyway else "no"
     engine = start_engine(path, jobs, accept_mode="automatic", bits=bits, anyway=go_on, **where)
     return follow_to_summary(path, engine, as_json)[0]
-
-
-def _made_again(path: Path) -> Path:
-    """A new run beside `path`, with its world, robot and first settings."""
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.creation import create_like, read_parts
-    from ddenv.runs.folder import run_path
-
-    with RunFile(path) as file:
-        scenario = read_parts(file)[0]
-    new = run_path(scenario.name, None, path.parent)
-    create_like(path, scenario, new)
-    return new

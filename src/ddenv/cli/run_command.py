@@ -11,7 +11,6 @@ import click
 from ddenv.cli.completing import scenarios
 from ddenv.cli.options import (
     announce,
-    chosen_scenario,
     jobs_option,
     json_option,
     reading_options,
@@ -48,9 +47,10 @@ def run_command(
     from ddenv.runs.export import export_world
     from ddenv.runs.folder import run_path
     from ddenv.runs.programs import start_engine
+    from ddenv.runs.subject import scenario_named
     from ddenv.runs.trust import trust_cluster
 
-    chosen = chosen_scenario(scenario, options)
+    chosen = scenario_named(scenario, options, announce)
     if options["cluster"]:
         trust_cluster(chosen)
     allow_named(chosen, scenario, trust)

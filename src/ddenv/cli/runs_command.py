@@ -46,7 +46,7 @@ def _line(path: Path) -> str:
     status = state.status
     if not state.ended and status != "created" and not engine_is_alive(path):
         status = "engine not running"
-    elif status == "finished":
-        status = "minimal" if state.minimal else "finished"
+    elif status == "finished" and state.minimal:
+        status = "minimal"
     size = f"{len(state.environment)} of {len(state.elements)} models"
     return f"{status:<18}  {size:<20}  {state.tests_done} tests"

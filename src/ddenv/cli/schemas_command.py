@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import shutil
-import sys
 from typing import TYPE_CHECKING
 
 import click
 
-from ddenv.cli.wrapping import wrapped
+from ddenv.cli.wrapping import terminal_columns, wrapped
 from ddenv.errors import printable
 
 if TYPE_CHECKING:
@@ -51,6 +49,6 @@ def _paragraph(name: str, words: str, columns: int | None) -> list[str]:
 @click.option("--json", "as_json", is_flag=True, help="Print one object with everything.")
 def schemas_command(as_json: bool) -> int:
     """Lists the partitionings, prioritizations and algorithms, each with its explanation."""
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_columns()
     print(json.dumps(report()) if as_json else "\n".join(lines(columns)))
     return 0

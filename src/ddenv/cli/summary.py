@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count, first_of, percent
-from ddenv.claims import (
+from ddenv.errors import printable
+from ddenv.evidence.claims import (
     current,
     drift,
     is_minimal,
@@ -21,13 +22,12 @@ from ddenv.claims import (
     smaller_known,
     verdict_on,
 )
-from ddenv.errors import printable
-from ddenv.rates import wilson_interval
-from ddenv.runfile.progress import Claim
-from ddenv.runfile.state import BROKEN, Node, RunState
+from ddenv.evidence.rates import wilson_interval
+from ddenv.evidence.took_part import simulated
+from ddenv.runfile.progress import Claim, Node
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.folder import find_run
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.took_part import simulated
 
 # The maximum number of names in a line, and of models with a line each.
 MOST_NAMES = 12

@@ -13,7 +13,6 @@ import click
 from ddenv.cli.completing import runs_and_scenarios
 from ddenv.cli.options import (
     announce,
-    chosen_scenario,
     jobs_option,
     reading_options,
     scenario_options,
@@ -21,10 +20,9 @@ from ddenv.cli.options import (
     trust_option,
     whole,
 )
-from ddenv.errors import UserError
 
 if TYPE_CHECKING:
-    from ddenv.engine.single_test import Subject
+    from ddenv.runs.subject import Subject
 
 
 @click.command("test")
@@ -93,8 +91,8 @@ def test_command(
 
 def _elsewhere(what: Subject, results: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """What the runs show of another simulator; [] without a certificate that it can be compared with."""
-    from ddenv.claims import current
     from ddenv.cli.test_summary import elsewhere
+    from ddenv.evidence.claims import current
 
     certificate, oracle = None if what.state is None else current(what.state), what.scenario.oracle
     if certificate is None or oracle is None or not certificate.claims[0].low:
@@ -103,39 +101,21 @@ def _elsewhere(what: Subject, results: list[dict[str, Any]]) -> list[dict[str, A
 
 
 def _subject(name: str, options: Mapping[str, Any], simulator: Path | None, trust: bool, robots: ExitStack) -> Subject:
-    """A run if there is one of that name, else a scenario; in another simulator, if one is given.
-
-    `robots` keeps the file of a robot that only the run file has.
-    """
+    """What `name` stands for; in another simulator, if one is given. `robots` keeps the file of a robot that only a run has."""
     from ddenv.cli.trusting import allow, allow_named
-    from ddenv.engine.single_test import Subject, in_simulator, subject_of_run
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.creation import robot_file
-    from ddenv.runs.folder import find_run
-    from ddenv.runs.scenarios import load_parts
+    from ddenv.engine.single_test import in_simulator
+    from ddenv.runs.subject import open_subject, robot_file
     from ddenv.world.load import load_simulator
 
-    path, another = find_run(name), None if simulator is None else load_simulator(simulator)
-    if (path.is_file() and path.suffix not in (".yaml", ".yml", ".sdf", ".world")) or name.endswith(".ddenv"):
-        if any(value is not None and value != () for value in options.values()):
-            raise UserError(
-                "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore are only for scenarios; "
-                "a run keeps its own"
-            )
-        with RunFile(path) as file:
-            found = subject_of_run(file)
-            model = (
-                found.scenario.robot.model
-                if another is None
-                else robots.enter_context(robot_file(file, found.scenario))
-            )
-        # Another simulator may start the scenario's own controller.
-        allow(found.scenario if another is None else found.scenario.model_copy(update={"oracle": None}), path, trust)
+    another = None if simulator is None else load_simulator(simulator)
+    found = open_subject(name, options, announce)
+    # Another simulator may start the scenario's own controller.
+    starts = found.scenario if another is None else found.scenario.model_copy(update={"oracle": None})
+    if found.run is None:
+        allow_named(starts, name, trust)
     else:
-        scenario = chosen_scenario(name, options)
-        allow_named(scenario, name, trust)
-        found, model = Subject(scenario, *load_parts(scenario, announce)), scenario.robot.model
+        allow(starts, found.run, trust)
     if another is not None:
-        found = in_simulator(found, another, model)
+        found = in_simulator(found, another, robots.enter_context(robot_file(found)))
         allow_named(found.scenario, str(simulator), trust)
     return found

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from ddenv.amounts import count, percent
-from ddenv.claims import in_another_simulator
 from ddenv.errors import printable
-from ddenv.rates import shows_at, wilson_interval
+from ddenv.evidence.claims import in_another_simulator
+from ddenv.evidence.rates import shows_at, wilson_interval
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 

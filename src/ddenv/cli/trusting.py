@@ -11,18 +11,18 @@ import click
 from ddenv.errors import printable
 
 if TYPE_CHECKING:
+    from ddenv.runfile.state import RunState
+    from ddenv.runfile.store import RunFile
     from ddenv.world.scenario import Scenario
 
 
 def allow(scenario: Scenario, where: Path | str, trust: bool) -> None:
     """Returns if what `scenario` starts is trusted; asks on a terminal, unless `trust` says yes. Raises UserError if it is not."""
-    from ddenv.runs.trust import check_trusted, is_trusted, program_of
+    from ddenv.runs.trust import check_trusted, untrusted
     from ddenv.runs.trust import trust as remember
 
-    program = program_of(scenario)
-    if program is None or is_trusted(program):
-        return
-    if trust or _says_yes(f"{where} starts {program.words}. Do you trust it?"):
+    program = untrusted(scenario)
+    if program and (trust or _says_yes(f"{where} starts {program.words}. Do you trust it?")):
         remember(program)
     check_trusted(scenario, where)
 
@@ -40,13 +40,29 @@ def allow_named(scenario: Scenario, name: str, trust: bool) -> None:
     allow(scenario, name, trust)
 
 
-def allow_run(path: Path, trust: bool, cluster: str | None = None) -> None:
-    """As `allow`, for a run file; the user has typed another `cluster`, if any. Raises UserError for a damaged one, too."""
-    from ddenv.runfile.store import RunFile
-    from ddenv.runs.clusters import check_cluster, made_here
-    from ddenv.runs.creation import read_scenario
+def allow_run(file: RunFile, trust: bool, cluster: str | None = None) -> Scenario:
+    """As `allow`, for a run, whose scenario it returns; the user has typed another `cluster`, if any.
 
-    with RunFile(path) as file:
-        scenario = read_scenario(file)
+    Raises UserError for a damaged file, too.
+    """
+    from ddenv.runs.clusters import check_cluster, made_here
+    from ddenv.runs.subject import read_scenario
+
+    scenario = read_scenario(file)
     check_cluster(cluster or scenario.reduction.cluster)
-    allow(made_here(scenario) if cluster else scenario, path, trust)
+    allow(made_here(scenario) if cluster else scenario, file.path, trust)
+    return scenario
+
+
+def idle_run(run: str, trust: bool, cluster: str | None) -> tuple[Path, RunState]:
+    """The file and the state of a run that no engine works on, and that may start what it brings along. Raises UserError."""
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.lock import engine_lock
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+
+    path = find_run(run)
+    with RunFile(path) as file:
+        allow_run(file, trust, cluster)
+        with engine_lock(path):
+            return path, fold(file.events())

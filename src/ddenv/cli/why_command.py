@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import sys
 from dataclasses import asdict
 
 import click
@@ -22,9 +20,9 @@ def why_command(run: str, as_json: bool) -> int:
     The fresh runs of the certificate show it; no new test is made. After 'ddenv isolate RUN' it also says what the nearest world
     that passes lacks.
     """
-    from ddenv.claims import current
-    from ddenv.cli.wrapping import wrapped
+    from ddenv.cli.wrapping import terminal_columns, wrapped
     from ddenv.errors import printable
+    from ddenv.evidence.claims import current
     from ddenv.runfile.fold import fold
     from ddenv.runfile.store import RunFile
     from ddenv.runs.folder import find_run
@@ -39,7 +37,7 @@ def why_command(run: str, as_json: bool) -> int:
         said = [asdict(each) | {"words": sentence(each)} for each in found]
         print(json.dumps({"reasons": said, "nearest": None if passing is None else asdict(passing)}))
         return 0
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_columns()
     for each in found:
         words = printable(f"{sentence(each)} {parting_sentence(each)}".rstrip())
         print("\n".join(wrapped(words, columns, "- ")))

@@ -12,12 +12,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ddenv.cli.completing import scenarios
-from ddenv.cli.options import Numbers, announce, reading_options
+from ddenv.cli.options import Numbers, announce, announced, reading_options
 from ddenv.errors import UserError, printable
 
 if TYPE_CHECKING:
+    from ddenv.runfile.state import RunState
     from ddenv.world.model import World
     from ddenv.world.scenario import Reading
+
+
+# A line names so many models.
+MOST_NAMES = 5
 
 
 @click.group("world")
@@ -32,10 +37,10 @@ def world_group() -> None:
 def check(file: Path, as_json: bool, **reading: Any) -> int:
     """Shows how FILE is read: each model, what was replaced or ignored, and why."""
     from ddenv.cli.world_check import lines, report
+    from ddenv.cli.wrapping import terminal_columns
 
     world = _read(file, reading)
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    print(json.dumps(report(world)) if as_json else "\n".join(lines(world, columns)))
+    print(json.dumps(report(world)) if as_json else "\n".join(lines(world, terminal_columns())))
     return 0
 
 
@@ -57,20 +62,15 @@ def show(
     **reading: Any,
 ) -> int:
     """Draws the map of FILE, from above."""
-    from ddenv.cli.world_show import terminal_map
     from ddenv.map.svg import svg_map
     from ddenv.world.files.access import write_file
 
-    columns, rows = shutil.get_terminal_size((100, 36))
-    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
     if took_part or passes:
-        from ddenv.cli.world_took_part import passing_map, took_part_map
-        from ddenv.runs.folder import find_run
-
-        option, drawn = ("--took-part", took_part_map) if took_part else ("--passes", passing_map)
+        option, drawn = ("--took-part", _took_part) if took_part else ("--passes", _passing)
         if spawn is not None or goal is not None or svg is not None or (took_part and passes):
             raise UserError(f"{option}: --spawn, --goal, --svg and other views of a run do not go with it")
-        print(drawn(find_run(str(file)), columns, rows - 1, color=color))
+        world, dim, below = drawn(str(file))
+        print("\n".join([_map(world, dim=dim), *below]))
         return 0
     world = _read(file, reading)
     start = None if spawn is None else (spawn[0], spawn[1], spawn[2] if len(spawn) > 2 else 0.0)
@@ -78,8 +78,58 @@ def show(
         write_file(svg, svg_map(world, spawn=start, goal=goal).encode())
         print(printable(f"wrote {svg}"))
         return 0
-    print(terminal_map(world, columns, rows - 1, color=color, spawn=start, goal=goal))
+    print(_map(world, spawn=start, goal=goal))
     return 0
+
+
+def _map(world: World, **marks: Any) -> str:
+    from ddenv.cli.world_show import terminal_map
+
+    columns, rows = shutil.get_terminal_size((100, 36))
+    color = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    return terminal_map(world, columns, rows - 1, color=color, **marks)
+
+
+def _took_part(run: str) -> tuple[World, frozenset[str], list[str]]:
+    """The world of a run, what did not take part in its runs of the whole world, and lines: what did, the most frequent first.
+
+    Raises UserError where that is unknown.
+    """
+    from ddenv.amounts import count
+    from ddenv.evidence.took_part import in_whole_world
+
+    path, world, state = _of_run(run)
+    times, baseline = in_whole_world(state), state.baseline
+    if not times or baseline is None:
+        raise UserError(f"{path}: it is not recorded what took part in its runs of the whole world; make a new run")
+    head = f"{count(len(times), 'model')} of {len(state.elements)} took part in the runs of the whole world:"
+    lines = [f"  {printable(name)}: {number} of {count(baseline.runs, 'run')}" for name, number in times.most_common()]
+    return world, frozenset(model.name for model in world.models) - times.keys(), [head, *lines]
+
+
+def _passing(run: str) -> tuple[World, frozenset[str], list[str]]:
+    """The world of a run, what has to go so that it passes, and the same in lines.
+
+    Raises UserError where no world that passes is known.
+    """
+    from ddenv.amounts import count
+    from ddenv.runs.nearest import removed_in_passing
+
+    path, world, state = _of_run(run)
+    gone = removed_in_passing(state, path)
+    head = f"the nearest world that passes lacks {count(len(gone), 'model')} of {len(state.elements)}:"
+    return world, frozenset(gone), [head, *(f"  {printable(name)}" for name in gone)]
+
+
+def _of_run(name: str) -> tuple[Path, World, RunState]:
+    from ddenv.runfile.fold import fold
+    from ddenv.runfile.store import RunFile
+    from ddenv.runs.folder import find_run
+    from ddenv.runs.subject import read_parts
+
+    path = find_run(name)
+    with RunFile(path) as run:
+        return path, read_parts(run)[1], fold(run.events())
 
 
 @world_group.command()
@@ -103,10 +153,47 @@ def convert(file: Path, output: Path, **reading: Any) -> int:
 @click.option("-o", "--output", type=Path, required=True, help="The SDF file to write.")
 def settle(file: Path, output: Path, **reading: Any) -> int:
     """Lets the models of FILE come to rest, and writes it with their new poses; nothing else changes."""
-    from ddenv.cli.world_settle import settle_world
-
-    print("\n".join(map(printable, settle_world(*_read_as(file, reading), output))))
+    world, read_as = _read_as(file, reading)
+    print("\n".join(map(printable, _settle(world, read_as, output))))
     return 0
+
+
+def _settle(world: World, reading: Reading, output: Path) -> list[str]:
+    """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
+    from ddenv.robot.drake_installed import check_drake
+
+    check_drake()
+    from ddenv.robot.drake.template import Variants
+    from ddenv.robot.settled import moved, notes_on
+    from ddenv.runs.subject import scenario_for_world
+    from ddenv.words import count, first_of
+    from ddenv.world.files.access import write_file
+    from ddenv.world.inside import note_inside
+    from ddenv.world.moved import with_places
+    from ddenv.world.read import read_model
+
+    if output.resolve() == world.path.resolve():
+        raise UserError(f"{output}: is the world itself; choose another file")
+    able = sum(bool(model.links) and not model.static for model in world.models)
+    # Drake's plant needs a robot; piles settle as if there were none.
+    scenario = scenario_for_world(world.path, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+    with announced(f"settling {count(able, 'model')} that can move"):
+        settled = Variants(world, read_model(scenario.robot.model), scenario).settled()
+    for about, words in (*note_inside(world), *notes_on(world, settled)):
+        if about != "unrest":
+            announce(words)
+    places = {name: links for name, links in settled.places.items() if name not in settled.fallen}
+    text, stay = with_places(world, places, reading)
+    write_file(output, text)
+    ways = {name: way for name, way in moved(world, settled).items() if name not in stay and way > 0}
+    farthest = max(ways, key=lambda name: ways[name], default="")
+    far = f", {farthest} farthest, by {ways[farthest]:.3f} m" if farthest else ""
+    lines = [f"wrote {output}: {count(len(ways), 'model')} moved within {settled.seconds:.1f} s{far}"]
+    if stay:
+        lines.append(
+            f"not moved: {first_of(stay, MOST_NAMES)}: their parts move, or others are placed relative to them"
+        )
+    return lines
 
 
 def _read(file: Path, reading: dict[str, Any]) -> World:
@@ -116,13 +203,13 @@ def _read(file: Path, reading: dict[str, Any]) -> World:
 
 def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     """The same, and how it was read."""
-    from ddenv.runs.scenarios import reading_of
-    from ddenv.world.load import bundled_names, find_scenario, load_scenario
+    from ddenv.runs.subject import named_file, reading_of
+    from ddenv.world.load import load_scenario
     from ddenv.world.read import read_world
+    from ddenv.world.scenario import PLAIN
 
-    if file.suffix.lower() in (".yaml", ".yml") or (str(file) in bundled_names() and not file.exists()):
-        scenario = load_scenario(find_scenario(str(file)))
-        file, read_as = scenario.world, reading_of(scenario.reading, **reading)
-    else:
-        read_as = reading_of(**reading)
+    kind, path = named_file(str(file)) or ("world", file)
+    scenario = load_scenario(path) if kind == "scenario" else None
+    file, own = (path, PLAIN) if scenario is None else (scenario.world, scenario.reading)
+    read_as = reading_of(own, **reading)
     return read_world(file, read_as, announce), read_as

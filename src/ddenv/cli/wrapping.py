@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Iterator
 
 from ddenv.text import width
 
 # The minimum width for readable text, columns.
 LEAST = 8
+
+
+def terminal_columns() -> int | None:
+    """How wide the terminal is, columns; None where the output goes elsewhere."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def wrapped(text: str, columns: int | None, first: str = "") -> list[str]:

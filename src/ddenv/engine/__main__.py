@@ -11,26 +11,35 @@ import signal
 import sys
 import threading
 from pathlib import Path
+from typing import Literal
 
 from ddenv import processor
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.crash_loop import check_crash_loop
+from ddenv.engine.disk_space import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pool
 from ddenv.engine.repeating import check_repeats
-from ddenv.engine.room import Room
 from ddenv.engine.settle import note_start
 from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
 from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
+from ddenv.runfile.events import (
+    AcceptModeChanged,
+    Cluster,
+    EngineFailed,
+    EngineStarted,
+    EngineStopped,
+    IsolationGivenUp,
+)
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
 from ddenv.runs.clusters import HERE, check_cluster, made_here
-from ddenv.runs.creation import read_parts
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
+from ddenv.runs.subject import read_parts
 from ddenv.runs.trust import check_trusted
 from ddenv.version import __version__
 from ddenv.world.model import Model, World
@@ -84,8 +93,8 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     check_trusted(made_here(scenario) if options.cluster else scenario, file.path)
     check_cluster(cluster)
     after = file.last_command() if options.after is None else options.after
-    room = Room(file, terminated)
-    file.own(room.wait)
+    disk = DiskSpace(file, terminated)
+    file.own(disk.wait)
     journal = Journal(file)
     new = (
         options.certify
@@ -100,7 +109,7 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
     before = journal.state.reason
     try:
         _begin(journal, jobs if cluster == HERE else 0, options.accept_mode)
-        control = Control(journal, terminated, after, room)
+        control = Control(journal, terminated, after, disk)
         workers = _workers(scenario, world, robot, jobs, cluster, journal)
         pool = workers
         if options.share is not None:
@@ -120,17 +129,15 @@ def _work(file: RunFile, options: argparse.Namespace, terminated: threading.Even
             pool.close()
     except Stopped as stop:
         journal.lose_running()
-        journal.record("engine_stopped", reason=str(stop))
+        journal.record(EngineStopped(str(stop)))
         return 1
     except UserError as error:
         journal.lose_running()
-        journal.record("engine_failed", reason=str(error))
+        journal.record(EngineFailed(str(error)))
         raise
     except Exception as error:
         # A bug in ddenv: the traceback goes to the log, and views show the reason.
-        journal.record(
-            "engine_failed", reason=f"unexpected {type(error).__name__}: {error} (see the log beside the run)"
-        )
+        journal.record(EngineFailed(f"unexpected {type(error).__name__}: {error} (see the log beside the run)"))
         raise
     finally:
         file.set_live([])
@@ -143,7 +150,7 @@ def _give_up(file: RunFile) -> int:
     file.own()
     journal = Journal(file)
     if journal.state.isolating is not None:
-        journal.record("isolation_given_up")
+        journal.record(IsolationGivenUp())
     return 0
 
 
@@ -154,18 +161,17 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
     def tell(tests: int, words: str) -> None:
-        journal.record("cluster", jobs=tests, words=words)
+        journal.record(Cluster(tests, words))
 
     return ClusterPool(scenario, world, robot, cluster, tell)
 
 
-def _begin(journal: Journal, jobs: int, accept_mode: str | None) -> None:
+def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:
     # This event comes first: all events before it are another engine's.
-    made_with = {"version": __version__, "simulator": simulator(), "machine": machine()}
-    journal.record("engine_started", None, pid=os.getpid(), jobs=jobs, **made_with)
+    journal.record(EngineStarted(os.getpid(), jobs, __version__, simulator(), machine()))
     journal.lose_running()
     if accept_mode and accept_mode != journal.state.accept_mode:
-        journal.record("accept_mode", mode=accept_mode)
+        journal.record(AcceptModeChanged(accept_mode))
 
 
 if __name__ == "__main__":

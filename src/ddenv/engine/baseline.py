@@ -4,44 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from ddenv.engine.bench import Bench, Wanted
-from ddenv.engine.journal import Journal
-from ddenv.engine.judging import end_of, rows_of
-from ddenv.rates import iterations_needed, miss_chance, wilson_interval
-from ddenv.reduction.acceptance import FEWEST_SHOWN, LONGEST_BASELINE
+from ddenv.amounts import count
+from ddenv.engine.judging import end_of
+from ddenv.evidence.rates import iterations_needed, miss_chance, wilson_interval
 from ddenv.robot.oracle import Failure, is_similar, judge_trajectory
+from ddenv.runfile.events import BaselineFinished, Outcomes, Seen
 from ddenv.runfile.failures import SeenFailure, grouped
 from ddenv.runfile.state import BROKEN, Test
-from ddenv.words import count
-from ddenv.world.scenario import FailureSpec, Reduction
-
-
-def run_baseline(journal: Journal, bench: Bench, asked: Reduction, spec: FailureSpec) -> dict[str, Any] | str:
-    """Runs the whole world; returns what `fix_failure` finds. Raises as `Bench.work`.
-
-    Where the rate is kept and f is rare, it goes on, one run at a time, so that the number of workers changes nothing.
-    """
-    everything = frozenset(journal.state.elements)
-
-    def found_in(runs: int) -> dict[str, Any] | str:
-        def wanted() -> Wanted:
-            return [(everything, run, None) for run in range(runs) if (everything, run, False) not in journal.ledger]
-
-        bench.work("baseline", None, wanted)
-        tests = [journal.state.tests[journal.ledger[everything, run, False] - 1] for run in range(runs)]
-        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
-        return fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
-
-    runs = asked.baseline_runs
-    found = found_in(runs)
-    while asked.accept_rate == "kept" and not isinstance(found, str) and goes_on(found, runs):
-        runs += 1
-        found = found_in(runs)
-    return found
+from ddenv.world.scenario import FailureSpec
 
 
 def fix_failure(
@@ -50,8 +23,8 @@ def fix_failure(
     spec: FailureSpec,
     iterations: int,
     wanted: int = 1,
-) -> dict[str, Any] | str:
-    """The data of the `baseline_finished` event. `tests` are in the order of runs, `trajectories` those of the failing ones, by id.
+) -> BaselineFinished | str:
+    """The event that ends the baseline. `tests` are in the order of runs, `trajectories` those of the failing ones, by id.
 
     f is the failure number `wanted`, by how many runs show each; its end is that of the run which shares its failure with most
     others. If no run failed, or if there is no such number, returns a line that tells the user so. The rate counts f only, not
@@ -78,26 +51,23 @@ def fix_failure(
     similar = sum(judgement.outcome == "similar" for judgement in judged.values())
     rate = similar / len(sound)
     low, high = wilson_interval(similar, len(sound))
-    return {
-        "runs": len(sound),
-        "broken": len(tests) - len(sound),
-        "failures": similar,
-        "rate": rate,
-        "low": low,
-        "high": high,
-        "failure_test": failing[f].id,
-        "position": failures[f].position,
-        "miss_chance": miss_chance(rate, iterations),
-        "iterations_95": iterations_needed(rate),
-        "seen": [{"test": one.test, "runs": one.runs, "kinds": one.kinds, "position": one.position} for one in seen],
-        "outcomes": {str(id): judgement.outcome for id, judgement in judged.items()},
-        "distances": {str(id): judgement.distance for id, judgement in judged.items()},
-    }
-
-
-def goes_on(found: Mapping[str, Any], runs: int) -> bool:
-    """Whether a baseline that keeps the rate needs another run after so many `runs`: f is rare in what it `found`."""
-    return bool(found["failures"] < FEWEST_SHOWN and runs < LONGEST_BASELINE)
+    return BaselineFinished(
+        runs=len(sound),
+        broken=len(tests) - len(sound),
+        failures=similar,
+        rate=rate,
+        low=low,
+        high=high,
+        failure_test=failing[f].id,
+        position=failures[f].position,
+        miss_chance=miss_chance(rate, iterations),
+        iterations_95=iterations_needed(rate),
+        seen=tuple(Seen(failure.test, failure.runs, failure.kinds, failure.position) for failure in seen),
+        judged=Outcomes(
+            {id: judgement.outcome for id, judgement in judged.items()},
+            {id: judgement.distance for id, judgement in judged.items()},
+        ),
+    )
 
 
 def _seen(group: Sequence[Test]) -> SeenFailure:

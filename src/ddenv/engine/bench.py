@@ -1,4 +1,4 @@
-"""Makes the tests: the next one on a free worker, later ones ahead of time on the others. Records all of them.
+"""Makes the tests that are wanted, the first on a free worker, later ones on the others, and records all of them.
 
 Tries of the user come first.
 """
@@ -7,58 +7,32 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ddenv.amounts import count
-from ddenv.engine.auditing import audit_is_due, compare
+from ddenv.engine.background import Background
 from ddenv.engine.control import Control, Steered, Stopped
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
+from ddenv.engine.limits import wall_limit
 from ddenv.engine.noting import give_up_if_late, note_slow
 from ddenv.engine.pool import Broken
-from ddenv.engine.subjects import Asked, Keep
-from ddenv.engine.thinking import Thinking
-from ddenv.engine.wall_limit import wall_limit
+from ddenv.engine.slicing import audit_is_due, compare
 from ddenv.engine.worker import Start
 from ddenv.engine.workers import Workers
+from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.reduction.verdict import standing
+from ddenv.reduction.procedure import Test
+from ddenv.reduction.verdict import Acceptance, decided_by, standing
 from ddenv.robot.oracle import Failure
 from ddenv.robot.result import RunResult
-from ddenv.runfile.state import AHEAD, BROKEN, ISOLATE, Trial
+from ddenv.runfile.events import Implied, TestFinished, TestStarted, TrialJudged
+from ddenv.runfile.state import BROKEN, ISOLATE, Trial
 from ddenv.runfile.store import ROBOT, Motions
 from ddenv.world.scenario import FailureSpec
-
-Hand = tuple[Keep, int, int]
-
-
-def open_trials(journal: Journal) -> list[Trial]:
-    """The tries without a verdict, oldest first."""
-    return [trial for trial in journal.state.trials if not trial.verdict]
-
-
-def judge_trials(journal: Journal) -> list[Hand]:
-    """Writes the verdicts that are due; returns the tests still needed as (models, run, trial), oldest first."""
-    wanted: list[Hand] = []
-    for trial in open_trials(journal):
-        keep = frozenset(trial.models)
-        now = standing([keep], journal.shown, journal.rule)
-        if now.verdicts[0]:
-            _judge(journal, trial, keep, now.verdicts[0])
-        else:
-            wanted += [(keep, run, trial.number) for _, run in now.wanted]
-    return wanted
-
-
-def _judge(journal: Journal, trial: Trial, keep: Keep, verdict: str) -> None:
-    tests = journal.tests_of(keep, journal.rule)
-    known = sum(journal.state.tests[test - 1].trial != trial.number for test in tests)
-    journal.record("trial_judged", trial=trial.number, verdict=verdict, tests=tests, known=known)
-
 
 # How long to wait for a test before looking at commands again, and between two looks at the running robots, s.
 WAIT = 0.05
@@ -69,13 +43,9 @@ PATIENCE = 1.0
 # break, and the reduction would read that as "no f". In worlds that break only some tests, others end.
 MOST_BROKEN = 25
 
-Wanted = list[tuple[Keep, int, int | None]]
-# So many tests that are likely to be wanted and not started yet, the likeliest first.
-Likely = Callable[[int, Callable[[Asked], bool]], list[Asked]]
-
 
 class Bench:
-    """Makes tests with `pool`, as `control` allows, and records them in `journal`.
+    """Makes tests with `pool`, as `control` allows, and records them in `journal`. `rule` judges tries of the user.
 
     Before f is fixed, a run that failed is recorded as "failed".
     """
@@ -84,93 +54,89 @@ class Bench:
         self._failures: tuple[Failure, ...] = ()
         self._failed: tuple[int, ...] = ()
         self._journal = journal
-        self._numbers = {name: number for number, name in enumerate(journal.state.elements)}
         self._pool = pool
         self._control = control
-        self._started: set[tuple[Keep, int, bool]] = set()
+        self._started: set[tuple[Environment, int, bool]] = set()
         self._next_live = 0.0
         self._live_shown = False
         self._broken = 0
-        self._thinking = Thinking()
-        # Whether no test ended at the last look: where tests end at once, nobody waits for thoughts.
+        self.background = Background()
+        self.rule = Acceptance(1)
+        # Whether no test ended at the last look: where tests end at once, nobody waits for what may wait.
         self._quiet = False
 
-    def work(
-        self,
-        phase: str,
-        round: int | None,
-        wanted: Callable[[], Wanted],
-        meanwhile: Iterator[object] | None = None,
-        likely: Likely | None = None,
-    ) -> None:
-        """Makes tests until none is wanted. While tests run, advances `meanwhile` (`Thinking`).
+    def work(self, tests: Sequence[Test]) -> None:
+        """Starts as many of the wanted tests as workers are free, the first ones first, and looks around once.
 
-        `wanted()` lists the tests still needed as (models, run, candidate), in the order in which one worker would make
-        them; it is called again after every look. Several workers take what is `likely` to be wanted, the likeliest first, if that
-        is given. Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
+        Raises Stopped, Steered, and UserError if nothing can be simulated or all tests break.
         """
-        self._thinking.begin(meanwhile)
-        while tests := wanted():
-            if self._start(self._next(phase, round, tests, likely)):
-                # Other tests may be wanted now.
-                self._look(0.0)
-            else:
-                self.tick()
+        if self._start(tests):
+            # Other tests may be wanted now.
+            self._look(0.0)
+        else:
+            self.tick()
 
-    def _next(self, phase: str, round: int | None, tests: Wanted, likely: Likely | None) -> list[Asked]:
-        """The tests to start now, as many as workers are free. A step is one test, the next in order; nothing runs ahead."""
-        speculates = self._control.speculates()
-        free = self._pool.idle if speculates else int(self._pool.busy == 0)
-        if not free or not self._control.may_start():
-            return []
-        asked = (Asked(phase, keep, run, round, candidate) for keep, run, candidate in tests)
-        if likely is None or not speculates or self._journal.state.jobs <= 1:
-            return list(islice((one for one in asked if not self._is_started(one)), free))
-        first = next(asked)
-        if self._is_started(first):
-            return likely(free, self._is_started)
-        # Without it nothing goes on, and whoever looks ahead may not have come to it.
-        this = first.keep, first.run
-        others = likely(free - 1, lambda one: (one.keep, one.run) == this or self._is_started(one)) if free > 1 else []
-        return [first, *others]
-
-    def _is_started(self, asked: Asked) -> bool:
-        return (asked.keep, asked.run, self._journal.is_full(asked.phase)) in self._started
-
-    def _start(self, tests: list[Asked]) -> bool:
+    def _start(self, tests: Sequence[Test]) -> bool:
         """Starts tests on free workers. Returns whether one was implied, and so needs none."""
-        for asked in tests:
-            if not self._control.may_start():
-                return False
-            implied = self._make(asked)
+        # A step is one test, the next in order; nothing runs ahead.
+        free = self._pool.idle if self._control.speculates() else int(self._pool.busy == 0)
+        for test in tests if free and self._control.may_start() else ():
+            if self._key(test) in self._started:
+                continue
+            implied = self._make(test)
             if implied is None:
                 return False
             self._control.started()
             if implied:
                 return True
+            free -= 1
+            if not free or not self._control.may_start():
+                return False
         return False
 
-    def _make(self, asked: Asked) -> bool | None:
+    def _key(self, test: Test) -> tuple[Environment, int, bool]:
+        return test.environment, test.run, self._journal.is_full(test.why)
+
+    def _make(self, wanted: Test, trial: int | None = None) -> bool | None:
         """Starts a test, or writes its result if another one implies it; returns whether that is so, None if none may start.
 
         Raises Stopped if it is used up and no test runs.
         """
-        journal, full = self._journal, self._journal.is_full(asked.phase)
-        source = journal.implying(asked.keep, asked.run, full)
-        if source is not None and asked.phase != "audit" and not audit_is_due(journal.state, asked.phase):
-            journal.imply(asked, source)
-            return True
+        journal, full = self._journal, self._journal.is_full(wanted.why)
+        source = journal.implying(wanted.environment, wanted.run, full)
+        implied = source is not None and wanted.why != "audit" and not audit_is_due(journal.state, wanted.why)
         # The budget is that of the reduction, which is over.
-        if (asked.phase != ISOLATE and self._is_spent()) or not self._control.has_room():
+        if not implied and ((wanted.why != ISOLATE and self._is_spent()) or not self._control.has_disk_space()):
             return None
-        test = journal.start_test(asked, source)
-        self._started.add((asked.keep, asked.run, full))
+        environment, state = journal.number(wanted.environment), journal.state
+        # All candidates meet the same noise.
+        seed, number = state.scenario["reduction"]["seed"] + wanted.run, len(state.tests) + 1
+        round = journal.current.number if wanted.why == "round" else None
+        started = TestStarted(
+            number,
+            environment,
+            wanted.run,
+            seed,
+            wanted.why,
+            round,
+            wanted.candidate if wanted.why == "round" else None,
+            trial,
+            wanted.without,
+            source,
+        )
+        if implied and source is not None:
+            place = {name: getattr(started, name) for name in Implied.__dataclass_fields__ if name != "by"}
+            journal.record(Implied(by=source, **place), {ROBOT: source})
+            return True
+        journal.record(started)
+        self._started.add((wanted.environment, wanted.run, full))
         # To be compared, it ends as the other one did.
-        full = full or (source is not None and journal.is_full(journal.state.tests[source - 1].phase))
-        self._pool.submit(test, asked.keep, journal.state.tests[test - 1].seed, full, wall_limit(journal.state))
+        full = full or (source is not None and journal.is_full(state.tests[source - 1].phase))
+        keep = frozenset(wanted.environment.names(state.elements))
+        self._pool.submit(number, keep, seed, full, wall_limit(state))
         return False
 
-    def settle(self, elements: Keep, late: Callable[[], None]) -> Start | Broken:
+    def settle(self, elements: frozenset[str], late: Callable[[], None]) -> Start | Broken:
         """How the world settles; calls `late` once if that takes longer than `PATIENCE`. Raises as `work`."""
         found = self._pool.settle(elements)
         until = time.monotonic() + PATIENCE
@@ -181,20 +147,39 @@ class Bench:
             self.tick()
         return result
 
+    # Tries of the user.
+
     def finish_trials(self) -> None:
         """Obeys the last commands, and makes the tests that the user asked for. Raises as `work`."""
         self._control.poll()
-        while self._control.holds or (self._journal.state.failures and open_trials(self._journal)):
+        while self._control.holds or (self._journal.state.failures and self._open_trials()):
             self.tick()
 
+    def _open_trials(self) -> list[Trial]:
+        """The tries without a verdict, oldest first."""
+        return [trial for trial in self._journal.state.trials if not trial.verdict]
+
     def _serve_trials(self) -> None:
-        """Starts tests of tries, also while the rounds are paused. Raises Stopped if the budget is used up."""
-        if not self._journal.state.failures or not open_trials(self._journal):
+        """Judges tries, and starts their tests, also while the rounds are paused. Raises Stopped if the budget is used up."""
+        if not self._journal.state.failures:
             return
-        wanted = [Asked("hand", keep, run, trial=trial) for keep, run, trial in judge_trials(self._journal)]
-        for asked in [one for one in wanted if not self._is_started(one)][: self._pool.idle]:
-            if self._make(asked) is None:
-                return
+        for trial in self._open_trials():
+            environment = self._journal.state.environments[trial.environment]
+            now = standing([environment], self._journal.shown, self.rule)
+            if now.verdicts[0]:
+                self._judge(trial, environment, now.verdicts[0])
+            for _, run in now.wanted:
+                test = Test(environment, run, "hand")
+                if self._key(test) in self._started:
+                    continue
+                if not self._pool.idle or self._make(test, trial.number) is None:
+                    return
+
+    def _judge(self, trial: Trial, environment: Environment, verdict: str) -> None:
+        runs, _ = decided_by(lambda run: self._journal.shown(environment, run), self.rule)
+        tests = self._journal.tests(environment, range(runs))
+        known = sum(self._journal.state.tests[test - 1].trial != trial.number for test in tests)
+        self._journal.record(TrialJudged(trial.number, verdict, tests, known))
 
     def _is_spent(self) -> bool:
         """Whether no test may start any more. Raises Stopped once none runs."""
@@ -204,6 +189,8 @@ class Bench:
         if self._pool.busy == 0:
             raise Stopped(f"the budget of {count(state.budget, 'test')} is used up")
         return True
+
+    # Looking around.
 
     def tick(self) -> None:
         """Obeys commands, records finished tests, shows the running robots. Raises as `work`.
@@ -222,13 +209,12 @@ class Bench:
 
     def _look_around(self, wait: float) -> None:
         self._control.poll()
-        thinks = self._quiet and self._pool.busy > 0 and self._thinking.step()
-        finished = self._pool.finished(0.0 if thinks else wait)
+        works = self._quiet and self._pool.busy > 0 and self.background.step()
+        finished = self._pool.finished(0.0 if works else wait)
         for test, result in finished:
             self._record(test, result)
-            self._thinking.test_ended()
-            if self._journal.state.tests[test - 1].phase != AHEAD:
-                self._give_up_if_all_break(result)
+            self.background.test_ended()
+            self._give_up_if_all_break(result)
         self._quiet = not finished
         # Before the search gets the workers that are free now.
         self._serve_trials()
@@ -263,16 +249,20 @@ class Bench:
         if isinstance(result, RunResult):
             motions = {ROBOT: _samples(result.trajectory)}
             motions |= {name: _samples(motion) for name, motion in result.motions.items()}
-        data = result_data(result, self._counted())
+        data, journal = result_data(result, self._counted()), self._journal
         if data["outcome"] in BROKEN:
             # It is made again, unless that has happened already.
-            started = self._journal.state.tests[test - 1]
-            self._started.discard((self._journal.keep_of_test(test), started.run, self._journal.is_full(started.phase)))
-        noticed: dict[str, Any] = {key: self._numbered(data[key]) for key in ("first_sensed", "first_touched")}
-        if "took_part" in data:
-            noticed["took_part"] = sorted(self._numbers[name] for name in data["took_part"] if name in self._numbers)
-        self._journal.record("test_finished", motions, test=test, **data | noticed)
-        compare(self._journal, [self._journal.state.tests[test - 1]])
+            started = journal.state.tests[test - 1]
+            environment = journal.state.environments[started.environment]
+            self._started.discard((environment, started.run, journal.is_full(started.phase)))
+        took_part = data.pop("took_part", None)
+        noticed: dict[str, Any] = {
+            "first_sensed": journal.in_order(data.pop("first_sensed")),
+            "first_touched": journal.in_order(data.pop("first_touched")),
+            "took_part": None if took_part is None else journal.models(took_part),
+        }
+        journal.record(TestFinished(test, **data, **noticed), motions)
+        compare(journal, [journal.state.tests[test - 1]])
 
     def _counted(self) -> tuple[Failure, ...]:
         """f, and the other failures that the user accepted."""
@@ -281,12 +271,6 @@ class Bench:
             spec = FailureSpec.model_validate(state.scenario["failure"])
             self._failures, self._failed = failures_of(self._journal.file, state, spec), state.failures
         return self._failures
-
-    def _numbered(self, times: dict[str, float]) -> list[list[float]]:
-        """`times` by name, s, as [number of the model, s] in order of time; only for elements."""
-        numbers = self._numbers
-        pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
-        return [[number, seconds] for seconds, number in pairs]
 
 
 def _samples(trajectory: np.ndarray) -> bytes:

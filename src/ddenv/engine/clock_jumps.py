@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 from ddenv.engine.journal import Journal
+from ddenv.runfile.events import ClockJumped
 
 # How far a clock that is kept exact may go on or back between two looks, s.
 SMALL = 2.0
@@ -21,12 +22,12 @@ class ClockJumps:
         steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self._journal = journal
-        self._ahead: Callable[[], float] = lambda: clock() - steady()
-        self._last = self._ahead()
+        self._offset: Callable[[], float] = lambda: clock() - steady()
+        self._last = self._offset()
 
     def look(self) -> None:
         """Records a jump since the last look: what is reckoned from the time that the run took would be wrong."""
-        ahead = self._ahead()
-        jump, self._last = ahead - self._last, ahead
+        offset = self._offset()
+        jump, self._last = offset - self._last, offset
         if abs(jump) > SMALL:
-            self._journal.record("clock_jumped", seconds=jump)
+            self._journal.record(ClockJumped(jump))

@@ -9,19 +9,37 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from ddenv.engine.clock_jumps import ClockJumps
+from ddenv.engine.disk_space import DiskSpace
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failure_of, rejudged
-from ddenv.engine.room import Room
+from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, parse, refusal
 from ddenv.guiding.course import Change, GoBack, Undo
 from ddenv.guiding.pace import AcceptMode, Pause, Resume, Step, Stop
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
-from ddenv.guiding.situation import Situation, label_of, names_of, numbers_of
-from ddenv.runfile.atlas import models_of
+from ddenv.guiding.situation import Situation, label_of, numbers_of
+from ddenv.runfile.events import (
+    AcceptedOther,
+    AcceptModeChanged,
+    Adopted,
+    Changed,
+    CommandHandled,
+    CommandRefused,
+    Decided,
+    Outcomes,
+    Paused,
+    Pinned,
+    Resumed,
+    TrialStarted,
+    Unpinned,
+    Unvetoed,
+    Vetoed,
+    WentBack,
+)
 from ddenv.runfile.fold_decisions import failures_at
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Request
 from ddenv.world.scenario import FailureSpec
 
 # Decisions within this time start one new search, not several, s.
@@ -42,11 +60,11 @@ class Control:
     """Commands turned into events and into what the driver may do next.
 
     `credit` is how many tests may still start before a pause, None for any number. `terminated` is set by a signal, `after` is
-    the number of the last command before this engine was asked to start. `room` says whether the disk has room for more tests.
+    the number of the last command before this engine was asked to start. `disk` says whether there is space for more tests.
     """
 
     def __init__(
-        self, journal: Journal, terminated: threading.Event, after: float = math.inf, room: Room | None = None
+        self, journal: Journal, terminated: threading.Event, after: float = math.inf, disk: DiskSpace | None = None
     ) -> None:
         self._journal = journal
         self._terminated = terminated
@@ -55,7 +73,7 @@ class Control:
         self._pause_after_round = False
         self._searches = False
         self._last = -math.inf
-        self._room = room
+        self._disk = disk
         self._jumps = ClockJumps(journal)
         self._catch_up(after)
 
@@ -88,7 +106,7 @@ class Control:
     @property
     def holds(self) -> bool:
         """Whether the current search is over because the user changed something."""
-        return self._searches and self._journal.steered
+        return self._searches and self._journal.state.search_due
 
     @property
     def may_search(self) -> bool:
@@ -99,17 +117,13 @@ class Control:
         """Whether a test may start now."""
         return not self._paused and self._credit != 0
 
-    def has_room(self) -> bool:
-        """Whether the disk has room for the results of more tests."""
-        return self._room is None or self._room.enough()
+    def has_disk_space(self) -> bool:
+        """Whether the disk has space for the results of more tests."""
+        return self._disk is None or self._disk.enough()
 
     def speculates(self) -> bool:
         """Whether idle workers may run ahead: not while the user steps."""
         return self._credit is None
-
-    def ends_with_round(self) -> bool:
-        """Whether the user steps, so that nothing of later rounds is made."""
-        return self._pause_after_round
 
     def started(self) -> None:
         """A test was started."""
@@ -126,33 +140,35 @@ class Control:
         if self._pause_after_round:
             self._pause()
 
-    def _obey(self, event: Event) -> None:
+    def _obey(self, request: Request) -> None:
         """Obeys a command exactly once, even if the engine is killed: its event holds the command's number."""
-        self._journal.command = event.id
+        self._journal.command = request.id
         try:
-            if why := self._why_not(event):
-                self._journal.record("command_refused", why=why)
+            if why := self._why_not(request):
+                self._journal.record(CommandRefused(why))
         finally:
             # A stop raises an exception, and must not be read again.
             self._journal.command = None
-            if self._journal.state.last_command < event.id:
-                self._handled(event)
+            if self._journal.state.last_command < request.id:
+                self._handled(request)
 
-    def _why_not(self, event: Event) -> str:
+    def _why_not(self, request: Request) -> str:
         """Obeys a command, or returns why it is not possible now."""
         try:
-            command = parse(event.kind, event.data)
+            command = parse(request.kind, request.data)
         except UserError as error:
             return str(error)
         journal = self._journal
-        now = Situation(journal.state, search_due=journal.steered)
+        now = Situation(journal.state, search_due=journal.state.search_due)
         why = refusal(command, now)
         if not why:
             _OBEYED[type(command)](self, command)
         return why
 
-    def _handled(self, event: Event) -> None:
-        self._journal.record("command_handled", command=event.id)
+    def _handled(self, request: Request) -> None:
+        self._journal.command = request.id
+        self._journal.record(CommandHandled())
+        self._journal.command = None
 
     # Speed.
 
@@ -168,7 +184,7 @@ class Control:
         self._run(credit=None if whole_round else 1, pause_after_round=whole_round)
 
     def _obey_accept_mode(self, asked: AcceptMode) -> None:
-        self._journal.record("accept_mode", mode=asked.mode)
+        self._journal.record(AcceptModeChanged(asked.mode))
 
     def _obey_stop(self, _: Stop) -> None:
         raise Stopped("stopped by the user")
@@ -177,53 +193,52 @@ class Control:
         self._credit, self._pause_after_round = credit, pause_after_round
         if self._paused:
             self._paused = False
-            self._journal.record("resumed")
+            self._journal.record(Resumed())
 
     def _pause(self) -> None:
         self._paused, self._credit, self._pause_after_round = True, None, False
-        self._journal.record("paused")
+        self._journal.record(Paused())
 
     # Candidates.
 
     def _decide(self, asked: Accept | Reject) -> None:
-        self._journal.record("decided", round=asked.round, candidate=asked.candidate, decision=asked.kind)
+        self._journal.record(Decided(asked.round, asked.candidate, "accept" if isinstance(asked, Accept) else "reject"))
 
     def _veto(self, asked: Veto) -> None:
-        self._journal.record("vetoed", round=asked.round, candidate=asked.candidate, verdict="vetoed")
+        self._journal.record(Vetoed(asked.round, asked.candidate))
 
     def _unveto(self, asked: Unveto) -> None:
-        self._journal.record("unvetoed", round=asked.round, candidate=asked.candidate)
+        self._journal.record(Unvetoed(asked.round, asked.candidate))
 
     # Models.
 
     def _pin(self, asked: Pin) -> None:
-        self._journal.record("pinned", models=self._numbers(asked.new(self._journal.state)))
+        self._journal.record(Pinned(self._numbers(asked.new(self._journal.state))))
 
     def _unpin(self, asked: Unpin) -> None:
-        self._journal.record("unpinned", models=self._numbers(asked.pinned(self._journal.state)))
+        self._journal.record(Unpinned(self._numbers(asked.pinned(self._journal.state))))
 
     def _try(self, asked: Try) -> None:
-        state = self._journal.state
-        models = numbers_of(state, names_of(state, asked.models, empty=True) or ())
-        self._journal.record("trial_started", trial=len(state.trials) + 1, models=list(models))
+        environment = self._journal.number(Environment.of(asked.models))
+        self._journal.record(TrialStarted(len(self._journal.state.trials) + 1, environment))
 
     def _adopt(self, asked: Adopt) -> None:
         trial = self._journal.state.trials[asked.trial - 1]
-        environment = self._numbers(trial.models)
-        self._journal.record("adopted", trial=asked.trial, environment=environment, evidence_test=trial.tests[-1])
+        self._journal.record(Adopted(asked.trial, trial.environment, trial.tests[-1]))
 
     def _accept_other(self, asked: AcceptOther) -> None:
         journal, state = self._journal, self._journal.state
-        test, keep = state.tests[asked.test - 1], frozenset(models_of(state, state.tests[asked.test - 1]))
+        test = state.tests[asked.test - 1]
         unnamed = asked.instead or test.phase == "hand"
         journal.record(
-            "accepted_other",
-            test=test.id,
-            what=f"test {test.id}" if unnamed else label_of(state, test),
-            trial=None if asked.instead else test.trial,
-            environment=self._numbers(name for name in state.elements if name in keep),
-            instead=asked.instead,
-            **self._judged((test.id,) if asked.instead else (*state.failures, test.id)),
+            AcceptedOther(
+                test.id,
+                f"test {test.id}" if unnamed else label_of(state, test),
+                test.environment,
+                self._judged((test.id,) if asked.instead else (*state.failures, test.id)),
+                None if asked.instead else test.trial,
+                asked.instead,
+            )
         )
 
     # Going back, and other settings.
@@ -239,24 +254,21 @@ class Control:
             self._pause()
 
     def _change(self, asked: Change) -> None:
-        self._journal.record("changed", settings=asked.new(self._journal.state))
+        self._journal.record(Changed(asked.new(self._journal.state)))
 
     def _go(self, node: int, rejected: int | None) -> None:
         state = self._journal.state
         failures = failures_at(state, node)
-        judged = {} if failures == state.failures else self._judged(failures)
-        self._journal.record("went_back", node=node, rejected=rejected, **judged)
+        self._journal.record(WentBack(node, rejected, None if failures == state.failures else self._judged(failures)))
 
-    def _judged(self, failures: tuple[int, ...]) -> dict[str, Any]:
+    def _judged(self, failures: tuple[int, ...]) -> Outcomes:
         """The outcomes of all tests if the ends of `failures` count as f."""
         file, state = self._journal.file, self._journal.state
         spec = FailureSpec.model_validate(state.scenario["failure"])
         return rejudged(file, state, tuple(failure_of(file, state, test, spec) for test in failures))
 
-    def _numbers(self, models: Iterable[str]) -> list[int]:
-        """In the order of `models`."""
-        number = {name: index for index, name in enumerate(self._journal.state.elements)}
-        return [number[name] for name in models]
+    def _numbers(self, models: Iterable[str]) -> tuple[int, ...]:
+        return numbers_of(self._journal.state, models)
 
 
 _OBEYED: dict[type[Command], Callable[[Control, Any], None]] = {

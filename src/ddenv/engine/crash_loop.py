@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
+from ddenv.runfile.events import (
+    AcceptModeChanged,
+    Comparing,
+    EngineStarted,
+    EnvironmentNamed,
+    LegStarted,
+    SupportsStarted,
+    TestLost,
+    TestStarted,
+)
 from ddenv.runs.programs import log_of
 
 # So many engines may die in a row, each before it has got anywhere.
 MOST_DEATHS = 3
 # What an engine writes again and again without getting anywhere.
-NOWHERE = ("engine_started", "accept_mode", "comparing", "supports_started", "leg_started", "test_started", "test_lost")
+NOWHERE = (AcceptModeChanged, Comparing, SupportsStarted, LegStarted, EnvironmentNamed, TestStarted, TestLost)
 # The last events that are looked at.
 LAST = 3000
 
@@ -19,9 +29,9 @@ def check_crash_loop(journal: Journal) -> None:
     path, last = journal.file.path, journal.state.revision
     deaths, place = 0, 0
     for event in journal.file.events(max(0, last - LAST)):
-        if event.kind == "engine_started":
+        if isinstance(event.event, EngineStarted):
             deaths += 1
-        elif event.kind not in NOWHERE:
+        elif not isinstance(event.event, NOWHERE):
             deaths, place = 0, event.id
     if deaths >= MOST_DEATHS:
         raise UserError(

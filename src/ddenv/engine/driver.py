@@ -1,50 +1,46 @@
-"""Carries a reduction through: baseline, rounds, end. The algorithm chooses what to test, the bench makes the tests."""
+"""Carries a run through: drives the procedure with workers and a run file, and records what it finds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import islice
+from typing import Any
 
-from ddenv.claims import current, is_minimal, verdict_on
-from ddenv.engine.ahead import Ahead, Now
-from ddenv.engine.announcing import announce
-from ddenv.engine.auditing import compare
-from ddenv.engine.baseline import run_baseline
-from ddenv.engine.bench import Bench, Wanted
-from ddenv.engine.certify import CHANGED, Certifier
+from ddenv.amounts import count
+from ddenv.engine.baseline import fix_failure
+from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Steered, Stopped
-from ddenv.engine.forecasting import forecasting
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import known_failure, rows_of
+from ddenv.engine.limits import limit_after
 from ddenv.engine.settle import settle
 from ddenv.engine.sight import Sight
-from ddenv.engine.slicing import audit_slice, slice_environment
-from ddenv.engine.subjects import Asked, Keep
-from ddenv.engine.wall_limit import limit_after
-from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
+from ddenv.engine.slicing import compare, slice_audit, slice_environment
+from ddenv.environment import Environment
+from ddenv.errors import UserError
+from ddenv.evidence.certificate import Terms, error_of
+from ddenv.evidence.claims import current, is_minimal, verdict_on
+from ddenv.evidence.rates import Shown, wilson_interval
+from ddenv.reduction import procedure as steps
 from ddenv.reduction.evidence import Evidence, Trial
-from ddenv.reduction.forecast import Memory, Moment
+from ddenv.reduction.forecast import Memory, Moment, interval, playing
 from ddenv.reduction.guide import Guide, Search, make_guide, search
 from ddenv.reduction.round import Candidate, Round
-from ddenv.reduction.rounds_ahead import Path, RoundsAhead, foreseeing
 from ddenv.reduction.stacks import Stacks
 from ddenv.reduction.stepping_back import tried_again
-from ddenv.reduction.verdict import Standing, standing
+from ddenv.reduction.verdict import MOST_RUNS, Acceptance
+from ddenv.runfile import events
+from ddenv.runfile.fold import digest
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.supports import stacks_of
 from ddenv.schemas import split_pair
-from ddenv.words import count
 from ddenv.world.model import World
 from ddenv.world.scenario import Reduction, Scenario
 
-# Of larger environments, only so many claims of a certificate are foreseen.
-MOST_CLAIMS = 20
-# The sets of models of so many candidates are held: with thousands of models, one takes a while to make and to find in the ledger,
-# and 10,000 of them would take gigabytes.
-HELD = 64
+CHANGED = "a decision of the user ended the certificate; resume the run to go on from there"
 
 
 class Driver:
@@ -53,176 +49,425 @@ class Driver:
     def __init__(self, scenario: Scenario, world: World, journal: Journal, bench: Bench, control: Control) -> None:
         self._scenario, self._world = scenario, world
         self._reduction = scenario.reduction
-        self._failure_spec = scenario.failure
-        self._journal = journal
-        self._bench = bench
-        self._control = control
+        self._journal, self._bench, self._control = journal, bench, control
         self._sight = Sight(world, journal.state.elements, self._reduction.delta, self._reduction.seed)
         self._evidence: Evidence | None = None
+        # What the schemas know: the tests behind the verdicts of rounds that are over, each once.
         self._trials: list[Trial] = []
         self._learnt: set[int] = set()
-        self._number = {name: index for index, name in enumerate(journal.state.elements)}
-        self._pinned: Keep = frozenset()
-        # The winners of this search's rounds so far.
-        self._path: Path = ()
-        # By the identities of candidates, which live as long as they are held here.
-        self._keeps: dict[int, tuple[Candidate, Keep]] = {}
-        # How many candidates of the round were dissimilar, and how many refusals there were at that time.
-        self._judged = 0
-        self._refusals = 0
+        self._memory = Memory()
+        self._guide: Guide | None = None
+        self._stacks = Stacks({})
+        self._leg: steps.Leg | None = None
+        # What the baseline shows so far, and why there is nothing to reduce.
+        self._baseline: events.BaselineFinished | None = None
+        self._reason = ""
+        # How many runs of what is left a new certificate needs at least; None if the search makes it when it is over.
+        self._only_certify: int | None = None
 
     def reduce(self) -> None:
         """The whole run. Raises Stopped, and UserError when it cannot go on."""
+        journal, reduction = self._journal, self._reduction
         # Unknown names are refused before a robot runs.
-        self._stack(self._journal.state.elements, frozenset())
-        self._begin(self._reduction)
-        settle(self._scenario, self._world, self._journal, self._bench)
-        reason = self._baseline()
-        if reason:
-            self._end(False, reason)
-            return
+        self.algorithm(self._leg_from(journal.state.elements, frozenset(), reduction))
+        settle(self._scenario, self._world, journal, self._bench)
+        leg: steps.Leg | None = None
+        if journal.state.baseline is not None:
+            leg = self._first_leg()
+        whole, keeps_rate = journal.state.environments[0], reduction.accept_rate == "kept"
+        procedure = steps.procedure(self, whole, reduction.baseline_runs, keeps_rate, leg)
+        if self._carry_out(procedure) is None:
+            self._end(False, self._reason)
+        else:
+            self._conclude()
+
+    def certify(self, at_least: int) -> None:
+        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
+        # A search that is due would begin at the end.
+        leg, self._only_certify = self._next_leg(), at_least
+        chain = tuple(self._journal.state.environments[node.id] for node in self._journal.state.path)
+        try:
+            self._carry_out(steps.certify(self, leg, chain))
+        except steps.Changed:
+            raise Stopped(CHANGED) from None
+        self._conclude()
+
+    def _carry_out(self, procedure: Generator[steps.Step, Any, Any]) -> Any:
+        """Drives the procedure to its end; returns what it returns. Whatever the user changes enters here."""
+        answer: object = None
+        changed: steps.Changed | None = None
+        while True:
+            try:
+                step = procedure.send(answer) if changed is None else procedure.throw(changed)
+            except StopIteration as end:
+                return end.value
+            answer = changed = None
+            try:
+                answer = _ANSWERS[type(step)](self, step)
+            except Steered:
+                slice_environment(self._journal)
+                changed = steps.Changed(self._next_leg())
+
+    def _first_leg(self) -> steps.Leg:
+        """The leg of an engine that starts after the baseline, or at its end."""
         self._control.search_begins()
         # An engine that was killed may not have compared its last one.
         compare(self._journal, self._journal.state.finished_tests)
         # The user may have gone back before this engine started; then it pauses there.
         with suppress(Steered):
-            while self._journal.steered:
+            while self._journal.state.search_due:
                 self._bench.tick()
-        while True:
-            try:
-                slice_environment(self._journal)
-                self._search()
-                return
-            except Steered:
-                continue
+        slice_environment(self._journal)
+        return self._next_leg()
 
-    def certify(self, at_least: int) -> None:
-        """Makes one more certificate of the current environment, and goes neither back nor on. Raises as `reduce`."""
-        # A search that is due would begin at the end.
-        self._journal.begin_leg()
-        state = self._journal.state
-        self._stack(state.environment, state.pinned)
-        self._certify(list(self._stacks.representatives), at_least, moves=False, anew=True)
-
-    def _search(self) -> None:
-        """Searches from the current environment to the end. Raises Steered if the user changes something."""
-        leg = self._journal.begin_leg()
+    def _next_leg(self) -> steps.Leg:
+        """The current search, or a new one where one is due."""
+        journal = self._journal
+        if journal.state.leg is None or journal.state.search_due:
+            state = journal.state
+            first = 1 if state.round is None else state.round.number + 1
+            rate = journal.rate_of_whole() if state.scenario["reduction"]["accept_rate"] == "kept" else 0.0
+            journal.record(events.LegStarted(first, state.nodes[state.node].n_partitions, rate))
+        leg = journal.state.leg
+        assert leg is not None
         self._reduction = Reduction.model_validate(leg.settings)
-        self._learnt = set(leg.tests)
-        self._trials = [
-            self._learnt_from(test) for test in leg.tests if self._journal.state.tests[test - 1].outcome not in BROKEN
-        ]
+        environment = journal.state.nodes[leg.node].environment
+        self._leg = self._leg_from(environment, leg.pinned, self._reduction)
+        self._bench.rule = self._leg.rule
+        self._trials.clear()
+        self._learnt.clear()
+        self._learn(leg.tests)
         self._look_at(leg.evidence_test)
-        self._stack(leg.environment, leg.pinned)
-        algorithm = self._begin(self._reduction, leg.n_partitions, leg.again)
-        number, winner = leg.first_round, None
-        try:
-            while True:
-                winner = self._round(number, algorithm.send(winner))
-                number += 1
-        except StopIteration as end:
-            self._finish(end.value | self._pinned)
+        return self._leg
 
-    def _stack(self, environment: tuple[str, ...], pinned: Keep) -> None:
-        """What the search may leave out of `environment`: whole stacks, and none with a model that is pinned."""
-        together = Stacks.of(stacks_of(self._journal.state, environment))
-        self._pinned = pinned | together.of_any(pinned)
-        self._keeps.clear()
-        free = (stack for stack in together.by_first.values() if self._pinned.isdisjoint(stack))
-        self._stacks = Stacks.of(free)
+    def _leg_from(self, environment: tuple[str, ...], pinned: frozenset[str], reduction: Reduction) -> steps.Leg:
+        """A search of `environment`. It may leave out whole stacks, and none with a model that is pinned."""
+        journal, state, leg = self._journal, self._journal.state, self._journal.state.leg
+        together = Stacks.of(map(journal.models, stacks_of(state, environment)))
+        stays = journal.models(pinned)
+        stays |= together.of_any(stays)
+        free = {model: stack for model, stack in together.by_first.items() if stack.isdisjoint(stays)}
+        most_misses = 1 + reduction.iterations
+        if leg is None:
+            return steps.Leg(1, journal.whole, (journal.whole,), stays, free, Acceptance(most_misses))
+        rule = Acceptance(most_misses, leg.rate, reduction.keep_rate, leg.steps_back)
+        chain = tuple(state.environments[node] for node in self._chain(leg.node))
+        return steps.Leg(leg.first_round, journal.whole, chain, stays, free, rule, leg.n_partitions, leg.again)
 
-    def _begin(
-        self, asked: Reduction, n_partitions: int | None = None, again: tuple[tuple[str, ...], ...] = ()
-    ) -> Search:
-        """The algorithm and the schemas by name; first it leaves out the groups `again`. Raises UserError for unknown names."""
+    def _chain(self, node: int) -> tuple[int, ...]:
+        """The numbers of the environments on the way to a node, from where the same failures counted as f as now."""
+        return tuple(reached.id for reached in self._nodes(node))
+
+    def _nodes(self, node: int) -> tuple[Any, ...]:
+        path = self._journal.state.changed(node=node).path
+        begin = max(place for place, one in enumerate(path) if place == 0 or one.how in ("accepted", "instead"))
+        return path[begin:]
+
+    # What the procedure asks.
+
+    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
+        return self._journal.shown(environment, run, full)
+
+    def refused(self, environment: Environment) -> bool:
+        return self._journal.is_refused(environment)
+
+    def refused_by_user(self, environment: Environment) -> bool:
+        return self._journal.is_refused_by_user(environment)
+
+    @property
+    def refusals(self) -> int:
+        return self._journal.state.refusals
+
+    @property
+    def workers(self) -> int:
+        return max(1, self._journal.state.jobs) if self._control.speculates() else 1
+
+    def rate(self) -> float:
+        return self._journal.rate_of_whole()
+
+    def goes_on(self) -> bool:
+        """Whoever accepts each reduction by hand also goes back by hand."""
+        automatic = self._journal.state.accept_mode == "automatic"
+        return self._only_certify is None and automatic and self._reduction.accept_rate == "kept"
+
+    def algorithm(self, leg: steps.Leg) -> Search:
+        """The algorithm and the schemas by name. Raises UserError for unknown ones."""
+        asked = self._reduction
         partitioning, prioritization = split_pair(asked.pair)
-        elements, self._memory, self._foreseen = self._stacks.representatives, Memory(), Memory()
+        self._stacks, self._memory = Stacks(leg.free), Memory()
         self._guide = make_guide(
             partitioning,
             prioritization,
             self._known,
             prior=asked.prior,
-            n_partitions=n_partitions or asked.n_partitions,
+            n_partitions=leg.n_partitions or asked.n_partitions,
             candidates=asked.candidates,
             complement_order=asked.complement_order,
             growth=asked.growth,
             skip=asked.skip,
-            rate=self._rate,
-            runs=lambda: self._journal.rule.misses,
+            rate=lambda: leg.rule.rate or known_failure(self._journal.state).rate,
+            runs=lambda: leg.rule.misses,
+            broke=partial(self._broke, leg),
         )
-        guide = replace(self._guide, broke=self._broke)
+        return self._begin(leg, self._memory.of(self._guide))
 
-        def begin(guide: Guide) -> Search:
-            if not again:
-                return self._stacks.expand(search(asked.algorithm, elements, guide))
-            searched = partial(search, asked.algorithm, guide=guide)
-            return self._stacks.expand(tried_again(elements, again, searched))
-
-        rounds = RoundsAhead(lambda: begin(foreseeing(guide, self._memory, self._foreseen, asked.pair)))
-        self._path = ()
-        self._ahead = Ahead(self._journal, rounds, self._pinned, self._certifier, asked.baseline_runs)
-        return begin(self._memory.of(guide))
+    def _begin(self, leg: steps.Leg, guide: Guide) -> Search:
+        stacks, searched = Stacks(leg.free), partial(search, self._reduction.algorithm, guide=guide)
+        if not leg.again:
+            return stacks.expand(searched(stacks.representatives))
+        return stacks.expand(tried_again(stacks.representatives, leg.again, searched))
 
     def _known(self) -> Evidence:
         """The evidence for the schemas; only rounds use it, after the first similar run."""
         assert self._evidence is not None
         return replace(self._evidence, trials=self._trials)
 
-    def _rate(self) -> float:
-        """The rate of f in the whole world, as it was known when this search began."""
-        return self._journal.rule.rate or known_failure(self._journal.state).rate
-
-    def _broke(self, candidate: Candidate) -> bool:
+    def _broke(self, leg: steps.Leg, candidate: Candidate) -> bool:
         """Whether a test of a candidate of the algorithm, which knows one model of each stack, broke for good."""
         tally = self._journal.state.tally
         if not any(tally[outcome] for outcome in BROKEN):
             return False
-        keep = self._pinned.union(self._stacks.expanded(candidate.models))
-        return any(self._journal.shown(keep, run) == "broken" for run in range(MOST_RUNS))
+        environment = leg.pinned | Environment.of(self._stacks.expanded(candidate.models))
+        return any(self._journal.shown(environment, run) == "broken" for run in range(MOST_RUNS))
 
-    def _rule(self, round: Round) -> Acceptance:
-        return self._journal.rule.within(round.runs)
+    def _learn(self, tests: Iterable[int]) -> None:
+        """The schemas see the tests behind the verdicts of a round: a resumed run sees the same."""
+        state = self._journal.state
+        for test in (state.tests[number - 1] for number in tests if number not in self._learnt):
+            self._learnt.add(test.id)
+            if test.outcome not in BROKEN:
+                environment = state.environments[test.environment]
+                self._trials.append(Trial(environment, test.outcome == "similar", state.elements))
 
-    def _keep(self, candidate: Candidate) -> Keep:
-        """All models that are in the world when a candidate is tested."""
-        held = self._keeps.get(id(candidate))
-        if held is None:
-            if len(self._keeps) >= HELD:
-                self._keeps.clear()
-            held = self._keeps[id(candidate)] = candidate, candidate.models | self._pinned
-        return held[1]
+    def _look_at(self, test: int) -> None:
+        """The schemas see `test`, the last similar run."""
+        rows = rows_of(self._journal.file, test)
+        self._evidence = self._sight.evidence(self._journal.state, test, rows, self._trials)
 
-    def _finish(self, kept: Keep) -> None:
-        audit_slice(self._journal, self._bench)
+    # What the procedure finds.
+
+    def _wants(self, step: steps.Wants) -> None:
+        self._bench.work(step.tests)
+
+    def _baseline_ran(self, step: steps.BaselineRan) -> int | None:
+        journal, whole = self._journal, self._journal.state.environments[0]
+        tests = [journal.state.tests[test - 1] for test in journal.tests(whole, range(step.runs))]
+        trajectories = {test.id: rows_of(journal.file, test.id) for test in tests if test.outcome == "failed"}
+        spec, asked = self._scenario.failure, self._reduction
+        fixed = fix_failure(tests, trajectories, spec, asked.iterations, asked.failure)
+        if isinstance(fixed, str):
+            self._reason = fixed
+            return None
+        self._baseline = fixed
+        return fixed.failures
+
+    def _failure_fixed(self, step: steps.FailureFixed) -> steps.Leg:
+        assert self._baseline is not None
+        limit = limit_after(self._journal.state, self._scenario.failure.timeout)
+        self._journal.record(replace(self._baseline, wall_limit=limit))
+        self._control.round_finished()
+        return self._first_leg()
+
+    def _round_began(self, step: steps.RoundBegan) -> steps.Past | None:
+        state, leg = self._journal.state, self._journal.state.leg
+        parts = tuple(map(Environment.of, step.round.partitions))
+        assert leg is not None
+        place = step.number - leg.first_round
+        if place < len(leg.past):
+            past = leg.past[place]
+            if past.digest != digest(parts):
+                raise UserError(other_way(step.number))
+            self._learn(past.tests)
+            if past.evidence_test is not None:
+                self._look_at(past.evidence_test)
+            return steps.Past(past.winner)
+        if state.round is None or state.round.number < step.number:
+            self._announce(step.number, step.round)
+        elif state.round.split.parts != parts:
+            raise UserError(other_way(step.number))
+        # Whoever waits before the first test of a round sees its candidates.
+        self._audit_slice()
+        self._bench.background.begin(self._forecast(step.number))
+        return None
+
+    def _announce(self, number: int, round: Round) -> None:
+        journal, leg = self._journal, self._leg
+        assert leg is not None
+        # These schemas score by distance in m, which is useful to show.
+        shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
+        environment = Environment.of(round.environment) | leg.pinned
+        journal.record(
+            events.RoundStarted(
+                number,
+                round.n_partitions,
+                journal.number(environment),
+                tuple(tuple(sorted(part)) for part in round.partitions),
+                tuple(
+                    (one.kind, one.partition, float(f"{round.scores[one.partition]:.3f}") if shown else None)
+                    for one in round.candidates
+                ),
+                leg.pinned & environment,
+            )
+        )
+        refused = {refusal.environment: refusal.verdict for refusal in journal.state.refused}
+        for index, one in enumerate(round.candidates) if refused else ():
+            if verdict := refused.get(one.models | leg.pinned):
+                journal.record(events.Vetoed(number, index, verdict, again=True))
+
+    def _forecast(self, number: int) -> Iterator[object]:
+        """Plays the search on, and records how many tests are left; once in a round."""
+        journal, leg, guide = self._journal, self._leg, self._guide
+        assert leg is not None and guide is not None and journal.state.leg is not None
+        moment = Moment(
+            leg,
+            tuple(past.winner for past in journal.state.leg.past),
+            journal.environment,
+            self._reduction.pair,
+            self._begin,
+            guide,
+            self._memory,
+            replace(self._known(), trials=tuple(self._trials)),
+            self.shown,
+            self.refused,
+            known_failure(journal.state).rate,
+            max(1, journal.state.jobs),
+        )
+        done, tests = journal.state.tests_done, list[float]()
+        for play in playing(moment):
+            tests += [] if play is None else [play]
+            yield play
+        if tests:
+            journal.record(events.Forecast(number, interval(tests), done))
+
+    def _judged(self, step: steps.Judged) -> None:
+        """Records a verdict, unless an earlier engine has."""
+        journal, round = self._journal, self._journal.current
+        if round.candidates[step.index].verdict:
+            return
+        tests = journal.tests(step.environment, range(step.runs))
+        known = sum(journal.state.tests[test - 1].round != round.number for test in tests)
+        journal.record(events.CandidateJudged(round.number, step.index, step.verdict, tests, known))
+
+    def _similar(self, step: steps.Similar) -> bool:
+        """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
+        journal, index = self._journal, step.index
+        if journal.current.winner == index:
+            return True
+        if journal.state.accept_mode == "ask" and journal.current.accepted != index:
+            journal.record(events.Waiting(step.number, index))
+            while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == index:
+                self._bench.tick()
+            if journal.state.waiting_candidate == index:
+                journal.record(events.Decided(step.number, index, "accept"))
+            if journal.current.accepted != index:
+                return False
+        test = journal.evidence_of(journal.current.candidates[index].tests)
+        journal.record(events.Reduced(step.number, index, journal.number(step.environment), test))
+        return True
+
+    def _round_ended(self, step: steps.RoundEnded) -> None:
+        journal = self._journal
+        if not journal.current.done:
+            journal.record(events.RoundFinished(step.number))
+            self._control.round_finished()
+        assert journal.state.leg is not None
+        self._learn(journal.state.leg.past[-1].tests)
+        if step.winner is not None:
+            assert journal.state.evidence_test is not None
+            self._look_at(journal.state.evidence_test)
+            if slice_environment(journal):
+                # The search goes on in the slice.
+                raise Steered
+
+    def _search_ended(self, step: steps.SearchEnded) -> None:
+        self._audit_slice()
         # Their results count, too.
         self._bench.finish_trials()
-        free = [name for name in self._stacks.representatives if name in kept]
-        self._certify(free, self._reduction.baseline_runs, self._moves)
+
+    def _audit_slice(self) -> None:
+        while tests := slice_audit(self._journal):
+            self._bench.work(tests)
+
+    def _certificate_due(self, step: steps.CertificateDue) -> steps.Certificate:
+        """The certificate that this search has already, or a new one; a finished one only if no other is asked for."""
+        journal, last = self._journal, self._journal.state.certificate
+        if last is None or (self._only_certify is not None and last.claims):
+            state, number = journal.state, len(journal.state.certificates) + 1
+            at_least = self._only_certify or self._reduction.baseline_runs
+            keep_rate = state.scenario["reduction"]["keep_rate"]
+            started = events.CertificateStarted(
+                number, journal.fresh_run, journal.rate_of_whole(), keep_rate, error_of(number), at_least
+            )
+            journal.record(started)
+            last = journal.state.certificates[-1]
+        return steps.Certificate(
+            last.number, last.first_run, Terms(last.keep_rate, last.rate, last.error, last.at_least)
+        )
+
+    def _certified(self, step: steps.Certified) -> None:
+        if not self._certificate.claims:
+            first, journal = step.certificate.first_run, self._journal
+            claims = tuple(self._claim_made(claim, first) for claim in step.claims)
+            rested_on = {
+                test
+                for claim in step.claims
+                for environment, run in claim.claim.rests_on
+                for test in journal.tests(environment, (first + run,), full=True)
+            }
+            journal.record(events.CertificateFinished(claims, tuple(sorted(rested_on))))
 
     @property
-    def _moves(self) -> bool:
-        """Whether the run goes on by a certificate. Whoever accepts each reduction by hand also goes back by hand."""
-        return self._reduction.accept_rate == "kept" and self._journal.state.accept_mode == "automatic"
+    def _certificate(self) -> Certificate:
+        last = self._journal.state.certificate
+        if last is None:
+            raise Stopped(CHANGED)
+        return last
 
-    def _certifier(self) -> Certifier:
-        """For the environment as it is now, if that has only so many claims."""
-        there = frozenset(self._journal.state.environment)
-        free = islice((name for name in self._stacks.representatives if name in there), MOST_CLAIMS)
-        return Certifier(self._journal, self._bench, list(free), self._moves)
+    def _claim_made(self, named: steps.NamedClaim, first: int) -> events.ClaimMade:
+        journal, runs = self._journal, range(first, first + named.claim.runs)
+        outcomes: dict[str, int] = {}
+        for test in journal.tests(named.environment, runs, full=True):
+            outcome = journal.state.tests[test - 1].outcome
+            outcomes[outcome] = outcomes.get(outcome, 0) + 1
+        sound = sum(number for outcome, number in outcomes.items() if outcome not in BROKEN)
+        shown = outcomes.get("similar", 0)
+        low, high = wilson_interval(shown, sound) if sound else (0.0, 1.0)
+        number = journal.number(named.environment)
+        return events.ClaimMade(named.model, number, named.claim.verdict, shown, sound, low, high, outcomes)
 
-    def _certify(self, free: list[str], at_least: int, moves: bool, anew: bool = False) -> None:
-        """Ends the run with a certificate. Raises Steered if the certificate changes the environment."""
+    def _stepped_back(self, step: steps.SteppedBack) -> None:
         journal = self._journal
-        Certifier(journal, self._bench, free, moves).certify(at_least, anew)
-        while journal.steered and not anew:
+        nodes = self._nodes(journal.state.node)
+        tests = {test for one, run in step.tests for test in journal.tests(one, (run,), full=True)}
+        node, lost = nodes[step.place].number, nodes[step.place + 1].number
+        journal.record(events.RateLost(node, lost, step.again, tuple(sorted(tests))))
+        self._wait_for_search()
+
+    def _left_out(self, step: steps.LeftOut) -> None:
+        journal, first = self._journal, self._certificate.first_run
+        runs = range(first, journal.fresh_run)
+        evidence = journal.evidence_of(journal.tests(step.environment, runs, full=True))
+        journal.record(events.LeftOut(step.model, journal.number(step.environment), evidence))
+        self._wait_for_search()
+
+    def _wait_for_search(self) -> None:
+        """A new search begins once the run is not paused. Raises Steered."""
+        while True:
             self._bench.tick()
+
+    # The end.
+
+    def _conclude(self) -> None:
+        """Ends the run with what its certificate shows."""
+        journal = self._journal
         certificate = current(journal.state)
-        if certificate is None or journal.steered:
+        if certificate is None or journal.state.search_due:
             raise Stopped(CHANGED)
         together = self._reduction.keep_supports
-        reason = verdict_on(certificate, len(self._pinned), "stack" if together else "single model")
+        pinned = 0 if self._leg is None else len(self._leg.pinned & journal.environment)
+        reason = verdict_on(certificate, pinned, "stack" if together else "single model")
         spare = [claim.without for claim in certificate.claims if claim.verdict == "not needed"]
-        if any(journal.refused.get(journal.without(name)) for name in spare if name is not None):
+        if any(journal.is_refused_by_user(journal.without(name)) for name in spare if name is not None):
             reason += "; to leave it out was vetoed or rejected"
         if together:
             stacks = stacks_of(journal.state, journal.state.environment)
@@ -233,165 +478,29 @@ class Driver:
         self._bench.finish_trials()
         # Tests that ran ahead of time are no longer needed.
         self._journal.lose_running()
-        self._journal.record("finished", minimal=minimal, reason=reason)
+        self._journal.record(events.Finished(minimal, reason))
 
-    def _baseline(self) -> str:
-        """Runs the whole world and fixes f; returns why there is nothing to reduce, or ""."""
-        if self._journal.state.baseline is not None:
-            return ""
-        found = run_baseline(self._journal, self._bench, self._reduction, self._failure_spec)
-        if isinstance(found, str):
-            return found
-        limit = limit_after(self._journal.state, self._failure_spec.timeout)
-        self._journal.record("baseline_finished", **found, wall_limit=limit)
-        self._control.round_finished()
-        return ""
 
-    def _round(self, number: int, round: Round) -> Candidate | None:
-        """Tests the candidates of a round until one is similar (and accepted); returns it, or None."""
-        self._announce(number, round)
-        # Whoever waits before the first test of a round sees its candidates.
-        audit_slice(self._journal, self._bench)
-        self._judged = 0
-        forecast = forecasting(self._journal, number, self._moment(round))
-        winner = self._judge(number, round, forecast)
-        while winner is not None and not self._is_accepted(number, winner):
-            winner = self._judge(number, round, forecast)
-        self._learn(number, round, winner)
-        if winner is not None:
-            self._take(number, round, winner)
-        if not self._journal.has("round_finished", number):
-            self._journal.record_once("round_finished", number)
-            self._control.round_finished()
-        if winner is not None and self._journal.current.number == number and slice_environment(self._journal):
-            # The search goes on in the slice.
-            raise Steered
-        self._path = (*self._path, winner)
-        return None if winner is None else round.candidates[winner]
+def other_way(round: int) -> str:
+    """The error if a resumed run would not repeat the rounds that it made before."""
+    return (
+        f"round {round} would now differ: the run was started with other versions of ddenv, scikit-learn or a "
+        "package of schemas; continue with those, or start a new run"
+    )
 
-    def _announce(self, number: int, round: Round) -> None:
-        # These schemas score by distance in m, which is useful to show.
-        shown = self._reduction.algorithm == "ddenv" and self._reduction.pair.endswith("-proximal")
-        announce(self._journal, number, round, self._pinned, shown)
-        if self._journal.current.number != number:
-            return
-        for index, one in enumerate(round.candidates) if self._journal.refused else ():
-            if verdict := self._journal.refused.get(self._keep(one)):
-                self._journal.record_once("vetoed", number, index, verdict=verdict, again=True)
 
-    def _moment(self, round: Round) -> Moment:
-        """The state of the search when a round begins."""
-        return Moment(
-            self._reduction.algorithm,
-            self._reduction.pair,
-            self._stacks.representatives,
-            self._stacks.collapsed(round.environment),
-            self._guide,
-            self._memory,
-            replace(self._known(), trials=tuple(self._trials)),
-            self._journal.rule,
-            known_failure(self._journal.state).rate,
-            max(1, self._journal.state.jobs),
-        )
-
-    def _judge(self, number: int, round: Round, forecast: Iterator[object]) -> int | None:
-        """The index of the first similar candidate that was not rejected, or None when all are judged."""
-
-        def wanted() -> Wanted:
-            if self._refusals != self._journal.refusals:
-                # The user may want a candidate that was passed over after all.
-                self._refusals, self._judged = self._journal.refusals, 0
-            now = self._standing(round)
-            self._record_verdicts(number, round, now.verdicts)
-            return [(self._keep(round.candidates[index]), run, index) for index, run in now.wanted]
-
-        def likely(most: int, is_started: Callable[[Asked], bool]) -> list[Asked]:
-            beyond = not self._control.ends_with_round()
-            return self._ahead.likely(Now(self._path, number, round, self._judged, beyond), most, is_started)
-
-        self._bench.work("round", number, wanted, forecast, likely)
-        return self._standing(round).winner
-
-    def _standing(self, round: Round) -> Standing:
-        """Tests of the candidates that have no verdict yet."""
-        open_ones = (self._keep(candidate) for candidate in islice(round.candidates, self._judged, None))
-        shown, rule, refused = self._journal.shown, self._rule(round), self._journal.refused
-        return standing(open_ones, shown, rule, refused, first=self._judged, enough=1)
-
-    def _record_verdicts(self, number: int, round: Round, verdicts: tuple[str, ...]) -> None:
-        """Records verdicts in the order of candidates: tests that ran ahead of time wait for their turn."""
-        for verdict in verdicts:
-            if not verdict:
-                return
-            models = self._keep(round.candidates[self._judged])
-            if self._journal.refused.get(models) is None:
-                # What has lost the rate is not tested.
-                lost = models in self._journal.refused
-                tests = [] if lost else self._journal.tests_of(models, self._rule(round))
-                # By these tests alone: more of them may have been made ahead of time.
-                shown = sum(self._journal.state.tests[test - 1].outcome == "similar" for test in tests)
-                if verdict == "dissimilar" and not self._journal.rule.verdict(shown, len(tests) - shown):
-                    verdict = "missed"
-                known = sum(self._journal.state.tests[test - 1].round != number for test in tests)
-                self._journal.record_once(
-                    "candidate_judged", number, self._judged, verdict=verdict, tests=tests, known=known
-                )
-                self._ahead.judged(round, self._judged, verdict == "similar")
-            if verdict == "similar":
-                return
-            self._judged += 1
-
-    def _learn(self, number: int, round: Round, winner: int | None) -> None:
-        """The tests behind the round's verdicts, each once, for schemas that learn.
-
-        Excludes tests that only ran ahead of time or were refused in this round, so that a resumed run sees the same.
-        """
-        last = len(round.candidates) if winner is None else winner + 1
-        journal = self._journal
-        for index, candidate in enumerate(round.candidates[:last]):
-            rejected = journal.decisions.get((number, index)) == "reject"
-            lost = journal.refused.has_lost(self._keep(candidate))
-            if rejected or lost or not journal.has("candidate_judged", number, index):
-                continue
-            for test in journal.tests_of(self._keep(candidate), self._rule(round)):
-                if test not in self._learnt and journal.state.tests[test - 1].outcome not in BROKEN:
-                    self._learnt.add(test)
-                    self._trials.append(self._learnt_from(test))
-
-    def _learnt_from(self, test: int) -> Trial:
-        return Trial(self._journal.keep_of_test(test), self._journal.state.tests[test - 1].outcome == "similar")
-
-    def _is_accepted(self, number: int, winner: int) -> bool:
-        """In accept mode `ask`, waits for the user, who may also choose an earlier candidate."""
-        journal, key = self._journal, (number, winner)
-        if journal.has("reduced", number, winner):
-            return True
-        if journal.state.accept_mode == "ask" and key not in journal.decisions:
-            journal.record("waiting", round=number, candidate=winner)
-            while journal.state.accept_mode == "ask" and journal.state.waiting_candidate == winner:
-                self._bench.tick()
-            if journal.state.waiting_candidate == winner:
-                journal.record("decided", round=number, candidate=winner, decision="accept")
-            if key not in journal.decisions:
-                return False
-        return journal.decisions.get(key, "accept") == "accept"
-
-    def _take(self, number: int, round: Round, winner: int) -> None:
-        """The winner becomes the environment; the next rounds use its similar run."""
-        models = self._keep(round.candidates[winner])
-        test = self._journal.evidence_of(self._journal.tests_of(models, self._rule(round)))
-        environment = self._numbers(models)
-        self._journal.record_once("reduced", number, winner, environment=environment, evidence_test=test)
-        self._look_at(test)
-
-    def _look_at(self, test: int | None) -> None:
-        """The schemas see `test`, the last similar run."""
-        assert test is not None
-        self._foreseen = Memory()
-        self._evidence = self._sight.evidence(
-            self._journal.state, test, rows_of(self._journal.file, test), self._trials
-        )
-
-    def _numbers(self, names: Iterable[str]) -> list[int]:
-        """In the order of the world, which may differ from the algorithm's."""
-        return sorted(self._number[name] for name in names)
+# Each is recorded, and answered as the step says.
+_ANSWERS: dict[type, Callable[[Driver, Any], object]] = {
+    steps.Wants: Driver._wants,
+    steps.BaselineRan: Driver._baseline_ran,
+    steps.FailureFixed: Driver._failure_fixed,
+    steps.RoundBegan: Driver._round_began,
+    steps.Judged: Driver._judged,
+    steps.Similar: Driver._similar,
+    steps.RoundEnded: Driver._round_ended,
+    steps.SearchEnded: Driver._search_ended,
+    steps.CertificateDue: Driver._certificate_due,
+    steps.Certified: Driver._certified,
+    steps.SteppedBack: Driver._stepped_back,
+    steps.LeftOut: Driver._left_out,
+}

@@ -2,167 +2,161 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 
-from ddenv.engine.known_tests import KnownTests
-from ddenv.engine.subjects import Asked, Keep, Keeps, current_round
-from ddenv.reduction.acceptance import Acceptance, estimated_rate
-from ddenv.reduction.stepping_back import Refused
-from ddenv.reduction.verdict import Shown, decided_by
+from ddenv.environment import Environment
+from ddenv.errors import UserError
+from ddenv.evidence.rates import Shown, estimated_rate
+from ddenv.evidence.slices import Ties, implies
+from ddenv.runfile.events import EnvironmentNamed, Event, TestLost
 from ddenv.runfile.fold import apply
 from ddenv.runfile.fold_decisions import origin
-from ddenv.runfile.state import AHEAD, BROKEN, FIRST_FRESH_RUN, FRESH, FRESH_RUNS, ISOLATE, Round, RunState, Test
-from ddenv.runfile.store import ROBOT, Event, Motions, RunFile, uncollected
+from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Round, RunState, Test
+from ddenv.runfile.store import Motions, RunFile, uncollected
 from ddenv.runfile.supports import stack_with
+from ddenv.settings import SETTINGS, read
 
-# After these events the search starts again from what the user left.
-STEERED = (
-    "pinned",
-    "unpinned",
-    "adopted",
-    "accepted_other",
-    "went_back",
-    "rate_lost",
-    "left_out",
-    "sliced",
-    "slices_refuted",
-)
-
-
-@dataclass(frozen=True)
-class Leg:
-    """The start of a search: the number of its first round, its n, and the environment that it starts from.
-
-    `n_partitions` is None for the scenario's value. `tests` are those known before, for schemas that learn. `rule` says when a
-    candidate is taken. The groups `again` are left out first.
-    """
-
-    first_round: int
-    n_partitions: int | None
-    environment: tuple[str, ...]
-    pinned: Keep
-    evidence_test: int | None
-    settings: dict[str, Any]
-    rule: Acceptance
-    tests: tuple[int, ...] = ()
-    again: tuple[tuple[str, ...], ...] = ()
+# The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
+FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
 
 class Journal:
-    """The events of a run, `state` folded from them, and what a resumed engine needs of them.
+    """The events of a run, `state` folded from them, and a memo of its finished tests.
 
-    `ledger` holds each finished test as (models, run, full) -> its id; a test in it is never made again, except that one that
-    broke is made twice, and anew by the next engine. Tests that the algorithm asked for have full False, tests that ran to their
-    end full True, most tests both: `early_stop` only changes runs that it cuts. `decisions` are the user's accepts and rejects by
-    (round, candidate), `refused` the sub-environments vetoed or rejected: they stay refused in later rounds, as those do that
-    lose the rate; `refusals` counts how often that changed. `partitions` are those of each round, as numbers of models. `leg` is
-    the current search; once `steered`, a new one has to start. While a user's `command` is obeyed, events hold its number.
+    While a user's `command` is obeyed, events hold its number.
     """
 
     def __init__(self, file: RunFile) -> None:
         self.file = file
         self.state = RunState()
-        self.ledger: dict[tuple[Keep, int, bool], int] = {}
-        self.decisions: dict[tuple[int, int], str] = {}
-        self.refused, self.refusals = Refused(), 0
-        self.steered = False
-        self.leg: Leg | None = None
         self.command: int | None = None
-        self.partitions: dict[int, list[list[int]]] = {}
-        self._keeps: dict[int, Keep] = {}
-        self._sets = Keeps()
-        self._refused_in: dict[Keep, int | None] = {}
-        # n of the last round in each node.
-        self._fineness: dict[int, int] = {}
-        self._seen: set[tuple[str, int | None, int | None]] = set()
-        self._broke: dict[tuple[Keep, int, bool], int] = {}
-        # In the order of verdicts: that of tests, and which of them are made, depend on the number of workers.
-        self._behind_verdicts: dict[int, None] = {}
-        self.known = KnownTests()
-        self._steps_back = 0
-        self._again: tuple[tuple[str, ...], ...] = ()
-        # Of thousands of models, a set that is made anew takes a while to be found in the ledger.
-        self._whole: tuple[tuple[str, ...], Keep] = (), frozenset()
         with uncollected():
-            for event in file.events():
-                self._take(event)
+            for recorded in file.events():
+                self.state = apply(self.state, recorded)
+        self._number_of = {name: number for number, name in enumerate(self.state.elements)}
+        self._memo = _Memo(self.state)
 
-    def record(self, kind: str, motions: Motions | None = None, **data: Any) -> None:
+    def record(self, event: Event, motions: Motions | None = None) -> None:
         """Writes an event."""
-        if self.command is not None:
-            data["command"] = self.command
-        self._take(self.file.append(kind, data, motions))
+        before = self.state
+        self.state = apply(before, self.file.append(event, motions, self.command))
+        self._memo.follow(before, self.state)
 
-    def record_once(self, kind: str, round: int | None = None, candidate: int | None = None, **data: Any) -> None:
-        """Writes an event of a round or a candidate, unless an earlier engine has written it."""
-        if self.has(kind, round, candidate):
-            return
-        if candidate is not None:
-            data["candidate"] = candidate
-        self.record(kind, round=round, **data)
+    # Environments.
 
-    def shown(self, keep: Keep, run: int, full: bool = False) -> Shown:
-        """Whether a finished test showed f; None if it is not made yet. With `full` only a run to the end counts."""
-        test = self.ledger.get((keep, run, full))
-        if test is None:
-            return None
-        outcome = self.state.tests[test - 1].outcome
-        return "broken" if outcome in BROKEN else outcome == "similar"
+    def models(self, names: Iterable[str]) -> Environment:
+        """The environment of those of these models that are elements."""
+        return Environment.of(self._number_of[name] for name in names if name in self._number_of)
 
-    def tests_of(self, keep: Keep, rule: Acceptance) -> list[int]:
-        """The tests behind the verdict on `keep`, in the order of runs."""
-        return [self.ledger[keep, run, False] for run in range(decided_by(lambda run: self.shown(keep, run), rule))]
+    def pairs(self, names: Iterable[tuple[str, str]]) -> tuple[tuple[int, int], ...]:
+        """Pairs of models by number."""
+        return tuple((self._number_of[first], self._number_of[second]) for first, second in names)
+
+    def in_order(self, times: Mapping[str, float]) -> tuple[tuple[int, float], ...]:
+        """`times` by name, s, as (model, s) in order of time; only for elements."""
+        numbers = self._number_of
+        pairs = sorted((seconds, numbers[name]) for name, seconds in times.items() if name in numbers)
+        return tuple((number, seconds) for seconds, number in pairs)
+
+    def number(self, environment: Environment) -> int:
+        """The number of an environment. An event names it the first time."""
+        known = self._memo.numbers.get(environment)
+        if known is None:
+            known, command = len(self.state.environments), self.command
+            # A command is not obeyed by that.
+            self.command = None
+            self.record(EnvironmentNamed(known, environment))
+            self.command = command
+        return known
+
+    @property
+    def environment(self) -> Environment:
+        """What is left now."""
+        return self.state.environments[self.state.nodes[self.state.node].id]
+
+    @property
+    def whole(self) -> Environment:
+        """The models in the world that f was seen in: what is left has to keep its rate."""
+        return self.state.environments[origin(self.state, self.state.node).id]
+
+    @property
+    def pinned(self) -> Environment:
+        return self.models(self.state.pinned)
+
+    def without(self, name: str) -> Environment:
+        """What is left without a model, or without all of its stack."""
+        return self.environment - self.models(stack_with(self.state, self.state.environment, name))
+
+    def is_refused_by_user(self, environment: Environment) -> bool:
+        return any(refusal.environment == environment for refusal in self.state.refused)
+
+    def is_refused(self, environment: Environment) -> bool:
+        """Whether the user refused it, or it is part of what lost the rate of what counts as f now."""
+        lost = (lost for failures, lost in self.state.lost if failures == self.state.failures)
+        return self.is_refused_by_user(environment) or any(environment <= one for one in lost)
+
+    # Tests.
+
+    def test(self, environment: Environment, run: int, full: bool = False) -> Test | None:
+        """The finished test of a run; None if it has to be made. With `full` only a run to its end counts."""
+        number = self._memo.numbers.get(environment)
+        test = None if number is None else self._memo.tests.get((number, run, full))
+        return None if test is None else self.state.tests[test - 1]
+
+    def tests(self, environment: Environment, runs: Iterable[int], full: bool = False) -> tuple[int, ...]:
+        """The numbers of the finished tests among these runs."""
+        tests = (self.test(environment, run, full) for run in runs)
+        return tuple(test.id for test in tests if test is not None)
+
+    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
+        """Whether a run showed f; None if it is not made yet."""
+        test = self.test(environment, run, full)
+        return None if test is None else "broken" if test.outcome in BROKEN else test.outcome == "similar"
 
     def evidence_of(self, tests: Iterable[int]) -> int:
         """The first of `tests` that showed f."""
         return next(test for test in tests if self.state.tests[test - 1].outcome == "similar")
 
-    @property
-    def rule(self) -> Acceptance:
-        """When a candidate is taken in the current search."""
-        return self._rule() if self.leg is None else self.leg.rule
+    def is_full(self, phase: str) -> bool:
+        """Whether tests of this phase run to the end even if the robot is stuck for good."""
+        return phase not in ("round", "hand", "audit") or not read(self.state.scenario, SETTINGS["early_stop"])
 
-    def _rule(self) -> Acceptance:
-        """By what is known of the whole world now; in the first search, by the baseline alone."""
-        reduction, baseline = self.state.scenario["reduction"], self.state.baseline
-        most_misses = 1 + reduction["iterations"]
-        if reduction["accept_rate"] == "first" or baseline is None:
-            return Acceptance(most_misses)
-        first = self.leg is None and not self.steered
-        rate = estimated_rate(baseline.failures, baseline.runs) if first else self.rate_of_whole()
-        return Acceptance(most_misses, rate, reduction["keep_rate"], self._steps_back)
+    def implying(self, environment: Environment, run: int, full: bool) -> int | None:
+        """The first test that implies the run of an environment, if there is one."""
+        ties = self.ties
+        if ties is None:
+            return None
+        made = self._memo.implying[run, full]
+        return next((test for took_part, there, test in made if implies(took_part, there, environment, ties)), None)
+
+    @property
+    def ties(self) -> Ties | None:
+        """The ties of the run; None where no slices may be used: unwanted, unknown ties, or an audit that found a difference."""
+        state = self.state
+        if state.ties is None or state.refuted is not None or not read(state.scenario, SETTINGS["slice"]):
+            return None
+        return self._memo.ties(state, self._number_of)
+
+    @property
+    def rested_on(self) -> tuple[Test, ...]:
+        """The tests that decisions rest on, without those that only ran ahead of time."""
+        state, began = self.state, self.state.baseline is not None
+        return tuple(
+            test for test in state.tests if state.rests_on >> test.id & 1 or (began and test.phase == "baseline")
+        )
 
     def rate_of_whole(self) -> float:
         """The estimated rate of f in the whole world, or where a branch begins whose f is another failure."""
-        # Fresh runs that only ran ahead of time would make it depend on the number of workers.
-        named = (test for test in self.state.tests if test.phase not in (*FRESH, ISOLATE) or self._rests_on(test))
-        tests = [test for test in named if self.keep_of_test(test.id) == self.whole]
+        whole, state = self._memo.numbers[self.whole], self.state
+        tests = [
+            test
+            for test in state.tests
+            # Fresh runs that only ran ahead of time would make it depend on the number of workers.
+            if test.environment == whole and (test.phase not in (CERTIFY, ISOLATE) or state.rests_on >> test.id & 1)
+        ]
         sound = [test for test in tests if test.is_finished and test.outcome not in BROKEN]
         return estimated_rate(sum(test.outcome == "similar" for test in sound), len(sound))
-
-    @property
-    def whole(self) -> Keep:
-        """The models in the world that f was seen in: what is left has to keep its rate."""
-        environment = origin(self.state, self.state.node).environment
-        if self._whole[0] is not environment:
-            self._whole = environment, frozenset(environment)
-        return self._whole[1]
-
-    @property
-    def has_broken(self) -> bool:
-        """Whether tests broke twice, so that a verdict or a claim is unknown."""
-        return any(self._leaves_unknown(self.state.tests[test - 1]) for test in self.ledger.values())
-
-    def _leaves_unknown(self, test: Test) -> bool:
-        """A baseline that is done, and a certificate, may do without a few runs that broke."""
-        if test.outcome not in BROKEN or test.phase == ISOLATE:
-            return False
-        if test.phase == "baseline":
-            return self.state.baseline is None
-        last = self.state.certificates[-1:]
-        return test.phase not in FRESH or any(claim.verdict == "unknown" for one in last for claim in one.claims)
 
     @property
     def fresh_run(self) -> int:
@@ -173,228 +167,88 @@ class Journal:
         return last.first_run + max(FRESH_RUNS, 2 * last.at_least)
 
     @property
-    def steps_back(self) -> int:
-        """How often the search went back because what was left had lost the rate."""
-        return self._steps_back
-
-    @property
-    def rested_on(self) -> tuple[int, ...]:
-        """The tests that decisions rest on, without those that only ran ahead of time."""
-        tests, began = self.state.tests, self.state.baseline is not None
-        return tuple(test.id for test in tests if self._rests_on(test) or (began and test.phase == "baseline"))
-
-    def _rests_on(self, test: Test) -> bool:
-        return bool(self.state.rests_on >> test.id & 1)
-
-    def keep_of_test(self, test: int) -> Keep:
-        """The models in a test's world."""
-        return self._keeps[test]
-
-    def begin_leg(self) -> Leg:
-        """The current search, or a new one if the user changed something. It starts with the last n used here."""
-        if self.steered:
-            first = max(self.partitions, default=0) + 1
-            self.record("leg_started", round=first, n_partitions=self._fineness.get(self.state.node))
-        if self.leg is None:
-            state = self.state
-            f = None if state.baseline is None else state.baseline.failure_test
-            self.leg = Leg(1, None, state.elements, frozenset(), f, state.scenario["reduction"], self._rule())
-        return self.leg
-
-    def _leg(self, first_round: int, n_partitions: int | None) -> Leg:
+    def has_broken(self) -> bool:
+        """Whether tests broke, so that the baseline, a verdict or a claim is unknown."""
         state = self.state
-        known = tuple(test for test in self._behind_verdicts if state.tests[test - 1].is_finished)
-        return Leg(
-            first_round,
-            n_partitions,
-            state.environment,
-            state.pinned,
-            state.evidence_test,
-            state.scenario["reduction"],
-            self._rule(),
-            known,
-            self._again,
-        )
-
-    def is_full(self, phase: str) -> bool:
-        """Whether tests of this phase run to the end even if the robot is stuck for good."""
-        return phase not in ("round", AHEAD, "hand", "audit") or not self.state.scenario["reduction"].get(
-            "early_stop", False
-        )
-
-    def start_test(self, asked: Asked, audits: int | None = None) -> int:
-        """Writes that a test starts, although the test `audits` implies it; returns its id. Raises as `Asked.place`."""
-        return self._begin("test_started", asked, None, {} if audits is None else {"audits": audits})
-
-    def imply(self, asked: Asked, source: int) -> int:
-        """Writes the result of a test that the finished test `source` implies; returns its id. Raises as `Asked.place`."""
-        return self._begin("implied", asked, {ROBOT: source}, {"by": source})
-
-    def _begin(self, kind: str, asked: Asked, motions: Motions | None, more: dict[str, int]) -> int:
-        place, test = asked.place(self.state), len(self.state.tests) + 1
-        self._keeps[test] = asked.keep
-        self.record(kind, motions, test=test, **place, **more)
-        return test
-
-    def implying(self, keep: Keep, run: int, full: bool) -> int | None:
-        """The finished test that implies this one, if there is one."""
-        return self.known.implying(self.state, keep, run, full)
-
-    def without(self, name: str) -> Keep:
-        """The environment without a model, or without all of its stack."""
-        environment = self.state.environment
-        return frozenset(environment) - frozenset(stack_with(self.state, environment, name))
+        return state.left_unknown or (state.baseline is None and any(state.tally[outcome] for outcome in BROKEN))
 
     def lose_running(self) -> None:
         """Records tests that were started and never ended as lost."""
-        for test in self.state.tests:
-            if test.outcome == "running":
-                self.record("test_lost", test=test.id)
+        for test in self.state.running_tests:
+            self.record(TestLost(test.id))
 
     @property
     def current(self) -> Round:
         """The current round. Raises UserError before the first round."""
-        return current_round(self.state)
+        if self.state.round is None:
+            raise UserError("damaged run file: there is no round yet")
+        return self.state.round
 
-    def has(self, kind: str, round: int | None = None, candidate: int | None = None) -> bool:
-        """Whether an event of a round or a candidate is already written."""
-        return (kind, round, candidate) in self._seen
 
-    def _take(self, event: Event) -> None:
-        self.state = apply(self.state, event)
-        data = event.data
-        self._seen.add((event.kind, data.get("round"), data.get("candidate")))
-        follow = _FOLLOWED.get(event.kind)
-        if follow is not None:
-            follow(self, data)
-        if event.kind in STEERED:
-            self.steered = True
-        self.refused.count_as_f(self.state.failures)
+class _Memo:
+    """The finished tests of a run by (environment, run, full). A test in it is never made again, but one that broke is made twice,
+    and again by the next engine where a verdict needs it.
 
-    def _round_started(self, data: dict[str, Any]) -> None:
-        self.partitions[data["round"]] = data["partitions"]
-        self._fineness[self.state.node] = data["n_partitions"]
+    Tests that the search asked for have full False, tests that ran to their end full True, most tests both: `early_stop` only
+    changes runs that it cuts.
+    """
 
-    def _arrived(self, _: dict[str, Any]) -> None:
-        if (round := self.state.round) is not None:
-            self._fineness[self.state.node] = round.n_partitions
+    def __init__(self, state: RunState) -> None:
+        self.tests: dict[tuple[int, int, bool], int] = {}
+        self.numbers: dict[Environment, int] = {}
+        # By run: what took part in a simulated test, its models, its number.
+        self.implying: dict[tuple[int, bool], list[tuple[Environment, Environment, int]]] = defaultdict(list)
+        self._broke: dict[tuple[int, int, bool, int], int] = {}
+        self._ties: tuple[object, Ties] = None, Ties.among(())
+        self._state = state
+        self.follow(RunState(), state)
 
-    def _leg_started(self, data: dict[str, Any]) -> None:
-        self.leg, self.steered = self._leg(data["round"], data["n_partitions"]), False
-        self._again = ()
-
-    def _engine_started(self, _: dict[str, Any]) -> None:
-        """Tests that broke are made again; verdicts that rest on them may change, so the search starts again."""
-        broke = {key: test for key, id in self.ledger.items() if (test := self.state.tests[id - 1]).outcome in BROKEN}
-        again = [test for test in broke.values() if self._leaves_unknown(test)]
-        for key in [key for key, test in broke.items() if test in again or test.phase == ISOLATE]:
-            del self.ledger[key]
-        self._broke.clear()
-        if again and self.state.baseline is not None:
-            self.steered = True
-
-    def _compared(self, data: dict[str, Any]) -> None:
-        """What was made with something else implies nothing of tests that are made now."""
-        if not data["same"]:
-            self.known = KnownTests()
-
-    def _slices_refuted(self, _: dict[str, Any]) -> None:
-        """What was implied is wanted again."""
-        tests = self.state.tests
-        self.ledger = {key: test for key, test in self.ledger.items() if tests[test - 1].implied_by is None}
-
-    def _rate_lost(self, data: dict[str, Any]) -> None:
-        """What has lost the rate, and all parts of it, are not taken again."""
-        elements = self.state.elements
-        self._steps_back += 1
-        self._again = tuple(tuple(elements[model] for model in group) for group in data["again"])
-        self.refused.lose(frozenset(self.state.nodes[data["lost"]].environment))
-
-    def _test_started(self, data: dict[str, Any]) -> None:
-        self._keeps.setdefault(data["test"], self._sets.of(self.state, self.state.tests[-1]))
-
-    def _test_finished(self, data: dict[str, Any]) -> None:
-        self._enter(self.state.tests[data["test"] - 1])
-
-    def _implied(self, data: dict[str, Any]) -> None:
-        self._test_started(data)
-        self._test_finished(data)
-
-    def _decided(self, data: dict[str, Any]) -> None:
-        round, candidate = data["round"], data["candidate"]
-        self.decisions[round, candidate] = data["decision"]
-        if data["decision"] == "reject":
-            self._refuse(self._sets.of_candidate(self.state, candidate), "rejected", round)
-
-    def _verdict_on(self, data: dict[str, Any]) -> None:
-        self._behind_verdicts |= dict.fromkeys(data["tests"])
-
-    def _vetoed(self, data: dict[str, Any]) -> None:
-        self._refuse(self._sets.of_candidate(self.state, data["candidate"]), data["verdict"], data.get("round"))
-
-    def _unvetoed(self, data: dict[str, Any]) -> None:
-        """A refusal in an earlier round has blocked candidates since, so the search starts again."""
-        keep, round = self._sets.of_candidate(self.state, data["candidate"]), data["round"]
-        self.refused.pop(keep, None)
-        self.decisions.pop((round, data["candidate"]), None)
-        # A rejected candidate was judged, and is judged again.
-        self._seen.discard(("candidate_judged", round, data["candidate"]))
-        self.refusals += 1
-        if self._refused_in.pop(keep, None) != round:
-            self.steered = True
-
-    def _refuse(self, keep: Keep, verdict: str, round: int | None = None) -> None:
-        self.refused.setdefault(keep, verdict)
-        self._refused_in.setdefault(keep, round)
-        self.refusals += 1
-
-    def _changed(self, data: dict[str, Any]) -> None:
-        """The budget does not change the order of a search."""
-        if set(data["settings"]) != {"budget"}:
-            self.steered = True
-
-    def _went_back(self, data: dict[str, Any]) -> None:
-        """An undone reduction is not accepted again; an environment that the user goes to is wanted."""
-        nodes = self.state.nodes
-        wanted = frozenset(nodes[data["node"]].environment)
-        self.refused.allow(wanted)
-        self._refused_in.pop(wanted, None)
-        if data.get("rejected") is not None:
-            self._refuse(frozenset(nodes[data["rejected"]].environment), "undone")
+    def follow(self, before: RunState, after: RunState) -> None:
+        """Takes in what one event, or a whole file, changed."""
+        self._state = after
+        for number in range(len(before.environments), len(after.environments)):
+            self.numbers[after.environments[number]] = number
+        if after.mixed_until != before.mixed_until:
+            # What was made with something else implies nothing of tests that are made now.
+            self.implying.clear()
+        if after.tests is not before.tests:
+            for test in after.tests.changed_since(before.tests):
+                self._enter(test)
+        if after.engines != before.engines:
+            tests = {key: after.tests[test - 1] for key, test in self.tests.items()}
+            broken = {key: test for key, test in tests.items() if test.outcome in BROKEN}
+            for key in (key for key, test in broken.items() if self._is_made_again(test)):
+                del self.tests[key]
+        if after.refuted is not before.refuted:
+            tests = {key: after.tests[test - 1] for key, test in self.tests.items()}
+            self.tests = {key: test.id for key, test in tests.items() if test.implied_by is None}
 
     def _enter(self, test: Test) -> None:
-        keep = self._keeps[test.id]
+        if not test.is_finished:
+            return
         if test.outcome in BROKEN:
-            full = self.is_full(test.phase)
-            self._broke[keep, test.run, full] = broken = self._broke.get((keep, test.run, full), 0) + 1
-            if broken < 2:
+            key = test.environment, test.run, test.phase == CERTIFY, test.engine
+            self._broke[key] = self._broke.get(key, 0) + 1
+            if self._broke[key] < 2:
                 return
-        for full, holds in ((False, test.phase not in FRESH), (True, not test.cut)):
-            if holds:
-                self.ledger[keep, test.run, full] = test.id
-                self.known.enter(test, keep, full)
+        for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
+            if not holds:
+                continue
+            self.tests[test.environment, test.run, full] = test.id
+            simulated = test.implied_by is None and test.outcome not in BROKEN
+            if test.took_part is not None and simulated and test.id > self._state.mixed_until:
+                there = self._state.environments[test.environment]
+                self.implying[test.run, full].append((test.took_part, there, test.id))
 
+    def _is_made_again(self, test: Test) -> bool:
+        """A baseline that is done, and a certificate, may do without a few runs that broke."""
+        if test.phase == "baseline":
+            return self._state.baseline is None
+        last = self._state.certificates[-1:]
+        return test.phase != CERTIFY or any(claim.verdict == "unknown" for one in last for claim in one.claims)
 
-_FOLLOWED: dict[str, Callable[[Journal, dict[str, Any]], None]] = {
-    "engine_started": Journal._engine_started,
-    "compared": Journal._compared,
-    "rate_lost": Journal._rate_lost,
-    "candidate_judged": Journal._verdict_on,
-    "trial_judged": Journal._verdict_on,
-    "round_started": Journal._round_started,
-    "reduced": Journal._arrived,
-    "adopted": Journal._arrived,
-    "left_out": Journal._arrived,
-    "sliced": Journal._arrived,
-    "slices_refuted": Journal._slices_refuted,
-    "accepted_other": Journal._arrived,
-    "leg_started": Journal._leg_started,
-    "test_started": Journal._test_started,
-    "test_finished": Journal._test_finished,
-    "implied": Journal._implied,
-    "decided": Journal._decided,
-    "vetoed": Journal._vetoed,
-    "unvetoed": Journal._unvetoed,
-    "went_back": Journal._went_back,
-    "changed": Journal._changed,
-}
+    def ties(self, state: RunState, number_of: dict[str, int]) -> Ties:
+        if self._ties[0] is not state.ties:
+            pairs = ((number_of[name], number_of[other]) for name, other in state.ties or ())
+            self._ties = state.ties, Ties.among(pairs)
+        return self._ties[1]

@@ -12,6 +12,7 @@ from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure, Judgement, judge, judge_trajectory
 from ddenv.robot.result import RunResult
+from ddenv.runfile.events import Outcomes
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
@@ -89,15 +90,16 @@ def failure_of(file: RunFile, state: RunState, test: int, spec: FailureSpec) -> 
     return Failure(end, rows_of(file, test), spec.epsilon, spec.similarity)
 
 
-def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> dict[str, dict[str, Any]]:
-    """The outcomes of all failed tests so far, judged by `failures`, and their distances in m, by test id."""
-    outcomes, distances = {}, {}
+def rejudged(file: RunFile, state: RunState, failures: tuple[Failure, ...]) -> Outcomes:
+    """The outcomes of all failed tests so far, judged by `failures`."""
+    outcomes: dict[int, str] = {}
+    distances: dict[int, float] = {}
     for test in state.tests:
         if test.outcome not in ("similar", "other"):
             continue
         judged = nearest([judge_trajectory(rows_of(file, test.id), failure) for failure in failures])
-        outcomes[str(test.id)], distances[str(test.id)] = judged.outcome, judged.distance
-    return {"outcomes": outcomes, "distances": distances}
+        outcomes[test.id], distances[test.id] = judged.outcome, judged.distance
+    return Outcomes(outcomes, distances)
 
 
 def rows_of(file: RunFile, test: int) -> np.ndarray:

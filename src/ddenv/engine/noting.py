@@ -8,6 +8,7 @@ from ddenv.amounts import about, count, duration
 from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Pace
 from ddenv.errors import UserError
+from ddenv.runfile.events import Noted
 from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import rough_run
 from ddenv.settings import SETTINGS, read
@@ -25,7 +26,7 @@ HELPS = "what helps: fewer models that can move, a shorter --timeout, another si
 def note(journal: Journal, about: str, words: str) -> None:
     """Writes an event with a sentence, unless one `about` the same is there."""
     if not is_noted(journal, about):
-        journal.record("noted", about=about, words=words)
+        journal.record(Noted(about, words))
 
 
 def is_noted(journal: Journal, about: str) -> bool:

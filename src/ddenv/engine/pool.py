@@ -15,8 +15,7 @@ from multiprocessing.connection import wait
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
-from ddenv.engine.memory_limit import memory_limit, too_large
-from ddenv.engine.wall_limit import GENEROUS
+from ddenv.engine.limits import GENEROUS, memory_limit, too_large
 from ddenv.engine.worker import POSE, Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
 from ddenv.engine.worker_process import WorkerProcess
 from ddenv.errors import UserError

@@ -7,11 +7,12 @@ import numpy as np
 from ddenv.engine.control import Control
 from ddenv.engine.journal import Journal
 from ddenv.engine.judging import rows_of
+from ddenv.engine.limits import wall_limit
 from ddenv.engine.pool import Broken
-from ddenv.engine.wall_limit import wall_limit
 from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
+from ddenv.runfile.events import Compared, Comparing
 from ddenv.runfile.state import RunState, Test
 
 # How long to wait for the test before looking at commands again, s.
@@ -27,7 +28,7 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     test = _comparable(state)
     if state.physics.now == state.physics.proven or test is None:
         return
-    journal.record("comparing", test=test.id)
+    journal.record(Comparing(test.id))
     pool.submit(0, frozenset(state.elements), test.seed, limit=wall_limit(state))
     while not (ended := pool.finished(WAIT)):
         control.poll()
@@ -35,7 +36,7 @@ def check_repeats(journal: Journal, pool: Workers, control: Control, mixed: bool
     same = isinstance(result, RunResult) and np.array_equal(result.trajectory, rows_of(journal.file, test.id))
     if not same and not mixed:
         raise UserError(_differs(journal, result))
-    journal.record("compared", same=same)
+    journal.record(Compared(same))
 
 
 def _comparable(state: RunState) -> Test | None:

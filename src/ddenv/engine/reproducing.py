@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import count
-from ddenv.claims import current
-from ddenv.engine.single_test import Subject, in_folder, plan, run_trials, subject_of_run
+from ddenv.engine.single_test import plan, run_trials
 from ddenv.errors import UserError
-from ddenv.rates import shows_at
+from ddenv.evidence.claims import current
+from ddenv.evidence.rates import shows_at
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN
 from ddenv.runfile.store import RunFile
-from ddenv.runs.trust import check_trusted, program_of, trust
+from ddenv.runs.subject import Subject, read_subject
+from ddenv.runs.trust import check_trusted, trust, untrusted
 
 # Far from all seeds of a reduction and of its certificates.
 FIRST_SEED = 1_000_000_000
@@ -46,14 +47,16 @@ class Reproduction:
 def subject_in(run: Path, folder: Path | None) -> Subject:
     """The world of a run; the user's own controller or simulator is that in `folder`, if given. Raises UserError."""
     with RunFile(run) as file:
-        subject = subject_of_run(file)
-    return subject if folder is None else in_folder(subject, folder)
+        subject = read_subject(file)
+    if folder is None:
+        return subject
+    return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
 
 
 def last_of(run: Path, folder: Path | None, most: int, jobs: int, trusted: bool) -> Reproduction:
     """What all runs of `reproduce` show together. Raises UserError, also for a program that is not trusted."""
     subject = subject_in(run, folder)
-    if trusted and (program := program_of(subject.scenario)) is not None:
+    if trusted and (program := untrusted(subject.scenario)):
         trust(program)
     check_trusted(subject.scenario, run)
     *_, (_, found) = reproduce(subject, expected(subject, run).low, most, jobs)

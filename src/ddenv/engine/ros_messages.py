@@ -1,6 +1,7 @@
 """ROS 2 messages as plain data, with their definitions: what Foxglove, Rerun and `ros2 bag` read.
 
-Names, fields and units are those of ROS 2 (common_interfaces and geometry2): m, s, rad, and quaternions x, y, z, w.
+Names, fields and units are those of ROS 2 (common_interfaces and geometry2): m, s, rad, and quaternions x, y, z, w. What a
+message lacks is written as zeros, empty texts and empty lists.
 """
 
 from __future__ import annotations
@@ -144,21 +145,11 @@ def marker(
         "ns": name,
         "id": number,
         "type": kind,
-        "action": 0,
         "pose": pose(at),
         "scale": vector(*size),
         "color": dict(zip("rgba", color, strict=True)),
-        "lifetime": {"sec": 0, "nanosec": 0},
         "frame_locked": True,
         "points": [vector(*point) for point in points],
-        "colors": [],
-        "texture_resource": "",
-        "texture": {"header": header(0.0, ""), "format": "", "data": b""},
-        "uv_coordinates": [],
-        "text": "",
-        "mesh_resource": "",
-        "mesh_file": {"filename": "", "data": b""},
-        "mesh_use_embedded_materials": False,
     }
 
 

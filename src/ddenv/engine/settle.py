@@ -8,6 +8,7 @@ from ddenv.engine.noting import note
 from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import notes_on
+from ddenv.runfile.events import Still, Supports, SupportsStarted
 from ddenv.world.inside import notes_on_start
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
@@ -27,8 +28,8 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
     """
     moves = any(model.links and not model.static for model in world.models)
     if not moves and scenario.reduction.slice and journal.state.ties is None:
-        journal.record("still")
-    if journal.has("supports") or not moves:
+        journal.record(Still())
+    if journal.state.ties is not None or journal.state.unsettled or journal.state.supports or not moves:
         return
     needed = scenario.reduction.keep_supports
     if scenario.oracle is not None:
@@ -38,15 +39,13 @@ def settle(scenario: Scenario, world: World, journal: Journal, bench: Bench) -> 
             )
         return
     elements = journal.state.elements
-    found = bench.settle(frozenset(elements), lambda: journal.record("supports_started"))
+    found = bench.settle(frozenset(elements), lambda: journal.record(SupportsStarted()))
     if not isinstance(found, Broken):
         for about, words in notes_on(world, found.settled):
             note(journal, about, words)
-        number = {name: index for index, name in enumerate(elements)}
-        pairs = [[number[upper], number[lower]] for upper, lower in found.supports]
-        ties = None if found.ties is None else [[number[name], number[other]] for name, other in found.ties]
-        journal.record("supports", pairs=pairs, ties=ties)
+        ties = None if found.ties is None else journal.pairs(found.ties)
+        journal.record(Supports(journal.pairs(found.supports), ties))
     elif needed:
         raise UserError(f"reduction.keep_supports: what rests on what is unknown: {found.failure}")
     else:
-        journal.record("supports", pairs=[], why=found.failure)
+        journal.record(Supports((), why=found.failure))

@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 
 from ddenv import processor
-from ddenv.engine.journal import Journal
 from ddenv.engine.pool import Broken, Pace
-from ddenv.engine.subjects import Keep
 from ddenv.engine.worker import Start
 from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
-from ddenv.runfile.events import as_it_was
-from ddenv.runfile.state import Test
+from ddenv.runfile.events import Created, EngineStarted
+from ddenv.runfile.fold import fold
+from ddenv.runfile.state import CERTIFY, Test
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
 from ddenv.runs.folder import SUFFIX
 from ddenv.version import __version__
@@ -34,7 +33,8 @@ OURS = ("straight", "costmap")
 # What the physics, the noise and the navigation are computed with.
 PACKAGES = ("drake", "numpy", "scipy")
 
-Key = tuple[Keep, int, bool]
+# Models, seed, and whether the test ran to its end.
+Key = tuple[frozenset[str], int, bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,7 @@ class Place:
 
     path: Path
     test: Test
+    elements: tuple[str, ...]
 
 
 def simulator() -> str:
@@ -79,40 +80,40 @@ def tests_of_others(run: RunFile, scenario: Scenario, folder: Path) -> dict[Key,
 
 
 def _tests_of(other: RunFile) -> Iterator[tuple[Key, Place]]:
-    journal = Journal(other)
-    for (keep, _, full), number in journal.ledger.items():
-        test = journal.state.tests[number - 1]
+    state = fold(other.events())
+    for test in state.tests:
         # Another run implies for itself.
         if test.outcome in ("pass", "similar", "other", "failed") and test.implied_by is None:
-            yield (keep, test.seed, full), Place(other.path, test)
+            models = frozenset(state.models_of(test))
+            for full, holds in ((False, test.phase != CERTIFY), (True, not test.cut)):
+                if holds:
+                    yield (models, test.seed, full), Place(other.path, test, state.elements)
 
 
 def _is_alike(run: RunFile, other: RunFile) -> bool:
     """Whether tests of the same models and the same seed are the same in both runs."""
-    first, second = ([event.data for event in file.events(most=1)] for file in (run, other))
-    if not first or not second:
+    first, second = ([recorded.event for recorded in file.events(most=1)] for file in (run, other))
+    if not (first and second and isinstance(first[0], Created) and isinstance(second[0], Created)):
         return False
     ours, theirs = first[0], second[0]
-    asked, elements = _asked(ours.get("scenario")), ours.get("elements")
-    if asked is None or asked != _asked(theirs.get("scenario")) or elements != theirs.get("elements"):
+    asked = _asked(ours.scenario)
+    if asked is None or asked != _asked(theirs.scenario) or ours.elements != theirs.elements:
         return False
     if any(run.documents(name) != other.documents(name) for name in ("world", "robot", "resource ")):
         return False
-    engines = [event.data for event in other.events() if event.kind == "engine_started"]
-    made_with = {(data.get("version"), data.get("simulator"), data.get("machine")) for data in engines}
+    engines = (recorded.event for recorded in other.events())
+    made_with = {(one.version, one.simulator, one.machine) for one in engines if isinstance(one, EngineStarted)}
     return made_with == {(__version__, simulator(), machine())}
 
 
-def _asked(scenario: Any) -> Any:
+def _asked(scenario: dict[str, Any]) -> Any:
     """A scenario without its paths, and of how it is reduced only whether tests end early: the contents of files are compared."""
-    if not isinstance(scenario, dict):
-        return None
     kept = {
         key: value
         for key, value in scenario.items()
         if key not in ("name", "description", "reduction", "world", "folder")
     }
-    robot, reduction = kept.get("robot"), as_it_was(scenario).get("reduction")
+    robot, reduction = kept.get("robot"), scenario.get("reduction")
     if not isinstance(robot, dict) or not isinstance(reduction, dict):
         return None
     return kept | {
@@ -138,7 +139,7 @@ class SharingPool:
     def busy(self) -> int:
         return self._pool.busy + len(self._ready)
 
-    def submit(self, test: int, keep: Keep, seed: int, full: bool = True, limit: float | None = None) -> None:
+    def submit(self, test: int, keep: frozenset[str], seed: int, full: bool = True, limit: float | None = None) -> None:
         """Reuses the test, or starts it on an idle worker."""
         result = _result(self._known.pop((keep, seed, full), None))
         if result is None:
@@ -151,7 +152,7 @@ class SharingPool:
         ready, self._ready = self._ready, []
         return sorted([*ready, *self._pool.finished(0.0 if ready else seconds)], key=lambda one: one[0])
 
-    def settle(self, elements: Keep) -> Callable[[], Start | Broken | None]:
+    def settle(self, elements: frozenset[str]) -> Callable[[], Start | Broken | None]:
         """As `Pool.settle`."""
         return self._pool.settle(elements)
 
@@ -192,6 +193,6 @@ def _result(place: Place | None) -> RunResult | None:
         first_sensed=dict(test.first_sensed),
         first_touched=dict(test.first_touched),
         cut=test.cut,
-        took_part=test.took_part,
+        took_part=None if test.took_part is None else frozenset(test.took_part.names(place.elements)),
         taken=place.path.stem,
     )

@@ -11,32 +11,9 @@ from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.pool import Pool
 from ddenv.errors import UserError
 from ddenv.robot.oracle import Failure
-from ddenv.runfile.position import Position, position_in
-from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.tested import purpose
-from ddenv.runs.creation import read_parts
-from ddenv.world.model import Model, World
-from ddenv.world.scenario import Oracle, Scenario
-
-
-@dataclass(frozen=True)
-class Subject:
-    """What to run; in a run, `position` finds earlier states.
-
-    `failures` count as f in a run whose baseline is done; without them a failed run is just "failed".
-    """
-
-    scenario: Scenario
-    world: World
-    robot: Model
-    state: RunState | None = None
-    failures: tuple[Failure, ...] = ()
-    position: Position | None = None
-
-    @property
-    def elements(self) -> tuple[str, ...]:
-        return self.world.elements(frozenset(self.scenario.protected))
+from ddenv.runs.subject import Subject
+from ddenv.world.scenario import Oracle
 
 
 @dataclass(frozen=True)
@@ -46,19 +23,6 @@ class Trial:
     keep: frozenset[str]
     seed: int
     without: str | None = None
-
-
-def subject_of_run(file: RunFile) -> Subject:
-    """The world of a run, with its f if the baseline is done."""
-    scenario, world, robot = read_parts(file)
-    position = position_in(file.events())
-    failures = failures_of(file, position.end, scenario.failure)
-    return Subject(scenario, world, robot, position.end, failures, position)
-
-
-def in_folder(subject: Subject, folder: Path) -> Subject:
-    """The same, with the user's own controller or simulator from `folder`."""
-    return replace(subject, scenario=subject.scenario.model_copy(update={"folder": folder.absolute()}))
 
 
 def in_simulator(subject: Subject, simulator: Oracle, robot: Path) -> Subject:
@@ -112,15 +76,19 @@ def _of_test(subject: Subject, number: int) -> tuple[tuple[str, ...], int]:
     """The models and the seed of a test of the run."""
     if subject.position is None:
         raise UserError("--test: needs a run; a scenario has no tests yet")
-    start = subject.position.start_of(number)
-    if start is None:
-        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(subject.position.end.tests)}")
-    test = start.after.tests[number - 1]
-    return purpose(start.after, test).models or (), test.seed
+    state = subject.position.end
+    if not 0 < number <= len(state.tests):
+        raise UserError(f"--test: there is no test {number}; the run has tests 1 to {len(state.tests)}")
+    test = state.tests[number - 1]
+    return state.models_of(test), test.seed
 
 
 def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dict[str, Any]]:
-    """Makes the runs in worker processes; yields the result of each, in order, as plain data."""
+    """Makes the runs in worker processes; yields the result of each, in order, as plain data.
+
+    In a run whose baseline is done they are judged by its f; else a failed run is just "failed".
+    """
+    failures = _failures(subject)
     pool = Pool(subject.scenario, subject.world, subject.robot, max(1, min(jobs, len(trials))))
     results: dict[int, dict[str, Any]] = {}
     started = shown = 0
@@ -132,9 +100,17 @@ def run_trials(subject: Subject, trials: list[Trial], jobs: int) -> Iterator[dic
             for index, result in pool.finished(1.0):
                 trial = trials[index]
                 asked = {"seed": trial.seed, "without": trial.without, "models": len(trial.keep)}
-                results[index] = asked | result_data(result, subject.failures)
+                results[index] = asked | result_data(result, failures)
             while shown in results:
                 yield results.pop(shown)
                 shown += 1
     finally:
         pool.close()
+
+
+def _failures(subject: Subject) -> tuple[Failure, ...]:
+    """What counts as f."""
+    if subject.run is None or subject.state is None:
+        return ()
+    with RunFile(subject.run) as file:
+        return failures_of(file, subject.state, subject.scenario.failure)

@@ -1,15 +1,25 @@
-"""Cuts the environment down to its slice: what took part in the runs known there, and what that is tied to. It needs no test."""
+"""Slices in a run: without a test, the environment is cut down to what took part in the runs known there. Some of what is implied
+is simulated all the same, and has to repeat the run that implies it to the last bit.
+"""
 
 from __future__ import annotations
 
-from ddenv.engine.auditing import audit_is_due
-from ddenv.engine.bench import Bench
+from collections.abc import Iterable
+from itertools import takewhile
+
 from ddenv.engine.journal import Journal
-from ddenv.engine.subjects import Keep
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.slices import fresh_chance, implies
+from ddenv.reduction.procedure import Test as Wanted
 from ddenv.reduction.stacks import Stacks
-from ddenv.runfile.state import BROKEN, Test
+from ddenv.runfile.events import Sliced, SlicesRefuted
+from ddenv.runfile.fold_claims import rests_on_slices
+from ddenv.runfile.state import BROKEN, CERTIFY, RunState, Test
 from ddenv.runfile.supports import stacks_of
-from ddenv.slices import fresh_chance
+from ddenv.settings import SETTINGS, read
+
+# All that a certificate would take as implied is simulated, while that is at most this part of all simulated time.
+CHEAP = 0.1
 
 
 def slice_environment(journal: Journal) -> bool:
@@ -19,58 +29,103 @@ def slice_environment(journal: Journal) -> bool:
     if the chance that a fresh run meets any of it is at most what may be lost of the rate; and after the baseline in any case.
     In accept mode `ask`, where each reduction waits for the user, it is not done.
     """
-    state = journal.state
-    there = frozenset(state.environment)
+    state, there = journal.state, journal.environment
     tests, met = _known(journal, there)
     if state.accept_mode == "ask" or not any(test.outcome == "similar" for test in tests):
         return False
     reduction = state.scenario["reduction"]
     if state.node and reduction["accept_rate"] == "kept" and fresh_chance(met) > 1.0 - reduction["keep_rate"]:
         return False
-    left = _closed(journal, frozenset[str]().union(*met, state.pinned), there)
-    evidence = state.evidence_test
-    if left == there or left in journal.refused or evidence is None:
+    left = journal.pinned
+    for models in met:
+        left |= models
+    left = _closed(journal, left, there)
+    if left == there or journal.is_refused(left) or state.evidence_test is None:
         return False
-    environment = [number for number, name in enumerate(state.elements) if name in left]
-    chose, audit = [test.id for test in tests], audit_is_due(state)
-    journal.record("sliced", environment=environment, tests=chose, evidence_test=evidence, audit=audit)
+    audit, chose = audit_is_due(state), tuple(test.id for test in tests)
+    journal.record(Sliced(journal.number(left), chose, state.evidence_test, audit))
     return True
 
 
-def audit_slice(journal: Journal, bench: Bench) -> None:
-    """Simulates the last similar run in the slice that the environment was cut down to, if that is due. Raises as `Bench.work`."""
+def slice_audit(journal: Journal) -> tuple[Wanted, ...]:
+    """The last similar run, to be simulated in the slice that the environment was cut down to, if that is due and not made yet."""
     state, here = journal.state, journal.state.here
     if here is None or not here.to_audit or here.evidence_test is None or state.refuted is not None:
-        return
-    keep, run = frozenset(here.environment), state.tests[here.evidence_test - 1].run
-    bench.work("audit", None, lambda: [] if (keep, run, False) in journal.ledger else [(keep, run, None)])
+        return ()
+    environment, run = journal.environment, state.tests[here.evidence_test - 1].run
+    return () if journal.test(environment, run) is not None else (Wanted(environment, run, "audit"),)
 
 
-def _known(journal: Journal, there: Keep) -> tuple[list[Test], list[Keep]]:
+def _known(journal: Journal, there: Environment) -> tuple[list[Test], list[Environment]]:
     """The runs known of the models `there`, of those that decisions rest on, and what took part in each seed's.
 
     None where slices may not be used, or where it is unknown what took part in one of them.
     """
-    state, found, met = journal.state, list[Test](), dict[int, Keep]()
-    for number in journal.rested_on:
-        test = state.tests[number - 1]
+    tests: list[Test] = []
+    met: dict[int, Environment] = {}
+    ties = journal.ties
+    for test in journal.rested_on:
         if not test.is_finished or test.outcome in BROKEN:
             continue
-        took_part = journal.known.took_part(state, test, journal.keep_of_test(number), there)
-        if took_part is not None:
-            found.append(test)
-            met[test.run] = met.get(test.run, frozenset()) | took_part
-        elif journal.keep_of_test(number) == there:
+        environment = journal.state.environments[test.environment]
+        if ties is not None and test.took_part is not None and implies(test.took_part, environment, there, ties):
+            tests.append(test)
+            met[test.run] = met.get(test.run, NOTHING) | test.took_part
+        elif environment == there:
             return [], []
-    return found, list(met.values())
+    return tests, list(met.values())
 
 
-def _closed(journal: Journal, models: Keep, there: Keep) -> Keep:
+def _closed(journal: Journal, models: Environment, there: Environment) -> Environment:
     """`models`, with what goes together with them."""
-    ties, state = journal.known.ties(journal.state), journal.state
+    ties, state, before = journal.ties, journal.state, NOTHING
     assert ties is not None
-    together, before = Stacks.of(stacks_of(state, state.environment)), frozenset[str]()
+    together = Stacks.of(map(journal.models, stacks_of(state, state.environment)))
     while models != before:
         before = models
         models = together.of_any(ties.closed(models, there))
     return models
+
+
+def audit_is_due(state: RunState, phase: str = "") -> bool:
+    """Whether the next implied test has to be simulated: the first one, and then one in so many as the setting says.
+
+    In the `phase` of a certificate each of them, while that is cheap. That a run repeats in a slice which it chose is implied, too.
+    """
+    if phase == CERTIFY and _is_cheap(state):
+        return True
+    every = read(state.scenario, SETTINGS["audit"])
+    known = state.implied + sum(len(node.sliced_by) for node in state.nodes)
+    return isinstance(every, int) and state.audits * every <= known + state.audits
+
+
+def _is_cheap(state: RunState) -> bool:
+    made = [test for test in state.finished_tests if test.implied_by is None]
+    audits = sum(test.simulated_seconds for test in made if test.audits is not None and test.phase == CERTIFY)
+    return audits <= CHEAP * sum(test.simulated_seconds for test in made)
+
+
+def compare(journal: Journal, audits: Iterable[Test]) -> None:
+    """Ends the use of slices if one of the finished `audits` differs from the run that implies it."""
+    state = journal.state
+    wrong = next((test for test in audits if not repeats(journal, test)), None)
+    if wrong is None or wrong.audits is None or state.refuted is not None:
+        return
+    sound = takewhile(lambda node: not rests_on_slices(state, node), state.path)
+    journal.record(SlicesRefuted(wrong.id, wrong.audits, [node.number for node in sound][-1]))
+
+
+def repeats(journal: Journal, audit: Test) -> bool:
+    """Whether a finished audit has the bits of the run that implies it; True for one that has none, since its worker died."""
+    if audit.audits is None or not (again := journal.file.motions(audit.id)):
+        return True
+    source, state = journal.state.tests[audit.audits - 1], journal.state
+    # What took no part may have moved by itself.
+    gone = (state.environments[0] - state.environments[audit.environment]).names(state.elements)
+    first = {name: rows for name, rows in journal.file.motions(source.id).items() if name not in gone}
+    same_end = _end(source) == _end(audit) and first.keys() == again.keys()
+    return same_end and all(first[name].tobytes() == again[name].tobytes() for name in first)
+
+
+def _end(test: Test) -> tuple[bool, str, bool]:
+    return test.outcome == "pass", test.failure, test.cut

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, get_args
 
-from ddenv.claims import fresh_runs_made, in_the_making
 from ddenv.errors import UserError
+from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
 from ddenv.guiding.pace import AcceptMode, Isolate, Pause, Resume, StartEngine, Step, Stop
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto

@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 from ddenv.errors import UserError, printable
 from ddenv.guiding.situation import NO_FAILURE, Situation, Words, new_search
+from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Node, RunState
+from ddenv.runfile.state import RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
 from ddenv.words import count

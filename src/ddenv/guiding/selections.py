@@ -21,7 +21,6 @@ from ddenv.guiding.situation import (
     names_of,
     new_search,
 )
-from ddenv.runfile.atlas import models_of
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState, Test, Trial
 from ddenv.text import shortened
@@ -161,16 +160,16 @@ class AcceptOther:
             return f"test {test.id} did not end in another failure"
         if self.instead:
             return ""
-        models, label = models_of(state, test), label_of(state, test)
-        if not frozenset(models) < frozenset(state.environment):
+        label, models = label_of(state, test), state.environments[test.environment]
+        if state.here is None or not models < state.environments[state.here.id]:
             return f"{label} is not part of the current environment"
-        lacking = lacks_pinned(state, models)
+        lacking = lacks_pinned(state, models.names(state.elements))
         return f"{label} {lacking}" if lacking else ""
 
     def words(self, state: RunState) -> Words:
         test = state.tests[self.test - 1]
         if self.instead:
-            size = count(len(models_of(state, test)), "model")
+            size = count(len(state.environments[test.environment]), "model")
             said = f"a branch reduces the failure of test {test.id}, from {size} on"
             return Words("branch to another failure", said, _question(state, test, self.instead))
         said = f"the other failure of {label_of(state, test)} counts as f, too"
@@ -187,7 +186,7 @@ def nearest_other(state: RunState, row: Row) -> Test | None:
 def _question(state: RunState, test: Test, instead: bool = False) -> str:
     """What happened in the test, compared with f, and what follows."""
     label = f"test {test.id}" if instead else printable(label_of(state, test))
-    models = count(len(models_of(state, test)), "model")
+    models = count(len(state.environments[test.environment]), "model")
     near = test.distance is not None and math.isfinite(test.distance)
     apart = f", {test.distance:.2f} m from f's end" if near else ""
     branch = (

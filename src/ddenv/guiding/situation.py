@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from ddenv.claims import fresh_runs_made, in_the_making
+from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
 from ddenv.text import shortened
@@ -69,7 +69,7 @@ def label_of(state: RunState, test: Test) -> str:
     """What a test was made for, in words."""
     row = row_of(state, test)
     if row is None and test.round is None:
-        return purpose(state, test).words
+        return purpose(state, test)
     return row.label if row is not None else f"a candidate of round {test.round}"
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from ddenv.amounts import count, first_of
-from ddenv.claims import of_all_parts
 from ddenv.errors import UserError
+from ddenv.evidence.claims import of_all_parts
 from ddenv.learn.plays import Play
 from ddenv.learn.recorded_oracle import Oracle
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from ddenv.amounts import count
 from ddenv.learn.lesson import Answer, Foretold, Question
-from ddenv.runfile.events import deed
+from ddenv.runfile.events import RoundStarted, TestFinished, TestStarted, deed
 from ddenv.runfile.position import Chapter, Moment, Position
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
@@ -107,10 +107,10 @@ def foretelling(position: Position, at: int, what: Foretold) -> Foretelling | No
 
 def at_hand(moment: Moment) -> Foretold | None:
     """What a student can foretell where a run is stepped through freely."""
-    kind = moment.event.kind
-    if kind == "test_started" and pointed(moment) is not None:
+    event = moment.recorded.event
+    if isinstance(event, TestStarted) and pointed(moment) is not None:
         return "outcome"
-    return "winner" if kind == "round_started" else None
+    return "winner" if isinstance(event, RoundStarted) else None
 
 
 # How a test ends.
@@ -118,10 +118,10 @@ def at_hand(moment: Moment) -> Foretold | None:
 
 def _outcome(position: Position, moment: Moment) -> Foretelling | None:
     number = len(moment.after.tests)
-    if moment.event.kind != "test_started" or not 0 < number <= len(position.end.tests):
+    if not isinstance(moment.recorded.event, TestStarted) or not 0 < number <= len(position.end.tests):
         return None
     test, candidate = position.end.tests[number - 1], pointed(moment)
-    until = next((id for id in position.ids if id > moment.event.id and _ends(position, id, number)), None)
+    until = next((id for id in position.ids if id > moment.recorded.id and _ends(position, id, number)), None)
     if test.outcome not in SAID or candidate is None or until is None:
         return None
     answers = tuple(Answer(words, outcome == test.outcome, _seen(test)) for outcome, words in SAID.items())
@@ -132,7 +132,8 @@ def _outcome(position: Position, moment: Moment) -> Foretelling | None:
 
 def _ends(position: Position, id: int, test: int) -> bool:
     moment = position.moment(id)
-    return moment is not None and moment.event.kind == "test_finished" and moment.event.data["test"] == test
+    event = None if moment is None else moment.recorded.event
+    return isinstance(event, TestFinished) and event.test == test
 
 
 def _what(candidate: Candidate) -> str:
@@ -182,7 +183,7 @@ def _chapter(position: Position, moment: Moment) -> tuple[Chapter, Round, RunSta
 
 def _winner(position: Position, moment: Moment) -> Foretelling | None:
     found = _chapter(position, moment)
-    if found is None or moment.event.kind != "round_started":
+    if found is None or not isinstance(moment.recorded.event, RoundStarted):
         return None
     chapter, round, _ = found
     listed = list(round.candidates)

@@ -12,17 +12,17 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from ddenv import claims
 from ddenv.amounts import first_of, percent
 from ddenv.errors import UserError
+from ddenv.evidence import claims
+from ddenv.evidence.rates import miss_chance, wilson_interval
+from ddenv.evidence.took_part import slice_words
 from ddenv.learn.recorded_oracle import Oracle
-from ddenv.rates import miss_chance, wilson_interval
 from ddenv.runfile.events import deed
 from ddenv.runfile.progress import Certificate, Claim, Node
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import FRESH, RunState
+from ddenv.runfile.state import CERTIFY, RunState
 from ddenv.schemas import nearest
-from ddenv.took_part import slice_words
 
 # Terms that contain a digit.
 TERMS = ("1-minimal", "Algorithm 1", "(1 − rate)")
@@ -52,7 +52,7 @@ def _fresh_whole(state: RunState) -> str:
     """How often f showed in the whole world, in the runs of the same certificate."""
     found = _certificate(state)
     first = 0 if found is None else found.first_run
-    whole = [test for test in state.tests if test.phase in FRESH and test.run >= first and test.node == 0]
+    whole = [test for test in state.tests if test.phase == CERTIFY and test.run >= first and test.node == 0]
     outcomes = [test.outcome for test in whole if test.without is None and test.outcome in ("similar", "other", "pass")]
     if not outcomes:
         return "no fresh run"

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.learn.recorded_oracle import Oracle
+from ddenv.runfile.events import TestFinished, TestStarted
 from ddenv.runfile.follow import steps
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Split, Trial
-from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runfile.tested import made_for
 from ddenv.schemas import BOTH, uses
 
@@ -106,17 +107,18 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
     return tuple(found)
 
 
-def _play_of_run(run: Path, events: Sequence[Event]) -> Play:
+def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     """The search of a run. Tests that others imply cost nothing, and are no turns."""
     state, turns, begun = RunState(), list[Turn](), dict[int, tuple[Candidate | Trial, bool]]()
-    for event, _, state in steps(events):
-        if event.kind == "test_started":
-            test = state.tests[event.data["test"] - 1]
+    for recorded, _, state in steps(events):
+        event = recorded.event
+        if isinstance(event, TestStarted):
+            test = state.tests[event.test - 1]
             candidate = made_for(state, test)
             if candidate is not None:
                 begun[test.id] = candidate, test.run > 0
-        elif event.kind == "test_finished" and (test := state.tests[event.data["test"] - 1]).id in begun:
-            candidate, again = begun[test.id]
+        elif isinstance(event, TestFinished) and event.test in begun:
+            test, (candidate, again) = state.tests[event.test - 1], begun[event.test]
             turns.append(Turn(candidate, test.round or 0, test.outcome, state.environment, again))
         elif turns and state.environment is not turns[-1].left:
             last = turns[-1]

@@ -7,8 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ddenv.errors import UserError
+from ddenv.runfile.events import CandidateJudged, Implied, TestFinished, TestStarted
 from ddenv.runfile.position import Position
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Recorded
 
 ALONE = ("start", "baseline", "end")
 COUNTED = ("round", "test", "result", "verdict", "reduction", "certificate", "claims", "back")
@@ -22,7 +23,7 @@ _Found = dict[tuple[str, int], int]
 class Places:
     """Finds the events of a run by the words of a lesson."""
 
-    def __init__(self, position: Position, events: Sequence[Event]) -> None:
+    def __init__(self, position: Position, events: Sequence[Recorded]) -> None:
         """`events` are all of those that the position was made of."""
         found = _of_tests(events) | _of_run(events)
         for chapter in position.chapters:
@@ -45,24 +46,27 @@ class Places:
         return self._found[key]
 
 
-def _of_tests(events: Sequence[Event]) -> _Found:
+def _of_tests(events: Sequence[Recorded]) -> _Found:
     """Where each test begins and ends, and where its candidate is judged after it."""
     found: _Found = {}
-    tests = ended = 0
-    for event in events:
-        if event.kind in ("test_started", "implied"):
-            tests += 1
-            found["test", tests] = event.id
-        if event.kind in ("test_finished", "implied"):
-            ended = tests if event.kind == "implied" else int(event.data["test"])
-            found["result", ended] = event.id
-        elif event.kind == "candidate_judged":
-            # A later candidate may be judged at once, by what is known.
-            found.setdefault(("verdict", ended), event.id)
+    ended = 0
+    for recorded in events:
+        match recorded.event:
+            case TestStarted(test):
+                found["test", test] = recorded.id
+            case TestFinished(test):
+                ended = test
+                found["result", test] = recorded.id
+            case Implied(test):
+                ended = test
+                found["test", test] = found["result", test] = recorded.id
+            case CandidateJudged():
+                # A later candidate may be judged at once, by what is known.
+                found.setdefault(("verdict", ended), recorded.id)
     return found
 
 
-def _of_run(events: Sequence[Event]) -> _Found:
+def _of_run(events: Sequence[Recorded]) -> _Found:
     found: _Found = {}
     numbers: Counter[str] = Counter()
     for event in events:

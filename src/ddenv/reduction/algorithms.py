@@ -13,10 +13,18 @@ from itertools import takewhile
 import numpy as np
 
 from ddenv.arrays import Floats
+from ddenv.environment import Environment
 from ddenv.reduction.chance import LEAST
-from ddenv.reduction.evidence import Partition
 from ddenv.reduction.guide import Guide, Search
-from ddenv.reduction.round import Candidate, Round, left_out, make_round, one_model_partitions, round_of
+from ddenv.reduction.round import (
+    Candidate,
+    Partition,
+    Round,
+    left_out,
+    make_round,
+    one_model_partitions,
+    round_of,
+)
 
 # A model is taken to be needed once the probability that it is not is below this; it is tried again at the end.
 DOUBT = 0.25
@@ -33,7 +41,7 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
     before are skipped.
     """
     environment, n = elements, guide.n_partitions
-    missed: list[frozenset[str]] = []
+    missed: list[Environment] = []
     while environment:
         n = min(n, len(environment))
         partitions = _split(environment, n, guide)
@@ -45,13 +53,12 @@ def ddenv(elements: Partition, guide: Guide) -> Search:
         winner = (yield round) if round.candidates else None
         missed = _missed(round, winner, missed, guide.broke)
         if winner is not None:
-            kept = winner.models
-            environment = tuple(name for name in environment if name in kept)
+            environment = tuple(model for model in environment if model in winner.models)
         elif round.exhaustive:
             break
         if winner is None or guide.growth == "paper":
             n += 1
-    return frozenset(environment)
+    return Environment.of(environment)
 
 
 def _split(environment: Partition, n: int, guide: Guide) -> list[Partition]:
@@ -74,7 +81,7 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
         largest = max(range(len(parts)), key=lambda place: len(parts[place]))
         models = parts[largest]
         scores = guide.rank(one_model_partitions(models))
-        line = tuple(name for _, name in sorted(zip(scores, models, strict=True), key=lambda pair: pair[0]))
+        line = tuple(model for _, model in sorted(zip(scores, models, strict=True), key=lambda pair: pair[0]))
         parts[largest : largest + 1] = [line[: len(line) // 2], line[len(line) // 2 :]]
     return parts
 
@@ -82,9 +89,9 @@ def _halved(partitions: list[Partition], n: int, guide: Guide) -> list[Partition
 def _missed(
     round: Round,
     winner: Candidate | None,
-    missed: list[frozenset[str]],
+    missed: list[Environment],
     broke: Callable[[Candidate], bool],
-) -> list[frozenset[str]]:
+) -> list[Environment]:
     """Groups of models of which at least one is needed, provided that f shows whenever everything that it needs is there.
 
     A candidate without f leaves out such a group, as far as its models are still in the environment. A group that is gone
@@ -93,29 +100,21 @@ def _missed(
     failed = takewhile(lambda one: one is not winner, round.candidates)
     found = [*missed, *(one.lacks for one in failed if not broke(one))]
     if winner is not None:
-        left = winner.models
-        found = [group & left for group in found]
+        found = [group & winner.models for group in found]
     return [group for group in dict.fromkeys(found) if group]
 
 
-def _without_implied(round: Round, missed: list[frozenset[str]]) -> Round:
+def _without_implied(round: Round, missed: list[Environment]) -> Round:
     """`round` without candidates that lack a whole group of `missed`, or everything that an earlier candidate of the round lacks.
 
     Leaving out a single model is always tried: else nothing would show that the environment is minimal.
     """
     lacked, worth = list(missed), []
     for one in round.candidates:
-        if len(round.environment) - one.size == 1 or not _lacks_any(one, lacked):
+        if len(one.lacks) == 1 or not any(group <= one.lacks for group in lacked):
             worth.append(one)
             lacked.append(one.lacks)
     return replace(round, candidates=tuple(worth))
-
-
-def _lacks_any(candidate: Candidate, groups: list[frozenset[str]]) -> bool:
-    part = frozenset(candidate.part)
-    if candidate.kind == "partition":
-        return any(group.isdisjoint(part) for group in groups)
-    return any(group <= part for group in groups)
 
 
 def ddmin(elements: Partition, guide: Guide) -> Search:
@@ -143,10 +142,10 @@ def by_chunks(elements: Partition) -> Search:
             partitions = _cut(environment, 2)
         else:
             partitions = partitions[: winner.partition] + partitions[winner.partition + 1 :]
-            environment = tuple(name for partition in partitions for name in partition)
+            environment = tuple(model for partition in partitions for model in partition)
             # A single partition would be the environment itself.
             partitions = partitions if len(partitions) > 1 else _cut(environment, 2)
-    return frozenset(environment)
+    return Environment.of(environment)
 
 
 def _cut(environment: Partition, n: int) -> list[Partition]:
@@ -180,24 +179,24 @@ def probdd(elements: Partition, guide: Guide) -> Search:
         if winner is None:
             _raise_chances(group, chance)
         else:
-            environment = tuple(name for name in environment if name not in set(group))
+            environment = tuple(model for model in environment if model not in set(group))
     return (yield from sweep(tuple(sorted(environment, key=chance.__getitem__))))
 
 
-def _best_group(environment: Partition, chance: dict[str, float]) -> Partition:
+def _best_group(environment: Partition, chance: dict[int, float]) -> Partition:
     """The least likely models: as many as maximize their number times the probability that none of them is needed."""
-    order = [name for name in sorted(environment, key=chance.__getitem__) if chance[name] < 1.0]
+    order = [model for model in sorted(environment, key=chance.__getitem__) if chance[model] < 1.0]
     if not order:
         return ()
-    none_needed = np.cumprod([1.0 - chance[name] for name in order])
+    none_needed = np.cumprod([1.0 - chance[model] for model in order])
     return tuple(order[: 1 + int(np.argmax(none_needed * np.arange(1, len(order) + 1)))])
 
 
-def _raise_chances(group: Partition, chance: dict[str, float]) -> None:
+def _raise_chances(group: Partition, chance: dict[int, float]) -> None:
     """Bayes' rule: at least one of the group is needed."""
-    some_needed = 1.0 - np.prod([1.0 - chance[name] for name in group])
-    for name in group:
-        chance[name] = 1.0 if len(group) == 1 else min(1.0, chance[name] / float(some_needed))
+    some_needed = 1.0 - np.prod([1.0 - chance[model] for model in group])
+    for model in group:
+        chance[model] = 1.0 if len(group) == 1 else min(1.0, chance[model] / float(some_needed))
 
 
 def splitting(elements: Partition, guide: Guide) -> Search:
@@ -218,7 +217,7 @@ def splitting(elements: Partition, guide: Guide) -> Search:
     while line:
         # The ratio of needed models found so far to those expected by now.
         likelier = (1.0 + found) / (1.0 + passed)
-        spared = _spared(np.array([weight[name] for name in line]) * likelier, misses, guide)
+        spared = _spared(np.array([weight[model] for model in line]) * likelier, misses, guide)
         if spared[0] < DOUBT:
             passed, found = passed + weight[line[0]], found + 1
             line, misses = line[1:], {}
@@ -232,8 +231,8 @@ def splitting(elements: Partition, guide: Guide) -> Search:
         if winner is None:
             misses[size] = runs if round.candidates else guide.runs()
             continue
-        environment = tuple(name for name in environment if name not in set(group))
-        passed += sum(weight[name] for name in group)
+        environment = tuple(model for model in environment if model not in set(group))
+        passed += sum(weight[model] for model in group)
         line, misses = line[size:], {more - size: count for more, count in misses.items() if more > size}
     return (yield from sweep(environment, guide.runs()))
 
@@ -279,9 +278,9 @@ def sweep(environment: Partition, runs: int | None = None) -> Search:
             break
         else:
             looks += 1
-    return frozenset(environment)
+    return Environment.of(environment)
 
 
 def _far_to_near(elements: Partition, guide: Guide) -> Partition:
     scores = guide.rank(one_model_partitions(elements)) if elements else []
-    return tuple(name for name, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))
+    return tuple(model for model, _ in sorted(zip(elements, scores, strict=True), key=lambda pair: -pair[1]))

@@ -85,17 +85,11 @@ def checked_traits(names: tuple[str, ...], traits: Mapping[str, Traits] | None) 
     return traits
 
 
-def checked_number(what: str, value: float) -> float:
-    """`value` as a number above 0. Raises UserError."""
-    if not isinstance(value, Real) or not 0 < value <= LARGEST:
-        raise UserError(f"{what}: expected a number above 0, found {value!r}")
-    return float(value)
-
-
-def checked_share(what: str, value: float, most: float) -> float:
+def checked_number(what: str, value: float, most: float = LARGEST) -> float:
     """`value` as a number above 0, at most `most`. Raises UserError."""
     if not isinstance(value, Real) or not 0 < value <= most:
-        raise UserError(f"{what}: expected a number above 0, at most {most:g}, found {value!r}")
+        limit = "" if most == LARGEST else f", at most {most:g}"
+        raise UserError(f"{what}: expected a number above 0{limit}, found {value!r}")
     return float(value)
 
 

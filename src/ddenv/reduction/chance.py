@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.reduction.evidence import Evidence, Partition
+from ddenv.reduction.evidence import Evidence, Names
 
 # Probabilities stay between these, so that no test is impossible.
 LEAST, MOST = 1e-6, 1.0 - 1e-6
@@ -21,12 +21,12 @@ DENSITY = 0.5
 SWEEPS = 12
 
 
-def uniform_prior(environment: Partition) -> Floats:
+def uniform_prior(environment: Names) -> Floats:
     """The same probability for each model, shape (len(environment),)."""
     return np.full(len(environment), UNIFORM)
 
 
-def spatial_prior(environment: Partition, evidence: Evidence) -> Floats:
+def spatial_prior(environment: Names, evidence: Evidence) -> Floats:
     """A probability that falls with the rank of a model's distance to the failure, as 1 / rank; shape (len(environment),).
 
     It has no scale: the nearest three models are as likely to include a needed one as the nearest three to nine. Raises
@@ -36,7 +36,7 @@ def spatial_prior(environment: Partition, evidence: Evidence) -> Floats:
     return np.asarray(np.clip(DENSITY / (1.0 + ranks), LEAST, MOST))
 
 
-def distances_to_failure(environment: Partition, evidence: Evidence) -> Floats:
+def distances_to_failure(environment: Names, evidence: Evidence) -> Floats:
     """A lower bound of each model's distance from the end of f, shape (len(environment),), m. Raises evidence.Lacking."""
     end = np.array(evidence.need("failure_position"))
     apart = np.linalg.norm(evidence.places(environment) - end, axis=1)

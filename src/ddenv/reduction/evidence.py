@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ddenv.arrays import Floats
+from ddenv.environment import Environment
 
-Partition = tuple[str, ...]
+# Models by name, for schemas.
+Names = tuple[str, ...]
 Place = tuple[float, float, float]
 
 
@@ -29,10 +31,16 @@ class Traits:
 
 @dataclass(frozen=True)
 class Trial:
-    """One finished test: the models that were there, and whether it showed f."""
+    """One finished test: the models that were there, and whether it showed f. `elements` are the names of all models."""
 
-    models: frozenset[str]
+    environment: Environment
     similar: bool
+    elements: Names = field(repr=False)
+
+    @property
+    def models(self) -> frozenset[str]:
+        """The names of the models that were there, collected at each call: thousands of tests of thousands of models are many."""
+        return frozenset(self.environment.names(self.elements))
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,7 @@ class Evidence:
     repeatable. A field that is None is unknown; `need` raises for it.
     """
 
-    elements: Partition
+    elements: Names
     positions: Mapping[str, Place] | None = None
     trajectory: Floats | None = None
     failure_position: Place | None = None
@@ -66,19 +74,19 @@ class Evidence:
             raise Lacking(what)
         return value
 
-    def places(self, models: Partition) -> Floats:
+    def places(self, models: Names) -> Floats:
         """The positions of `models`, shape (len(models), 3), m. Raises Lacking."""
         positions = self.need("positions")
         return np.array([positions[name] for name in models], dtype=float).reshape(-1, 3)
 
-    def centroids(self, partitions: Sequence[Partition]) -> Floats:
+    def centroids(self, partitions: Sequence[Names]) -> Floats:
         """The mean position of each partition, shape (len(partitions), 3), m. Raises Lacking."""
         places = self.places(tuple(name for partition in partitions for name in partition))
         sizes = np.array([len(partition) for partition in partitions])
         firsts = np.cumsum(sizes) - sizes
         return np.asarray(np.add.reduceat(places, firsts, axis=0) / sizes[:, None])
 
-    def nearest(self, models: Partition) -> Floats:
+    def nearest(self, models: Names) -> Floats:
         """For each of `models`, how near the robot's path comes to it (m) and when (s): shape (len(models), 2). Raises Lacking.
 
         Computed once for the whole world: rounds ask for it again and again.

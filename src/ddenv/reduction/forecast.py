@@ -1,23 +1,24 @@
-"""How many tests are left of a search: its algorithm is played on, many times, each with other models as the needed ones."""
+"""How many tests are left of a search: it is played on with dice, many times, each with other models as the needed ones."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
-from operator import xor
 from random import Random
+from typing import Any
 
 import numpy as np
 
 from ddenv import schemas
-from ddenv.reduction.acceptance import MOST_RUNS, Acceptance
+from ddenv.environment import Environment
+from ddenv.evidence.rates import Shown
 from ddenv.reduction.chance import distances_to_failure
-from ddenv.reduction.evidence import Evidence, Partition
-from ddenv.reduction.guide import Guide, Search, search
+from ddenv.reduction.evidence import Evidence, Names
+from ddenv.reduction.guide import Guide, Search, guide_of
 from ddenv.reduction.prioritizations import failure_proximal
-from ddenv.reduction.round import Candidate
+from ddenv.reduction.procedure import Judged, Leg, Past, RoundBegan, Similar, search_on
+from ddenv.reduction.round import Partition
 
 # How likely one, two, ... models are needed of a world of up to `SMALL_WORLD` models; more in a larger one.
 NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
@@ -25,8 +26,6 @@ NEEDED, SMALL_WORLD = (10, 24, 22, 16, 11, 7, 5, 3, 2), 40
 # round takes as long as one candidate for each `SPLIT` models of its environment, and those that it has.
 PLAYS, CANDIDATES, FEWEST_PLAYS, SPLIT = 30, 6_000, 8, 50
 STEP = 100
-# What is known is looked through with a break after so many models of tests.
-MODELS = 20_000
 # A play that goes on for longer says nothing new.
 MOST_ROUNDS = 1500
 # The interval holds eight of ten plays, and somewhat more: a play knows less than there is to know.
@@ -69,22 +68,24 @@ class Memory:
 
 @dataclass(frozen=True)
 class Moment:
-    """Where a search stands: of `elements`, with which it began, `environment` is left.
+    """Where a search stands: it began with `leg`, its rounds so far had these `winners`, and `environment` is left.
 
-    `guide` is the search's own, `memory` what that was asked. `rule` judges a candidate; f shows in a share `rate` of the runs
-    with all that it needs. `jobs` tests run at the same time.
+    `begin(leg, guide)` starts the algorithm; `guide` is the search's own, `memory` what that was asked. `shown` knows of
+    the runs so far; f shows in a share `rate` of the runs with all that it needs. `workers` make tests at the same time.
     """
 
-    algorithm: str
+    leg: Leg
+    winners: tuple[int | None, ...]
+    environment: Environment
     pair: str
-    elements: Partition
-    environment: Partition
+    begin: Callable[[Leg, Guide], Search]
     guide: Guide
     memory: Memory
     evidence: Evidence
-    rule: Acceptance
+    shown: Callable[[Environment, int], Shown]
+    refused: Callable[[Environment], bool]
     rate: float
-    jobs: int = 1
+    workers: int = 1
 
 
 def plays(moment: Moment) -> Iterator[float]:
@@ -95,23 +96,79 @@ def plays(moment: Moment) -> Iterator[float]:
 def playing(moment: Moment) -> Iterator[float | None]:
     """As `plays`, with None every few milliseconds: in large worlds a play takes a while."""
     random = Random(f"{moment.evidence.seed} {len(moment.environment)} {len(moment.evidence.trials)}")
-    codes = {name: random.getrandbits(62) for name in moment.elements}
-    guide, line = _quick_guide(moment), _near_to_far(moment)
-    verdicts, missed = yield from _known(moment, codes)
-    groups = yield from _groups(moment, line)
-    looked_at = 0
+    line, guide = _near_to_far(moment), _quick_guide(moment)
+    groups, looked_at = _groups(moment, line), 0
     for number in range(PLAYS):
         if number >= FEWEST_PLAYS and looked_at > CANDIDATES:
             return
-        needed = _needed(random, len(moment.elements), len(line), groups)
-        play = _Play(moment, random, frozenset(line[place] for place in needed), codes, dict(verdicts), dict(missed))
+        needed = _needed(random, len(moment.leg.free), len(line), groups)
+        dice = _Dice(moment, guide, random, Environment.of(line[place] for place in needed))
         try:
-            yield from play.run(search(moment.algorithm, moment.elements, guide))
+            looked_at += yield from _play(moment, dice)
         except Exception:
             # An algorithm of another package may not bear answers that its own schemas would not give.
             return
-        looked_at += play.looked_at
-        yield play.tests
+        yield dice.tests
+
+
+def _play(moment: Moment, dice: _Dice) -> Generator[None, None, int]:
+    """To the end of the search, with a break after about `STEP` candidates; returns how many it looked at."""
+    steps, rounds, looked_at, last = search_on(dice, moment.leg), 0, 0, 0
+    answer: Past | bool | None = None
+    while rounds < MOST_ROUNDS:
+        try:
+            step: Any = steps.send(answer)
+        except StopIteration:
+            break
+        answer = None
+        if isinstance(step, RoundBegan):
+            if rounds < len(moment.winners):
+                answer = Past(moment.winners[rounds])
+            rounds, looked_at = rounds + 1, looked_at + len(step.round.environment) // SPLIT
+        elif isinstance(step, Judged):
+            looked_at += 1
+        elif isinstance(step, Similar):
+            answer, dice.tests = True, dice.tests + WASTED * (moment.workers - 1)
+        if looked_at - last > STEP:
+            last = looked_at
+            yield
+    return looked_at
+
+
+class _Dice:
+    """Drives a search in which f needs the models `needed`, and no other. Runs that were made show what they showed."""
+
+    refusals, workers = 0, 1
+
+    def __init__(self, moment: Moment, guide: Guide, random: Random, needed: Environment) -> None:
+        self.tests = 0.0
+        self._moment, self._guide, self._random, self._needed = moment, guide, random, needed
+        self._rate = min(1.0, max(LEAST_RATE, moment.rate))
+        self._drawn: dict[tuple[Environment, int], bool] = {}
+
+    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
+        known = self._moment.shown(environment, run)
+        if known is not None:
+            return known
+        if (environment, run) not in self._drawn:
+            self.tests += 1
+            self._drawn[environment, run] = self._needed <= environment and self._random.random() < self._rate
+        return self._drawn[environment, run]
+
+    def refused(self, environment: Environment) -> bool:
+        return self._moment.refused(environment)
+
+    def refused_by_user(self, environment: Environment) -> bool:
+        return False
+
+    def rate(self) -> float:
+        return self._rate
+
+    def goes_on(self) -> bool:
+        return True
+
+    def algorithm(self, leg: Leg) -> Search:
+        return self._moment.begin(leg, self._guide)
 
 
 def interval(tests: Sequence[float]) -> tuple[int, int, int]:
@@ -120,98 +177,6 @@ def interval(tests: Sequence[float]) -> tuple[int, int, int]:
     shares = zip(SHARES, WIDER, strict=True)
     low, likely, high = (ordered[round(share * (len(ordered) - 1))] * wider for share, wider in shares)
     return math.floor(low), round(likely), math.ceil(high)
-
-
-class _Play:
-    """A search where f needs the models `needed`, and no other. What has one of `verdicts` is not tested again; other candidates
-    go on after the runs that `missed` f.
-
-    Verdicts are found by the exclusive or of the `codes` of all models that are there: of thousands of complements, sets of names
-    would take too long.
-    """
-
-    def __init__(
-        self,
-        moment: Moment,
-        random: Random,
-        needed: frozenset[str],
-        codes: dict[str, int],
-        verdicts: dict[int, bool],
-        missed: dict[int, int],
-    ) -> None:
-        self.tests = 0.0
-        self.looked_at = 0
-        self._rule = moment.rule
-        self._rate = min(1.0, max(LEAST_RATE, moment.rate))
-        self._wasted = WASTED * (moment.jobs - 1)
-        self._random = random
-        self._needed = needed
-        self._codes = codes
-        self._verdicts = verdicts
-        self._missed = missed
-
-    def run(self, searching: Search) -> Iterator[None]:
-        """To the end of the search, with a break after about `STEP` candidates."""
-        winner, last = None, 0
-        for _ in range(MOST_ROUNDS):
-            try:
-                round = searching.send(winner)
-            except StopIteration:
-                return
-            whole = _code(self._codes, round.environment)
-            self.looked_at += len(round.environment) // SPLIT
-            rule = self._rule.within(round.runs)
-            winner = next((one for one in round.candidates if self._is_similar(one, whole, rule)), None)
-            if self.looked_at - last > STEP:
-                last = self.looked_at
-                yield
-
-    def _is_similar(self, candidate: Candidate, whole: int, rule: Acceptance) -> bool:
-        """Its verdict by `rule`; `whole` is the code of the round's environment."""
-        self.looked_at += 1
-        part = _code(self._codes, candidate.part)
-        code = part if candidate.kind == "partition" else part ^ whole
-        if code in self._verdicts:
-            return self._verdicts[code]
-        similar = self._shows(candidate, code, rule)
-        if similar or self._rule.verdict(0, self._missed.get(code, 0)):
-            self._verdicts[code] = similar
-        return similar
-
-    def _shows(self, candidate: Candidate, code: int, rule: Acceptance) -> bool:
-        part = candidate.part
-        all_there = self._needed.issubset(part) if candidate.kind == "partition" else self._needed.isdisjoint(part)
-        shown, missed = 0, self._missed.get(code, 0)
-        while not (verdict := rule.verdict(shown, missed)):
-            self.tests += 1
-            if all_there and self._random.random() < self._rate:
-                shown += 1
-            else:
-                missed += 1
-        # Where some runs showed f, it is judged for good.
-        self._missed[code] = missed if not shown else MOST_RUNS
-        if verdict == "similar":
-            self.tests += self._wasted
-        return verdict == "similar"
-
-
-def _code(codes: dict[str, int], models: Iterable[str]) -> int:
-    return reduce(xor, map(codes.__getitem__, models), 0)
-
-
-def _known(moment: Moment, codes: dict[str, int]) -> Generator[None, None, tuple[dict[int, bool], dict[int, int]]]:
-    """The verdicts so far, and how often candidates without a verdict missed f."""
-    shown, missed = set[int](), dict[int, int]()
-    for number, trial in enumerate(moment.evidence.trials, 1):
-        if number % max(1, MODELS // len(codes)) == 0:
-            yield
-        code = _code(codes, trial.models.intersection(codes))
-        if trial.similar:
-            shown.add(code)
-        else:
-            missed[code] = missed.get(code, 0) + 1
-    verdicts = {code: False for code, count in missed.items() if moment.rule.verdict(0, count)}
-    return verdicts | dict.fromkeys(shown, True), missed
 
 
 def _quick_guide(moment: Moment) -> Guide:
@@ -224,16 +189,17 @@ def _quick_guide(moment: Moment) -> Guide:
     order = schemas.load("prioritization", prioritization)
     if not order.__module__.startswith("ddenv."):
         order = failure_proximal
+    quick = guide_of(cut, order, lambda: evidence)
 
     def split(environment: Partition, n: int) -> list[Partition]:
         if (environment, n) not in splits:
-            splits[environment, n] = cut(environment, n, evidence)
+            splits[environment, n] = quick.split(environment, n)
         return splits[environment, n]
 
     def rank(partitions: Sequence[Partition]) -> list[float]:
         asked = tuple(partitions)
         if asked not in scores:
-            scores[asked] = order(partitions, evidence)
+            scores[asked] = quick.rank(partitions)
         return scores[asked]
 
     def chances(environment: Partition) -> np.ndarray:
@@ -243,7 +209,7 @@ def _quick_guide(moment: Moment) -> Guide:
     return replace(moment.guide, split=split, rank=rank, chances=chances)
 
 
-def _halves(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+def _halves(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """Parts of models near each other: the largest is halved across its longer side, until there are enough."""
     places = evidence.places(environment)
     parts = [np.arange(len(environment))]
@@ -257,23 +223,23 @@ def _halves(environment: Partition, n_partitions: int, evidence: Evidence) -> li
 
 
 def _near_to_far(moment: Moment) -> Partition:
-    """The environment's models, the nearest to f first."""
-    order = np.argsort(distances_to_failure(moment.environment, moment.evidence), kind="stable")
-    return tuple(moment.environment[place] for place in order)
+    """The models that may go from the environment, the nearest to f first; one of each stack."""
+    models = tuple(model for model, stack in moment.leg.free.items() if stack <= moment.environment)
+    names = tuple(moment.evidence.elements[model] for model in models)
+    order = np.argsort(distances_to_failure(names, moment.evidence), kind="stable")
+    return tuple(models[place] for place in order)
 
 
-def _groups(moment: Moment, line: Partition) -> Generator[None, None, list[tuple[int, ...]]]:
+def _groups(moment: Moment, line: Partition) -> list[tuple[int, ...]]:
     """Places in the line of which one at least is needed: f did not show without the models there."""
-    place = {name: number for number, name in enumerate(line)}
-    shown = {trial.models for trial in moment.evidence.trials if trial.similar}
-    missed = {trial.models for trial in moment.evidence.trials} - shown
-    groups = set()
-    for number, models in enumerate(missed, 1):
-        groups.add(tuple(sorted(place[name] for name in place.keys() - models)))
-        if number % max(1, MODELS // len(place)) == 0:
-            yield
+    shown = {trial.environment for trial in moment.evidence.trials if trial.similar}
+    missed = {trial.environment for trial in moment.evidence.trials} - shown
+    models, place = Environment.of(line), {model: number for number, model in enumerate(line)}
     # A group of which nothing is left was not needed after all.
-    return sorted((group for group in groups if group), key=lambda group: (len(group), group))[:MOST_GROUPS]
+    groups = sorted(
+        {group for there in missed if (group := models - there)}, key=lambda group: (len(group), group.bits)
+    )
+    return [tuple(sorted(map(place.__getitem__, group))) for group in groups[:MOST_GROUPS]]
 
 
 def _needed(random: Random, whole: int, models: int, groups: Sequence[tuple[int, ...]]) -> set[int]:

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from ddenv import schemas
 from ddenv.arrays import Floats
+from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.chance import spatial_prior, uniform_prior
-from ddenv.reduction.evidence import Evidence, Lacking, Partition
-from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.evidence import Evidence, Lacking, Names
+from ddenv.reduction.round import Candidate, Partition, Round
 
 Split = Callable[[Partition, int], list[Partition]]
 Rank = Callable[[Sequence[Partition]], list[float]]
 Chances = Callable[[Partition], Floats]
-Search = Generator[Round, Candidate | None, frozenset[str]]
+Search = Generator[Round, Candidate | None, Environment]
 
 # The fields of the evidence in the words of `ddenv.reduce`.
 _ARGUMENTS = {
@@ -32,7 +34,7 @@ _ARGUMENTS = {
 
 @dataclass(frozen=True)
 class Guide:
-    """What an algorithm asks while it searches.
+    """What an algorithm asks while it searches. Models are numbers, in the order of the world file.
 
     `split(environment, n)` returns at most n partitions; `rank(partitions)` their scores, of which the lowest is tried first.
     `chances(environment)` is the probability that each model is needed, shape (len(environment),), before any test.
@@ -61,35 +63,46 @@ def make_guide(
     evidence: Callable[[], Evidence],
     *,
     prior: str = "spatial",
-    n_partitions: int = 2,
-    candidates: str = "both",
-    complement_order: str = "paper",
-    growth: str = "paper",
-    skip: str = "known",
-    rate: Callable[[], float] = lambda: 1.0,
-    runs: Callable[[], int] = lambda: 1,
+    **more: Any,
 ) -> Guide:
-    """A guide for the schemas of these names, which look at what `evidence()` returns at that moment.
+    """A guide for the schemas of these names, which look at what `evidence()` returns at that moment, and see models by name.
 
     Raises UserError for unknown names; a schema that lacks evidence raises UserError when it is used. A schema that is a class is
     instantiated for each guide: it may remember what it has seen. `prior` is "uniform", or "spatial" where positions and the place
-    of the failure are known.
+    of the failure are known. `more` are the other fields of `Guide`.
     """
     split, rank = _made("partitioning", partitioning), _made("prioritization", prioritization)
+    return guide_of(split, rank, evidence, partitioning, prioritization, prior, **more)
+
+
+def guide_of(
+    split: Callable[..., Any],
+    rank: Callable[..., Any],
+    evidence: Callable[[], Evidence],
+    partitioning: str = "",
+    prioritization: str = "",
+    prior: str = "spatial",
+    **more: Any,
+) -> Guide:
+    """As `make_guide`, with schemas that are there; their names are for error messages."""
 
     def split_now(environment: Partition, n: int) -> list[Partition]:
+        known = evidence()
+        names = _names(known, environment)
         try:
-            partitions = [tuple(part) for part in split(environment, n, evidence())]
+            partitions = [tuple(part) for part in split(names, n, known)]
         except Lacking as lacking:
             raise _complaint("partitioning", partitioning, lacking) from None
         models = [name for part in partitions for name in part]
-        if not all(partitions) or len(models) != len(environment) or set(models) != set(environment):
+        if not all(partitions) or len(models) != len(names) or set(models) != set(names):
             raise UserError(f"partitioning '{partitioning}': its partitions must be disjoint, not empty, and cover E")
-        return partitions
+        numbers = _numbers(known.elements)
+        return [tuple(map(numbers.__getitem__, part)) for part in partitions]
 
     def rank_now(partitions: Sequence[Partition]) -> list[float]:
+        known = evidence()
         try:
-            scores = [float(score) for score in rank(partitions, evidence())]
+            scores = [float(score) for score in rank([_names(known, part) for part in partitions], known)]
         except Lacking as lacking:
             raise _complaint("prioritization", prioritization, lacking) from None
         if len(scores) != len(partitions) or any(map(math.isnan, scores)):
@@ -100,17 +113,27 @@ def make_guide(
 
     def chances_now(environment: Partition) -> Floats:
         known = evidence()
+        names = _names(known, environment)
         if prior == "uniform" or known.positions is None or known.failure_position is None:
-            return uniform_prior(environment)
-        return spatial_prior(environment, known)
+            return uniform_prior(names)
+        return spatial_prior(names, known)
 
-    return Guide(split_now, rank_now, chances_now, n_partitions, candidates, complement_order, growth, skip, rate, runs)
+    return Guide(split_now, rank_now, chances_now, **more)
 
 
-def search(algorithm: str, elements: Iterable[str], guide: Guide) -> Search:
+def search(algorithm: str, elements: Iterable[int], guide: Guide) -> Search:
     """The algorithm `algorithm`, before its first round. Raises UserError for an unknown name."""
-    found: Search = schemas.load("algorithm", algorithm)(tuple(elements), guide)
-    return found
+    searching: Search = schemas.load("algorithm", algorithm)(tuple(elements), guide)
+    return searching
+
+
+def _names(known: Evidence, models: Partition) -> Names:
+    return tuple(map(known.elements.__getitem__, models))
+
+
+@lru_cache(maxsize=4)
+def _numbers(elements: Names) -> dict[str, int]:
+    return {name: number for number, name in enumerate(elements)}
 
 
 def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:
@@ -123,7 +146,7 @@ def _made(kind: schemas.Kind, name: str) -> Callable[..., Any]:
 
 def _complaint(kind: schemas.Kind, name: str, lacking: Lacking) -> UserError:
     what = str(lacking)
-    others = [each for each in schemas.names(kind) if each != name]
+    others = [other for other in schemas.names(kind) if other != name]
     return UserError(
         f"{kind} '{name}' needs {_ARGUMENTS.get(what, what)}, which is missing; or use one of {', '.join(others)}"
     )

@@ -1,7 +1,7 @@
 """Isolation: the fewest models that have to go from the whole world so that the robot reaches its goal.
 
 A reduction makes a failing world smaller. Isolation makes a passing world larger, until putting any one model back makes the robot
-fail: that is the nearest world that passes.
+fail: that is the nearest world that passes. It is the same search with another predicate, over what is removed.
 
 Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", 2002, where `dd` moves both ends. Here the failing one
 stays the whole world, as in "Debugging Inputs" (Kirschner, Soremekun and Zeller, 2020): else what comes out would be the
@@ -11,15 +11,19 @@ difference of two worlds that nobody has seen.
 from __future__ import annotations
 
 import math
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from ddenv.rates import leans_to
-from ddenv.reduction.acceptance import Verdict, estimated_rate
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.certificate import Procedure, Terms, error_of, falls
+from ddenv.evidence.rates import estimated_rate, leans_to
 from ddenv.reduction.algorithms import by_chunks
-from ddenv.reduction.certificate import Procedure, Subject
-from ddenv.reduction.evidence import Partition
 from ddenv.reduction.guide import Search
-from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.procedure import NamedClaim, Runs, Step, judge, settled
+from ddenv.reduction.round import Candidate, Partition, Round
+from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.verdict import Verdict
 
 # A world passes if the robot reaches its goal in so many of its runs, and fails in at most this part of those of the whole world.
 MOSTLY, FAILURES_LEFT = 0.9, 0.2
@@ -27,6 +31,8 @@ MOSTLY, FAILURES_LEFT = 0.9, 0.2
 SEARCH_ERROR = 0.05
 # After this many runs the likelier side counts; fresh runs that do not decide leave it open.
 MOST_RUNS = 60
+# Fresh runs judge so many ends; after that the last one stays as it is.
+MOST_CHECKS = 6
 
 
 @dataclass(frozen=True)
@@ -49,10 +55,106 @@ class Passing:
 
     def verdict(self, shown: int, missed: int) -> Verdict:
         """Of a world in which `shown` runs reached the goal and `missed` did not: "similar" if it passes; "" while it is open."""
-        found = leans_to(shown, missed, self.wanted, self.rather_than, self.error)
-        if found is None and shown + missed >= MOST_RUNS:
-            found = shown / (shown + missed) > math.sqrt(self.wanted * self.rather_than)
-        return "" if found is None else ("similar" if found else "dissimilar")
+        passes = leans_to(shown, missed, self.wanted, self.rather_than, self.error)
+        if passes is None and shown + missed >= MOST_RUNS:
+            passes = shown / (shown + missed) > math.sqrt(self.wanted * self.rather_than)
+        return "" if passes is None else ("similar" if passes else "dissimilar")
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A step: fresh runs of the world without `removed`, and of it with each model of `removed` put back, showed these claims."""
+
+    removed: Environment
+    claims: tuple[NamedClaim, ...]
+
+    @property
+    def passes(self) -> bool:
+        return self.claims[0].claim.verdict == "passes"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An isolation: of `whole`, the suspects may go, at first `size` of them; `stacks` has what goes with each.
+
+    Each check has the error of its number, and begins `block` runs after the one before.
+    """
+
+    whole: Environment
+    suspects: Partition
+    stacks: Stacks
+    size: int
+    rule: Passing
+    keep_rate: float
+    at_least: int
+    first_run: int
+    block: int
+
+
+def isolation(
+    driver: Runs, asked: Asked, checks: Sequence[Checked] = ()
+) -> Generator[Step | Checked, Any, Environment | None]:
+    """Returns what has to go so that the robot passes; None if no such world is found. `checks` are known already."""
+    checks = list(checks)
+    while len(checks) < MOST_CHECKS:
+        refuted = {asked.whole, *(asked.whole - check.removed for check in checks if not check.passes)}
+        smaller = _smaller(asked, checks[-1], refuted) if checks else NOTHING
+        if checks and checks[-1].passes and not smaller:
+            return checks[-1].removed
+        removed = yield from _search(driver, asked, smaller, refuted)
+        if not removed:
+            return None
+        checks.append((yield from _check(driver, asked, removed, len(checks))))
+        yield checks[-1]
+    return checks[-1].removed if checks[-1].passes else None
+
+
+def _smaller(asked: Asked, check: Checked, refuted: set[Environment]) -> Environment:
+    """What is enough to remove if a check shows that a model may stay; nothing where that was refuted."""
+    needless = next((claim.model for claim in check.claims if claim.claim.verdict == "not needed"), None)
+    smaller = NOTHING if needless is None else check.removed - asked.stacks.by_first[needless]
+    return NOTHING if asked.whole - smaller in refuted else smaller
+
+
+def _search(
+    driver: Runs, asked: Asked, smaller: Environment, refuted: set[Environment]
+) -> Generator[Step | Checked, Any, Environment]:
+    """What has to go, by the seeds of the search; nothing if the robot does not pass without all that may go."""
+    if smaller:
+        searching = by_chunks(tuple(model for model in asked.suspects if model in smaller))
+    else:
+        searching = isolating(asked.suspects, asked.size)
+    algorithm, winner = asked.stacks.expand(searching), None
+    while True:
+        try:
+            round = algorithm.send(winner)
+        except StopIteration as end:
+            removed: Environment = end.value
+            return removed
+        # What was refuted is not tested again.
+        candidates = [one for one in round.candidates if asked.whole - one.models not in refuted]
+        worlds = [asked.whole - candidate.models for candidate in candidates]
+        place = yield from judge(driver, worlds, asked.rule, "isolate")
+        winner = None if place is None else candidates[place]
+
+
+def _check(driver: Runs, asked: Asked, removed: Environment, number: int) -> Generator[Step | Checked, Any, Checked]:
+    """Fresh runs show whether the world without `removed` passes, and whether it does with each model of it put back."""
+    passing, error = asked.whole - removed, error_of(number + 1) / 2.0
+    backs = [model for model in asked.suspects if model in removed]
+    terms = Terms(asked.keep_rate, asked.rule.wanted, error / len(backs))
+
+    def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
+        yield None, passing, passes(passing, Passing(asked.rule.wanted, asked.rule.rather_than, error), asked.at_least)
+        for model in backs:
+            with_it = passing | asked.stacks.by_first[model]
+            yield model, with_it, falls(with_it, passing, terms)
+
+    def ends(claim: NamedClaim) -> bool:
+        return claim.claim.verdict != "passes" if claim.model is None else claim.claim.verdict == "not needed"
+
+    first = asked.first_run + number * asked.block
+    return Checked(removed, (yield from settled(driver, claims, ends, first, "isolate")))
 
 
 def isolating(suspects: Partition, first: int) -> Search:
@@ -65,16 +167,22 @@ def isolating(suspects: Partition, first: int) -> Search:
     size = max(1, first)
     while suspects:
         group = suspects[:size]
-        winner = yield Round(1, suspects, (group,), (0.0,), (Candidate("partition", 0, group, suspects),))
+        winner = yield _only(group, suspects)
         if winner is not None:
             return (yield from by_chunks(group))
         if size >= len(suspects):
             break
         size *= 2
-    return frozenset()
+    return NOTHING
 
 
-def passes(world: Subject, rule: Passing, at_least: int) -> Procedure:
+def _only(group: Partition, suspects: Partition) -> Round:
+    """A round with `group` as its one candidate, even if these are all suspects."""
+    whole, models = Environment.of(suspects), Environment.of(group)
+    return Round(1, suspects, (group,), (0.0,), (Candidate("partition", 0, group, models, whole - models),))
+
+
+def passes(world: Environment, rule: Passing, at_least: int) -> Procedure:
     """Whether fresh runs show that `world` passes, from at least so many: "passes", "fails" or "not shown".
 
     "passes" is wrong with a probability of at most about the error of the rule: then the goal is not reached more often than at

@@ -11,7 +11,7 @@ from sklearn.linear_model import SGDClassifier
 
 from ddenv.arrays import Booleans, Floats, Integers
 from ddenv.reduction.chance import LEAST, MOST, beliefs, distances_to_failure, spatial_prior, undominated
-from ddenv.reduction.evidence import Evidence, Partition, Traits, Trial
+from ddenv.reduction.evidence import Evidence, Names, Traits, Trial
 from ddenv.reduction.partitionings import grouped
 
 # After this number of candidates the classifier counts as much as the spatial prior.
@@ -36,7 +36,7 @@ class Learner:
         self._lessons = Lessons()
         self._classifier = OnlineClassifier()
 
-    def __call__(self, environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+    def __call__(self, environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
         chances = self.chances(environment, evidence)
         # By probability, the least likely first; equals in the order of the file.
         order = np.argsort(chances, kind="stable")
@@ -45,7 +45,7 @@ class Learner:
         labels[order] = -_shares(weights, n_partitions)
         return grouped(environment, labels)
 
-    def chances(self, environment: Partition, evidence: Evidence) -> Floats:
+    def chances(self, environment: Names, evidence: Evidence) -> Floats:
         """The probability that each model is needed, shape (len(environment),). Learns from the tests since the last call."""
         rows = features(environment, evidence)
         if not self._lessons.begun:
@@ -126,14 +126,14 @@ class Lessons:
         # Tests that still say something: which models (T, N) of the first environment each of them left out.
         self._failed = np.zeros((0, 0), dtype=bool)
         self._new_gone = np.zeros((0, 0))
-        self._new_groups: list[Partition] = []
+        self._new_groups: list[Names] = []
 
     @property
     def begun(self) -> bool:
         """Whether `take` was called yet."""
         return bool(self._columns)
 
-    def take(self, environment: Partition, rows: Floats, prior: Floats, trials: Sequence[Trial]) -> None:
+    def take(self, environment: Names, rows: Floats, prior: Floats, trials: Sequence[Trial]) -> None:
         """Takes in new tests; `rows` (M, F) and `prior` (M,) are the features and priors of the current environment."""
         if not self._columns:
             self._columns = {name: column for column, name in enumerate(environment)}
@@ -148,7 +148,7 @@ class Lessons:
         self._new_groups = self._failures(environment, trials)
         self.count += len(self._new_groups) + bool(gone)
 
-    def _failures(self, environment: Partition, trials: Sequence[Trial]) -> list[Partition]:
+    def _failures(self, environment: Names, trials: Sequence[Trial]) -> list[Names]:
         """The groups that new candidates without f left out of the current environment."""
         fresh, self._taken = trials[self._taken :], len(trials)
         similar = {trial.models for trial in fresh if trial.similar}
@@ -158,7 +158,7 @@ class Lessons:
         groups = (tuple(name for name in environment if name not in models) for models in failed)
         return [group for group in groups if group]
 
-    def groups(self, environment: Partition) -> Booleans:
+    def groups(self, environment: Names) -> Booleans:
         """Groups (T, M) of which at least one model is needed: those that candidates without f left out.
 
         Supersets of another group are dropped for good: they never say anything new.
@@ -190,7 +190,7 @@ NEAR = 0.1
 SOON = 10.0
 
 
-def features(models: Partition, evidence: Evidence) -> Floats:
+def features(models: Names, evidence: Evidence) -> Floats:
     """The features of `models`, shape (len(models), 9), all of order one; unknown ones are 0.
 
     Distance to the end of f, mean and minimum distance to the path, how early it was sensed (1 at once, 0 never), whether it was

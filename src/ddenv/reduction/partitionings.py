@@ -11,15 +11,14 @@ from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
 from ddenv.arrays import Floats
-from ddenv.reduction.evidence import Evidence, Partition
-from ddenv.reduction.round import one_model_partitions
+from ddenv.reduction.evidence import Evidence, Names
 
 # With more clusters or models than this, k-means starts once instead of four times, and with more clusters than this from random
 # models: it would take a second instead of a tenth.
 MANY_CLUSTERS, MANY_MODELS, MOST_CLUSTERS = 100, 500, 500
 
 
-def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+def model2model(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """Models that are near each other form a partition: k-means clusters their positions into n groups. If a cluster stays empty,
     because models share a position, each model is its own partition in this round. Good if models that cause a failure stand close
     together.
@@ -38,10 +37,10 @@ def model2model(environment: Partition, n_partitions: int, evidence: Evidence) -
         warnings.simplefilter("ignore", ConvergenceWarning)
         labels = clusters.fit(evidence.places(environment)).labels_
     partitions = grouped(environment, labels)
-    return partitions if len(partitions) == n_partitions else one_model_partitions(environment)
+    return partitions if len(partitions) == n_partitions else [(name,) for name in environment]
 
 
-def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+def timeseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """The trajectory of the last similar run is cut into n spans of equal duration. A model belongs to the span whose path is
     nearest to it. If the robot is stuck for long, many spans lie at that place, so the models there are soon separated from the
     rest. Good if it matters when the robot met a model.
@@ -50,7 +49,7 @@ def timeseg(environment: Partition, n_partitions: int, evidence: Evidence) -> li
     return by_span(environment, np.linspace(times[0], times[-1], n_partitions + 1)[1:-1], evidence)
 
 
-def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence) -> list[Partition]:
+def trajectoryseg(environment: Names, n_partitions: int, evidence: Evidence) -> list[Names]:
     """The trajectory of the last similar run is cut where the robot's angular velocity changes by more than delta (rad/s, the
     scenario's key `reduction.delta`). A model belongs to the span whose path is nearest to it. Of too many cuts the n - 1 sharpest
     are kept; with too few, the longest spans are halved. Good if the robot's turns show where something happened.
@@ -59,7 +58,7 @@ def trajectoryseg(environment: Partition, n_partitions: int, evidence: Evidence)
     return by_span(environment, cuts(trajectory, evidence.delta, n_partitions), evidence)
 
 
-def by_span(environment: Partition, cuts: Floats, evidence: Evidence) -> list[Partition]:
+def by_span(environment: Names, cuts: Floats, evidence: Evidence) -> list[Names]:
     """Groups the models by the span of time, between sorted `cuts` (s), in which the robot was nearest to them."""
     return grouped(environment, np.searchsorted(cuts, evidence.nearest(environment)[:, 1], side="left"))
 
@@ -85,7 +84,7 @@ def turns(trajectory: Floats) -> tuple[Floats, Floats]:
     return times[1:-1], np.abs(np.diff(rates))
 
 
-def grouped(environment: Partition, labels: Iterable[int]) -> list[Partition]:
+def grouped(environment: Names, labels: Iterable[int]) -> list[Names]:
     """The models of each label, sorted by label; within a partition they keep the environment's order."""
     groups: dict[int, list[str]] = {}
     for name, label in zip(environment, labels, strict=True):

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ddenv.reduction.evidence import Evidence, Partition, nearest_on_path
+from ddenv.reduction.evidence import Evidence, Names, nearest_on_path
 
 
-def failure_proximal(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def failure_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions whose centroid is near the place where the robot failed are tried first. Good if the cause stands where the robot
     got stuck; it ignores what happened on the way there.
 
@@ -22,7 +22,7 @@ def failure_proximal(partitions: Sequence[Partition], evidence: Evidence) -> lis
     return scores
 
 
-def avg_trajectory_proximal(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def avg_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions whose centroid has the smallest mean distance to the robot, over its whole last similar run, are tried first. What
     disturbed the robot early counts as much as what stood where it failed.
 
@@ -32,7 +32,7 @@ def avg_trajectory_proximal(partitions: Sequence[Partition], evidence: Evidence)
     return scores
 
 
-def min_trajectory_proximal(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def min_trajectory_proximal(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions whose centroid the robot came nearest to, at any time of its last similar run, are tried first. What the robot
     only passed counts as much as what it failed at.
 
@@ -43,7 +43,7 @@ def min_trajectory_proximal(partitions: Sequence[Partition], evidence: Evidence)
     return scores
 
 
-def timestep(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def timestep(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions are tried in the order in which the robot first sensed any of their models in its last similar run: by touch, or
     within the range and the field of view of its sensors. Partitions that it never sensed come last. Good if an early disturbance
     leads to the failure.
@@ -54,7 +54,7 @@ def timestep(partitions: Sequence[Partition], evidence: Evidence) -> list[float]
     return [min((first.get(name, math.inf) for name in partition), default=math.inf) for partition in partitions]
 
 
-def sequential(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def sequential(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions are tried in the order in which their first models appear in the world file. It knows nothing about the failure: a
     yardstick for the schemas that do, and right if the order of the file means something.
 
@@ -64,7 +64,7 @@ def sequential(partitions: Sequence[Partition], evidence: Evidence) -> list[floa
     return [float(min(place[name] for name in partition)) for partition in partitions]
 
 
-def random(partitions: Sequence[Partition], evidence: Evidence) -> list[float]:
+def random(partitions: Sequence[Names], evidence: Evidence) -> list[float]:
     """Partitions are tried in a random order, fixed by the seed and the round, so that repeated runs use the same order. The
     baseline that every other prioritization has to beat.
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 from ddenv.arrays import Floats
+from ddenv.environment import NOTHING, Environment
 from ddenv.errors import UserError
-from ddenv.reduction.acceptance import Acceptance
+from ddenv.evidence.certificate import Terms, Verdict, error_of
+from ddenv.evidence.rates import Shown, estimated_rate, wilson_interval
 from ddenv.reduction.arguments import (
     checked_choice,
     checked_count,
@@ -15,19 +20,77 @@ from ddenv.reduction.arguments import (
     checked_names,
     checked_number,
     checked_positions,
-    checked_share,
     checked_times,
     checked_traits,
     checked_trajectory,
 )
-from ddenv.reduction.calls import Calls, Test
-from ddenv.reduction.evidence import Evidence, Place, Traits
-from ddenv.reduction.guide import make_guide, search
-from ddenv.reduction.keeping import NOTHING_TO_REDUCE, Keeping
-from ddenv.reduction.rate_claims import RateClaim
-from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Round
-from ddenv.reduction.verdict import standing
-from ddenv.reduction.walk import Step, Walk, next_round
+from ddenv.reduction.evidence import Evidence, Names, Place, Traits, Trial
+from ddenv.reduction.guide import Search, make_guide, search
+from ddenv.reduction.procedure import (
+    BaselineRan,
+    Certificate,
+    CertificateDue,
+    Certified,
+    FailureFixed,
+    LeftOut,
+    Leg,
+    NamedClaim,
+    RoundBegan,
+    Similar,
+    SteppedBack,
+    Wants,
+    baseline,
+    procedure,
+    search_on,
+)
+from ddenv.reduction.procedure import Step as ProcedureStep
+from ddenv.reduction.procedure import Test as ProcedureTest
+from ddenv.reduction.round import CANDIDATES, COMPLEMENT_ORDERS, Partition, Round
+from ddenv.reduction.stepping_back import tried_again
+from ddenv.reduction.verdict import Acceptance, standing
+
+NOTHING_TO_REDUCE = "the failure does not show with all elements: there is nothing to reduce"
+# Runs of certificates are numbered from here on, so that they chose nothing; the search never comes so far.
+FIRST_FRESH, EACH_CERTIFICATE = 1_000_000, 100_000
+
+Test = Callable[[frozenset[str]], bool]
+
+
+@dataclass(frozen=True)
+class Step:
+    """The environment `kept`, in the order of the elements, after `tests` tests."""
+
+    tests: int
+    kept: Names
+
+
+@dataclass(frozen=True)
+class NamedRound:
+    """A round, before it is tested: the environment, and its parts in the order in which they are tried.
+
+    A candidate is "partition" or "complement", and the number of its part.
+    """
+
+    environment: Names
+    partitions: tuple[Names, ...]
+    candidates: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True)
+class RateClaim:
+    """A claim about what is left, or, if `without` is an element, about that without it.
+
+    `verdict`: what is left is "kept" (it keeps the rate) or "lost"; an element is "needed" (without it the rate falls below what
+    must be kept) or "not needed"; "not shown" if the runs do not decide. `shown` of `runs` fresh runs showed the failure;
+    `low`..`high` is Wilson's 95 % interval of the rate.
+    """
+
+    without: str | None
+    verdict: Verdict
+    shown: int
+    runs: int
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -81,7 +144,7 @@ def reduce(
     keep_rate: float = 0.8,
     baseline_runs: int = 10,
     check: bool = True,
-    on_round: Callable[[Round], None] | None = None,
+    on_round: Callable[[NamedRound], None] | None = None,
 ) -> Reduction:
     """Finds a few of `elements` with which `test` still shows the failure; the best end is one of which no single one can go.
 
@@ -126,40 +189,188 @@ def reduce(
     checked_choice("skip", skip, ("known", "implied"))
     checked_choice("prior", prior, ("spatial", "uniform"))
     checked_count("baseline_runs", baseline_runs, 1)
-    checked_share("keep_rate", keep_rate, 0.95)
+    checked_number("keep_rate", keep_rate, 0.95)
     checked_choice("accept_rate", accept_rate := accept_rate or ("kept" if iterations else "first"), ("first", "kept"))
-    calls, everything = Calls(test), frozenset(names)
-    keeping = Keeping(calls, everything, keep_rate, 1 + iterations, baseline_runs)
-    guide = make_guide(
-        partitioning,
-        prioritization,
-        lambda: replace(known, trials=calls.trials),
-        prior=prior,
-        n_partitions=n_partitions,
-        candidates=candidates,
-        complement_order=complement_order,
-        growth=growth,
-        skip=skip,
-        rate=lambda: keeping.rate if iterations else 1.0,
-        runs=lambda: keeping.rule().misses if accept_rate == "kept" else 1 + iterations,
-    )
-    walk, searching = Walk(names, calls, on_round or (lambda _: None)), search(algorithm, names, guide)
-    # Planned before the first test, so that a missing argument is reported at once.
-    planned = next_round(searching, None)
-    claims: tuple[RateClaim, ...] = ()
-    if accept_rate == "kept" or (check and iterations):
-        keeping.baseline()
-    elif check and not calls.once(everything):
-        raise UserError(NOTHING_TO_REDUCE)
-    before = calls.others
-    if accept_rate == "kept":
-        walk.search(searching, keeping.rule(), planned)
-        claims = keeping.carry_on(walk)
-        minimal = all(claim.verdict in ("kept", "needed") for claim in claims)
+
+    def begin(leg: Leg) -> Search:
+        guide = make_guide(
+            partitioning,
+            prioritization,
+            lambda: replace(known, trials=caller.trials),
+            prior=prior,
+            n_partitions=leg.n_partitions or n_partitions,
+            candidates=candidates,
+            complement_order=complement_order,
+            growth=growth,
+            skip=skip,
+            rate=lambda: caller.rate() if iterations else 1.0,
+            runs=lambda: leg.rule.misses,
+        )
+        return tried_again(tuple(leg.chain[-1]), leg.again, partial(search, algorithm, guide=guide))
+
+    keeps_rate = accept_rate == "kept"
+    caller = _Caller(names, test, begin, keep_rate if keeps_rate else 0.0, iterations, baseline_runs, on_round)
+    # A missing argument is reported before the first test.
+    next(begin(caller.leg()), None)
+    if keeps_rate:
+        caller.carry_out(procedure(caller, caller.whole, baseline_runs, keeps_rate=True))
+        minimal = all(claim.verdict in ("kept", "needed") for claim in caller.claims)
     else:
-        rule = Acceptance(1 + iterations)
-        walk.search(searching, rule, planned)
-        rests = [walk.chain[-1] - {name} for name in walk.left]
-        minimal = all(standing([rest], calls.known, rule).verdicts[0] == "dissimilar" for rest in rests)
-    tests = before, len(calls.trials), calls.others - before
-    return Reduction(walk.left, walk.rounds, tuple(walk.history), minimal, *tests, claims)
+        if check:
+            caller.carry_out(baseline(caller, caller.whole, baseline_runs if iterations else 1, bool(iterations)))
+        leg = caller.leg()
+        caller.carry_out(search_on(caller, leg))
+        rests = [caller.left - Environment.of((element,)) for element in caller.left]
+        minimal = all(standing([rest], caller.shown, leg.rule).verdicts[0] == "dissimilar" for rest in rests)
+    tests = caller.calls["baseline"], caller.calls["round"], caller.calls["certify"]
+    return Reduction(caller.history[-1].kept, caller.rounds, tuple(caller.history), minimal, *tests, caller.claims)
+
+
+class _Caller:
+    """Drives the procedure: calls `test` for each test that it wants. With `keep_rate` 0 the first run with the failure decides."""
+
+    refusals, workers = 0, 1
+
+    def __init__(
+        self,
+        names: Names,
+        test: Test,
+        begin: Callable[[Leg], Search],
+        keep_rate: float,
+        iterations: int,
+        baseline_runs: int,
+        on_round: Callable[[NamedRound], None] | None,
+    ) -> None:
+        self._names, self._test, self._begin, self._on_round = names, test, begin, on_round
+        self._keep_rate, self._iterations, self._baseline_runs = keep_rate, iterations, baseline_runs
+        self.whole = Environment.whole(len(names))
+        # By what they were made for: "baseline", "round" or "certify".
+        self.calls: Counter[str] = Counter()
+        self.trials: list[Trial] = []
+        self.rounds = 0
+        self.history = [Step(0, names)]
+        self.claims: tuple[RateClaim, ...] = ()
+        self._known: dict[tuple[Environment, int], bool] = {}
+        # What calls with all elements showed.
+        self._of_whole: list[bool] = []
+        self._chain: tuple[Environment, ...] = (self.whole,)
+        # n of the last round in each environment, or of the round that reached it.
+        self._n_partitions: dict[Environment, int] = {}
+        self._last_n: int | None = None
+        self._lost: list[Environment] = []
+        self._certificates = 0
+
+    # What the procedure asks.
+
+    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
+        return self._known.get((environment, run))
+
+    def refused(self, environment: Environment) -> bool:
+        return any(environment <= lost for lost in self._lost)
+
+    def refused_by_user(self, environment: Environment) -> bool:
+        return False
+
+    def rate(self) -> float:
+        return estimated_rate(sum(self._of_whole), len(self._of_whole))
+
+    def goes_on(self) -> bool:
+        return True
+
+    def algorithm(self, leg: Leg) -> Search:
+        return self._begin(leg)
+
+    # What it finds.
+
+    def carry_out(self, steps: Generator[ProcedureStep, Any, object]) -> None:
+        """To the end. Raises UserError if the failure never shows in the baseline."""
+        answer: object = None
+        while True:
+            try:
+                step = steps.send(answer)
+            except StopIteration:
+                return
+            answer = self._answer(step)
+
+    def _answer(self, step: ProcedureStep) -> object:
+        match step:
+            case Wants():
+                self._call(step.tests[0])
+            case BaselineRan():
+                return self._failures()
+            case FailureFixed():
+                return self.leg()
+            case RoundBegan():
+                self._begin_round(step.round)
+            case Similar():
+                self._go(*self._chain, step.environment)
+                return True
+            case CertificateDue():
+                return self._certificate()
+            case Certified():
+                self.claims = tuple(self._claim(claim, step.certificate.first_run) for claim in step.claims)
+            case LeftOut():
+                self._go(*self._chain, step.environment)
+                return self.leg()
+            case SteppedBack():
+                self._lost.append(self._chain[step.place + 1])
+                self._go(*self._chain[: step.place + 1])
+                return self.leg(step.again)
+        return None
+
+    def _call(self, asked: ProcedureTest) -> None:
+        shown = bool(self._test(frozenset(asked.environment.names(self._names))))
+        self.calls[asked.why] += 1
+        self._known[asked.environment, asked.run] = shown
+        if asked.why == "round":
+            self.trials.append(Trial(asked.environment, shown, self._names))
+        elif asked.environment == self.whole:
+            self._of_whole.append(shown)
+
+    def _failures(self) -> int:
+        if not any(self._of_whole):
+            raise UserError(NOTHING_TO_REDUCE)
+        return sum(self._of_whole)
+
+    def leg(self, again: tuple[Partition, ...] = ()) -> Leg:
+        """The next search, from what is left."""
+        rate = self.rate() if self._keep_rate else 0.0
+        rule = Acceptance(1 + self._iterations, rate, self._keep_rate, len(self._lost))
+        free = {element: Environment.of((element,)) for element in self.left}
+        n_partitions = self._n_partitions.get(self.left)
+        return Leg(self.rounds + 1, self.whole, self._chain, NOTHING, free, rule, n_partitions, again)
+
+    @property
+    def left(self) -> Environment:
+        """The environment that was reached."""
+        return self._chain[-1]
+
+    def _begin_round(self, round: Round) -> None:
+        self.rounds += 1
+        self._last_n = self._n_partitions[self.left] = round.n_partitions
+        if self._on_round is not None:
+            candidates = tuple((candidate.kind, candidate.partition) for candidate in round.candidates)
+            self._on_round(
+                NamedRound(self._named(round.environment), tuple(map(self._named, round.partitions)), candidates)
+            )
+
+    def _named(self, models: Partition) -> Names:
+        return tuple(self._names[model] for model in models)
+
+    def _go(self, *chain: Environment) -> None:
+        """On, or back, along `chain`."""
+        self._chain = chain
+        if self._last_n is not None:
+            self._n_partitions.setdefault(self.left, self._last_n)
+        self.history.append(Step(self.calls.total(), self.left.names(self._names)))
+
+    def _certificate(self) -> Certificate:
+        self._certificates += 1
+        terms = Terms(self._keep_rate, self.rate(), error_of(self._certificates), self._baseline_runs)
+        return Certificate(self._certificates, FIRST_FRESH + self._certificates * EACH_CERTIFICATE, terms)
+
+    def _claim(self, named: NamedClaim, first: int) -> RateClaim:
+        runs = named.claim.runs
+        shown = sum(self._known[named.environment, first + run] for run in range(runs))
+        without = None if named.model is None else self._names[named.model]
+        return RateClaim(without, named.claim.verdict, shown, runs, *wilson_interval(shown, runs))

@@ -5,40 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ddenv.reduction.evidence import Partition
+from ddenv.environment import Environment
 
 CANDIDATES = ("both", "partitions", "complements")
 COMPLEMENT_ORDERS = ("paper", "far-first")
+
+# Models by their numbers, in an order that the algorithm chose.
+Partition = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Candidate:
     """A sub-environment to try: `kind` is "partition" or "complement" of the round's partition number `partition`.
 
-    `part` is that partition. `models` is computed each time: stored, the models of 5,000 complements would take gigabytes.
+    `part` is that partition, `models` are those that are there, `lacks` those of the environment that are not.
     """
 
     kind: str
     partition: int
     part: Partition
-    environment: Partition
-
-    @property
-    def models(self) -> frozenset[str]:
-        """The models that are there."""
-        part = frozenset(self.part)
-        return part if self.kind == "partition" else frozenset(self.environment) - part
-
-    @property
-    def lacks(self) -> frozenset[str]:
-        """The models of the environment that are not there."""
-        part = frozenset(self.part)
-        return part if self.kind == "complement" else frozenset(self.environment) - part
-
-    @property
-    def size(self) -> int:
-        """The number of models that are there."""
-        return len(self.part) if self.kind == "partition" else len(self.environment) - len(self.part)
+    models: Environment
+    lacks: Environment
 
 
 @dataclass(frozen=True)
@@ -63,7 +50,7 @@ class Round:
 
 def one_model_partitions(environment: Partition) -> list[Partition]:
     """Each model as a partition of its own."""
-    return [(name,) for name in environment]
+    return [(model,) for model in environment]
 
 
 def make_round(
@@ -95,24 +82,24 @@ def round_of(
     The empty set is a candidate only if E is a single model.
     """
     partitions, scores = zip(*ranked, strict=True)
-    whole = len(environment)
-    found = []
-    seen: set[tuple[str, int]] = set()
+    whole = Environment.of(environment)
+    parts = [Environment.of(part) for part in partitions]
+    candidates: list[Candidate] = []
+    seen: set[Environment] = set()
     for kind, number in wanted:
-        one = Candidate(kind, number, partitions[number], environment)
-        # Two partitions are each other's complements; otherwise all candidates differ.
-        same = ("partition", 1 - number) if kind == "complement" else ("complement", 1 - number)
-        repeated = (kind, number) in seen or (len(partitions) == 2 and same in seen)
-        if repeated or one.size == whole or (one.size == 0 and whole > 1):
+        models, lacks = parts[number], whole - parts[number]
+        if kind == "complement":
+            models, lacks = lacks, models
+        if models in seen or not lacks or (not models and len(environment) > 1):
             continue
-        seen.add((kind, number))
-        found.append(one)
-    return Round(n_partitions, environment, tuple(partitions), tuple(scores), tuple(found))
+        seen.add(models)
+        candidates.append(Candidate(kind, number, partitions[number], models, lacks))
+    return Round(n_partitions, environment, tuple(partitions), tuple(scores), tuple(candidates))
 
 
 def left_out(group: Partition, environment: Partition, score: float = 0.0) -> Round:
     """A round with one candidate, E without `group`. The group is the first partition, the rest the second."""
     gone = frozenset(group)
-    rest = tuple(name for name in environment if name not in gone)
+    rest = tuple(model for model in environment if model not in gone)
     ranked = [(group, score), (rest, score)] if rest else [(group, score)]
     return round_of(len(ranked), environment, ranked, [("complement", 0)])

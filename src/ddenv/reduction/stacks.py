@@ -9,39 +9,42 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ddenv.reduction.evidence import Partition
+from ddenv.environment import NOTHING, Environment
 from ddenv.reduction.guide import Search
-from ddenv.reduction.round import Candidate, Round
+from ddenv.reduction.round import Candidate, Partition, Round
 
 
 @dataclass(frozen=True)
 class Stacks:
-    """The stacks of an environment by their first models, which stand for them. All are in the environment's order."""
+    """The stacks of an environment by their first models, which stand for them, in the order of the world."""
 
-    by_first: dict[str, Partition]
+    by_first: dict[int, Environment]
 
     @classmethod
-    def of(cls, groups: Iterable[Partition]) -> Stacks:
-        """`groups` are disjoint and not empty, as of `ddenv.resting.stacks`."""
-        return cls({group[0]: group for group in groups})
+    def of(cls, groups: Iterable[Environment]) -> Stacks:
+        """`groups` are disjoint and not empty, as of `ddenv.runfile.supports.stacks`."""
+        return cls({next(iter(group)): group for group in groups})
 
     @property
     def representatives(self) -> Partition:
         """The first model of each stack."""
         return tuple(self.by_first)
 
-    def expanded(self, representatives: Iterable[str]) -> Partition:
+    def expanded(self, representatives: Iterable[int]) -> Partition:
         """All models of the stacks for which `representatives` stand, one stack after the other."""
-        return tuple(name for first in representatives for name in self.by_first[first])
+        return tuple(model for first in representatives for model in self.by_first[first])
 
-    def collapsed(self, models: Iterable[str]) -> Partition:
+    def inside(self, models: Environment) -> Partition:
         """The representatives of the stacks of which all models are among `models`."""
-        there = frozenset(models)
-        return tuple(first for first, stack in self.by_first.items() if there.issuperset(stack))
+        return tuple(first for first, stack in self.by_first.items() if stack <= models)
 
-    def of_any(self, models: frozenset[str]) -> frozenset[str]:
+    def of_any(self, models: Environment) -> Environment:
         """All models of the stacks of which any model is among `models`."""
-        return frozenset(name for stack in self.by_first.values() if not models.isdisjoint(stack) for name in stack)
+        whole = NOTHING
+        for stack in self.by_first.values():
+            if not stack.isdisjoint(models):
+                whole |= stack
+        return whole
 
     def expand(self, search: Search) -> Search:
         """`search`, which knows only the representatives, as a search that tests whole stacks."""
@@ -52,15 +55,22 @@ class Stacks:
             try:
                 round = search.send(winner)
             except StopIteration as end:
-                return frozenset(self.expanded(end.value))
+                return Environment.of(self.expanded(end.value))
             whole = self._expanded(round)
             won = yield whole
             winner = None if won is None else round.candidates[whole.candidates.index(won)]
 
     def _expanded(self, round: Round) -> Round:
-        environment = self.expanded(round.environment)
         candidates = tuple(
-            Candidate(one.kind, one.partition, self.expanded(one.part), environment) for one in round.candidates
+            Candidate(
+                candidate.kind,
+                candidate.partition,
+                self.expanded(candidate.part),
+                Environment.of(self.expanded(candidate.models)),
+                Environment.of(self.expanded(candidate.lacks)),
+            )
+            for candidate in round.candidates
         )
         partitions = tuple(map(self.expanded, round.partitions))
+        environment = self.expanded(round.environment)
         return replace(round, environment=environment, partitions=partitions, candidates=candidates)

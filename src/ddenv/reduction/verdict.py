@@ -1,17 +1,82 @@
-"""The verdicts of a round from its finished tests, and which tests it needs next: the same whichever tests finish first."""
+"""When a candidate is taken, and when it is given up: by its runs in their order, whichever of them finish first."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
-from dataclasses import dataclass
-from typing import Literal, TypeVar
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal, Protocol
 
-from ddenv.reduction.acceptance import Rule, Verdict
+from ddenv.environment import Environment
+from ddenv.evidence.rates import HIGHEST_RATE, SPURIOUS, Shown
 
-Key = TypeVar("Key")
-# Whether a run showed f. A broken one says nothing; None is a run that is not finished.
-Shown = bool | Literal["broken"] | None
-Runs = Callable[[Key, int], Shown]
+Verdict = Literal["", "similar", "dissimilar", "unknown"]
+
+# The baseline goes on to this many runs with f, for up to so many runs, where f is rare.
+FEWEST_SHOWN, LONGEST_BASELINE = 3, 60
+# After this many runs the likelier side counts.
+MOST_RUNS = 40
+
+
+class Rule(Protocol):
+    """Decides from the runs of a candidate, one after the other."""
+
+    def verdict(self, shown: int, missed: int) -> Verdict:
+        """The verdict after `shown` runs that showed what is looked for and `missed` that did not; "" while it is open."""
+        ...
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """The rule of a search. A candidate is dissimilar after `most_misses` runs without f and none with it.
+
+    With `rate` 0 the first run with f makes it similar, as in the paper. Otherwise `rate` is the estimated rate of f in the whole
+    world, and Bayes decides between three rates of the candidate: that one, one that is clearly below `keep_rate` of it, and
+    `SPURIOUS`. After each of `steps_back` the rule is stricter: the search has taken worlds where f is rarer. It bounds no error
+    by itself, the certificate does; it makes a refuted certificate rare.
+    """
+
+    most_misses: int
+    rate: float = 0.0
+    keep_rate: float = 0.8
+    steps_back: int = 0
+
+    def verdict(self, shown: int, missed: int) -> Verdict:
+        """The verdict after `shown` runs with f and `missed` without it, if no fewer of them decided; "" while it is open."""
+        if not shown and missed >= self.most_misses:
+            return "dissimilar"
+        if not self.rate:
+            return "similar" if shown else ""
+        return _by_bayes(self.rate, self.keep_rate, self.steps_back, shown, missed)
+
+    def within(self, runs: int | None) -> Acceptance:
+        """The same rule, by which `runs` runs without f and none with it are enough; None leaves it as it is."""
+        return self if runs is None else replace(self, most_misses=min(runs, self.most_misses))
+
+    @property
+    def misses(self) -> int:
+        """How many runs without f, and none with it, make a candidate dissimilar."""
+        return next(runs for runs in range(1, self.most_misses + 1) if self.verdict(0, runs))
+
+
+@lru_cache(maxsize=4096)
+def _by_bayes(rate: float, keep_rate: float, steps_back: int, shown: int, missed: int) -> Verdict:
+    kept = min(rate, HIGHEST_RATE)
+    # Nearer to the rate that must be kept, the stricter the rule is.
+    lower = kept * (0.5, 0.65, 0.8)[min(steps_back, 2)] * keep_rate / 0.8
+    priors = (0.5, 0.1, 0.4) if steps_back == 0 else (0.5, 0.25, 0.25)
+    weights = [
+        prior * candidate**shown * (1.0 - candidate) ** missed
+        for prior, candidate in zip(priors, (kept, lower, SPURIOUS), strict=True)
+    ]
+    keeps = weights[0] / sum(weights)
+    if keeps >= (0.85 if steps_back == 0 else 0.94):
+        return "similar"
+    if keeps <= 0.03:
+        return "dissimilar"
+    if shown + missed < MOST_RUNS:
+        return ""
+    return "similar" if keeps > 0.5 else "dissimilar"
 
 
 @dataclass(frozen=True)
@@ -30,10 +95,10 @@ class Standing:
 
 
 def standing(
-    candidates: Iterable[Key],
-    shown: Runs[Key],
+    candidates: Iterable[Environment],
+    shown: Callable[[Environment, int], Shown],
     rule: Rule,
-    refused: Container[Key] = frozenset(),
+    refused: Callable[[Environment], bool] = lambda _: False,
     *,
     first: int = 0,
     enough: int | None = None,
@@ -47,8 +112,8 @@ def standing(
     """
     verdicts: list[Verdict] = []
     wanted: list[tuple[int, int]] = []
-    for index, key in enumerate(candidates, first):
-        verdict, missing = ("dissimilar", []) if key in refused else _row(shown, key, rule)
+    for index, candidate in enumerate(candidates, first):
+        verdict, missing = ("dissimilar", []) if refused(candidate) else _row(shown, candidate, rule)
         verdicts.append("" if missing else verdict)
         wanted += [(index, run) for run in missing]
         if verdict == "similar":
@@ -58,7 +123,7 @@ def standing(
     return Standing(tuple(verdicts), None, tuple(wanted))
 
 
-def _row(shown: Runs[Key], candidate: Key, rule: Rule) -> tuple[Verdict, list[int]]:
+def _row(shown: Callable[[Environment, int], Shown], candidate: Environment, rule: Rule) -> tuple[Verdict, list[int]]:
     """The verdict if no missing run shows f, and the missing runs up to there.
 
     A later run that showed f decides nothing while an earlier one is open: else the verdict would depend on timing.
@@ -79,15 +144,15 @@ def _row(shown: Runs[Key], candidate: Key, rule: Rule) -> tuple[Verdict, list[in
     return verdict, missing
 
 
-def decided_by(shown: Callable[[int], Shown], rule: Rule) -> int:
-    """How many runs of a candidate decided its verdict; all of them are finished."""
+def decided_by(shown: Callable[[int], Shown], rule: Rule) -> tuple[int, int]:
+    """How many runs of a candidate decided its verdict, and how many of them showed f; all of them are finished."""
     hits = misses = 0
     while not rule.verdict(hits, misses):
         known = shown(hits + misses)
         if known == "broken":
-            return hits + misses + 1
+            return hits + misses + 1, hits
         if known:
             hits += 1
         else:
             misses += 1
-    return hits + misses
+    return hits + misses, hits

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from ddenv.claims import current, rate
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, rate
 from ddenv.report.report import content, write_report
 from ddenv.report.run_data import Record, read_run
 from ddenv.runfile.events import deed

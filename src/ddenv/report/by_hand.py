@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ddenv.claims import seen
+from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Section, Table, moment, say
 from ddenv.report.run_data import Record
-from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.runfile.progress import Node
+from ddenv.runfile.state import RunState, Trial
 from ddenv.text import plain
 from ddenv.words import count
 

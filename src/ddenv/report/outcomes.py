@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from ddenv.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
+from ddenv.evidence.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
+from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, percent, say, section, thousands
 from ddenv.report.run_data import Record
-from ddenv.runfile.atlas import OtherFailure, atlas, models_of
+from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import AHEAD, BROKEN, RunState
+from ddenv.runfile.state import BROKEN, RunState
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.text import plain
-from ddenv.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.words import count, failed_in
 
 # The maximum number of models with a row each.
@@ -32,12 +32,10 @@ MEANING = {
 PHASES = (
     ("baseline", "whole world"),
     ("round", "in rounds"),
-    (AHEAD, "ahead of their rounds"),
     ("hand", "by hand"),
     ("audit", "audits of slices"),
     ("certify", "fresh runs"),
     ("isolate", "isolation"),
-    ("confirm", "full runs at the end"),
 )
 # The maximum number of failures in the table, and of models by name.
 MOST, MOST_NAMES = 30, 6
@@ -195,7 +193,7 @@ def others_met(record: Record) -> Section | None:
 
 
 def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
-    models = models_of(state, state.tests[failure.smallest - 1])
+    models = state.models_of(state.tests[failure.smallest - 1])
     names: list[Part] = []
     for name in models[:MOST_NAMES]:
         names += [", ", Name(name)]

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from ddenv.claims import current, ended, for_everyone
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, ended, for_everyone
 from ddenv.page.blocks import (
     Name,
     Paragraph,
@@ -31,10 +31,11 @@ from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
 from ddenv.report.why import why
-from ddenv.runfile.events import DEEDS, deed, vector
+from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
+from ddenv.runfile.fold import spent
+from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
-from ddenv.runfile.working import spent
 from ddenv.text import plain
 from ddenv.version import __version__
 from ddenv.words import count
@@ -133,7 +134,7 @@ def _short_of(state: RunState, position: Place) -> str:
     goal = section(state.scenario, "goal")
     try:
         x, y = vector((goal.get("x"), goal.get("y")), 2)
-    except (TypeError, ValueError, OverflowError):
+    except Invalid:
         return ""
     return f", {math.dist((x, y), position[:2]):.1f} m short of the goal at ({x:g}, {y:g})"
 

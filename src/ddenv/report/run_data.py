@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddenv.claims import current
 from ddenv.errors import UserError
-from ddenv.page.blocks import section
+from ddenv.evidence.claims import current
+from ddenv.runfile.events import Created, RoundStarted
 from ddenv.runfile.follow import steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
-from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.store import Recorded, RunFile
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, reasons
 
@@ -54,15 +54,14 @@ def read_run(path: Path) -> Record:
     """Reads a run file; of a damaged one, as much as is valid. Raises UserError if it is not a run file."""
     alive = engine_is_alive(path)
     with RunFile(path) as file:
-        events = file.events()
-        state, rounds, trouble = _story(events)
-        if not state.nodes:
+        first, state, rounds, trouble = _story(file)
+        if first is None or not isinstance(first.event, Created):
             raise UserError(trouble or f"{path}: damaged run file: it has no data for a report")
         troubles = [trouble] if trouble else []
         world = _world(file, troubles)
-        first = None if state.f_test is None else state.f_test.id
-        original = _path(file, first, troubles)
-        same = state.evidence_test == first
+        f = None if state.f_test is None else state.f_test.id
+        original = _path(file, f, troubles)
+        same = state.evidence_test == f
         evidence = original if same else _path(file, state.evidence_test, troubles)
         why = _reasons(file, state, troubles)
         passing = nearest(file, state)
@@ -73,8 +72,8 @@ def read_run(path: Path) -> Record:
         path=path,
         state=state,
         rounds=rounds,
-        asked=section(events[0].data, "scenario"),
-        started=events[0].time,
+        asked=first.event.scenario,
+        started=first.time,
         alive=alive,
         world=world,
         original=original,
@@ -88,26 +87,27 @@ def read_run(path: Path) -> Record:
     )
 
 
-def _story(events: Iterable[Event]) -> tuple[RunState, tuple[Round, ...], str]:
-    """The state at the end or before the first damaged event, every round as it ended, and what is wrong."""
-    state = RunState()
+def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...], str]:
+    """The first event, the state at the end or before the first damaged event, every round as it ended, and what is wrong."""
+    first, state = None, RunState()
     rounds: dict[int, Round] = {}
     trouble = ""
     try:
-        for event, before, after in steps(events):
+        for recorded, before, after in steps(file.read()):
+            first = first or recorded
             # A round does not change after its end.
-            if event.kind == "round_started" and before.round is not None:
+            if isinstance(recorded.event, RoundStarted) and before.round is not None:
                 rounds[before.round.number] = before.round
             state = after
     except UserError as error:
         trouble = f"{error}; the report shows what came before it"
     if state.round is not None:
         rounds[state.round.number] = state.round
-    return state, tuple(rounds.values()), trouble
+    return first, state, tuple(rounds.values()), trouble
 
 
 def _world(file: RunFile, troubles: list[str]) -> World | None:
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     try:
         return read_parts(file)[1]

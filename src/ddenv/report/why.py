@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ddenv.claims import current, rate
+from ddenv.evidence.claims import current, rate
 from ddenv.page.blocks import Block, Picture, Section, Table, say
 from ddenv.report.report_map import CORNERS, two_ways
 from ddenv.report.run_data import Record

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ddenv.runfile.failures import Place, alike, named
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Candidate, RunState, Test, Trial
+from ddenv.runfile.state import RunState
 
 # Tests grouped at a time: the first ones find the centres of frequent failures, and most of the later ones are close to these.
 CHUNK = 400
@@ -31,24 +31,6 @@ class OtherFailure:
     @property
     def name(self) -> str:
         return named((self.kind,), self.position)
-
-
-def models_of(state: RunState, test: Test) -> tuple[str, ...]:
-    """The models in the world of a test that failed. Of tests that did not, the state does not know them in all cases."""
-    if test.phase == "baseline":
-        return state.elements
-    row = _row(state, test)
-    if row is not None:
-        return row.models
-    if test.removal is not None:
-        return without_removal(state, test.removal)
-    return tuple(name for name in state.nodes[test.node].environment if name != test.without)
-
-
-def without_removal(state: RunState, number: int) -> tuple[str, ...]:
-    """The models of the whole world after removal number `number`, from 1."""
-    gone = frozenset(state.removals[number - 1].models)
-    return tuple(name for name in state.elements if name not in gone)
 
 
 def atlas(state: RunState) -> tuple[OtherFailure, ...]:
@@ -90,16 +72,6 @@ def _by_end(ends: list[tuple[int, Place]], epsilon: float) -> Iterable[tuple[Pla
 
 
 def _failure(state: RunState, kind: str, position: Place, tests: list[int]) -> OtherFailure:
-    sizes = {test: _size(state, state.tests[test - 1]) for test in tests}
+    sizes = {test: len(state.environments[state.tests[test - 1].environment]) for test in tests}
     smallest = min(tests, key=lambda test: (sizes[test], test))
     return OtherFailure(kind, position, tuple(sorted(tests)), smallest, sizes[smallest])
-
-
-def _size(state: RunState, test: Test) -> int:
-    row = _row(state, test)
-    return len(models_of(state, test)) if row is None else row.size
-
-
-def _row(state: RunState, test: Test) -> Candidate | Trial | None:
-    """The candidate or try that a test was made for."""
-    return test.tried if test.trial is None else state.trials[test.trial - 1]

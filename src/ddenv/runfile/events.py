@@ -1,155 +1,670 @@
-"""The events of a run file, and checks of the values in them.
+"""The events of a run file: what each says, as frozen dataclasses with their units.
 
-The kinds of events with their data. Models are indices into the run's `elements`; fields marked ? may be missing:
-
-    created              scenario {...}, elements [names]
-    engine_started       pid, jobs, version (of ddenv), simulator (Drake and numpy with their versions, or the oracle), machine?
-                         (Python and the processor)
-    cluster              jobs (how many tests its workers can make at the same time now), words: what has happened to it
-    comparing            test: it is made again, because this engine computes with something else than the earlier ones
-    compared             same: whether its bits are the same; if not, the user goes on with mixed tests
-    supports_started     the piles are being settled, to find what rests on what; only if that takes more than a second
-    supports             pairs [[upper, lower]], why? (it is unknown): what rests on what once the whole world has settled; ties?
-                         [[model, other]] or null: which model would move by itself without which other; null if that is unknown
-    still                nothing in the world moves by itself: there are no ties
-    noted                about, words: what is wrong with the whole world; a sentence about each thing, once
-    test_started         test, phase, round, candidate, run, seed; if phase is "certify" or "audit" (of a slice): node, without?
-                         (a model); if it is "hand": trial; if it is "isolate": removal; audits? (the test that implies it: it is
-                         simulated to be compared)
-    test_finished        test, outcome, failure, distance, end_pose, simulated_seconds, wall_seconds,
-                         first_sensed [[model, s]], first_touched [[model, s]], cut, took_part? [models that can have
-                         changed a bit of it], taken? (the run whose result was copied); trajectories beside it
-    implied              as test_started, and by (a test): the result is that of this test, which has its trajectories
-    sliced               environment [..], tests [ids] of which what took part is left, evidence_test, audit (whether one of
-                         them is simulated there, too)
-    slices_refuted       test, by, node: this audit does not repeat the test by, which implies it; slices are no longer used,
-                         implied tests are void, and the run goes back to node
-    test_lost            test: it was running when the engine died
-    baseline_finished    the fields of `Baseline`, and outcomes {test: outcome}, distances {test: m}
-    leg_started          round (number of the next one), n_partitions: a new search starts after a decision of the user
-    round_started        round, n_partitions, environment [..], partitions [[..]], candidates [[kind, partition, distance or null]],
-                         pinned? [..]
-    forecast             round, tests [low, likely, high]: how many were left when tests_done of them were finished
-    candidate_judged     candidate, verdict (similar, missed, dissimilar or unknown), tests [ids], known
-    waiting              candidate
-    decided              candidate, decision: accept or reject
-    reduced              candidate, environment [..], evidence_test
-    round_finished
-    certificate_started  certificate, run (the number of its first), rate, keep_rate, error, at_least: full runs with fresh seeds
-                         follow
-    certificate_finished claims [{without (a model or null), verdict, shown, runs, low, high, outcomes {outcome: number}}], tests
-                         [ids] that they rest on
-    rate_lost            node (the run goes back to it), lost (the node after it), again [[models]] (to leave out at once, or in
-                         halves), tests [ids] that this rests on
-    left_out             without, environment [..], evidence_test: the certificate showed that this model is not needed
-    isolation_started    isolation, run (the number of its first fresh run), block (fresh runs of a check), wanted, rather_than,
-                         keep_rate, error, at_least, suspects [..], size, before: the fewest models are sought that have to go from
-                         the whole world so that the robot reaches its goal
-    removal_tried        removal, models [..]: tests of the whole world without these follow, with phase "isolate" and this removal
-    removal_judged       removal, verdict (passes, fails or unknown), tests [ids]
-    isolation_checked    removal, claims [{back (a model or null), verdict, reached, runs, low, high}], tests [ids]: fresh runs
-    isolation_finished   removal (null if there is no such world)
-    isolation_given_up
-    confirm_started      (format 4) the rounds are over; full runs of what is left follow
-    paused / resumed
-    room                 enough, needed, free (bytes): without enough room on the disk no tests are started
-    clock_jumped         seconds that Unix time went on or back at once: the machine slept, or its clock was set
-    accept_mode          mode
-    vetoed               candidate, verdict: vetoed; with `again`? also rejected or undone: the same models were refused so before
-    unvetoed             round, candidate
-    pinned / unpinned    models [..]
-    trial_started        trial, models [..]: the user tries a selection
-    trial_judged         trial, verdict, tests [ids], known
-    adopted              trial, environment [..], evidence_test
-    accepted_other       test, what, trial? or null, environment [..], outcomes {test: outcome}, distances {test: m}, instead? (a
-                         branch: the failure is f from here on, in place of what was f)
-    went_back            node, rejected (the node that is undone, or null), outcomes? and distances? of tests, if other failures
-                         count as f there
-    changed              settings {...}: keys of the scenario's section `reduction`
-    command_refused      why
-    command_handled      command: it caused no other event
-    finished             minimal, reason
-    engine_stopped       reason
-    engine_failed        reason
-
-An event caused by a viewer's command also holds `command`, its number.
+Models are numbers into the run's `elements`, environments are numbers into those that `EnvironmentNamed` has, tests count
+from 1. A field with a default may be missing in a file. Times are in s, places in m.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args
 
-# The data of an event; the fields of the state that it changes, with their new values.
-Data = dict[str, Any]
-Changes = dict[str, Any]
-Names = tuple[str, ...]
-LATEST = 1e11  # maximum time, Unix time in s: the year 5138
-# No robot comes so far, no test takes so long, and no run counts so far (m, s). Squares of these are still numbers.
-LARGEST = 1e15
+from ddenv.environment import NOTHING, Environment
+from ddenv.runfile.reading import OneOf, Range
 
-
-def number(value: Any) -> float:
-    """A number that something in a run can have."""
-    found = float(value)
-    if not abs(found) <= LARGEST:
-        raise ValueError(value)
-    return found
+Natural = Annotated[int, Range(0)]
+Number = Annotated[int, Range(1)]
+Share = Annotated[float, Range(0, 1)]
+Seconds = Annotated[float, Range(0)]
+Pair = tuple[Natural, Natural]
+Pose = tuple[float, float, float, float, float, float, float]
+Place = tuple[float, float, float]
+Phase = Annotated[str, OneOf("baseline", "round", "hand", "audit", "certify", "isolate")]
+Outcome = Annotated[str, OneOf("similar", "other", "pass", "error", "timeout", "failed")]
+Verdict = Annotated[str, OneOf("similar", "dissimilar", "unknown")]
 
 
-def whole(value: Any) -> int:
-    """A whole number that something in a run can have."""
-    found = int(value)
-    if not abs(found) <= LARGEST:
-        raise ValueError(value)
-    return found
+# The engine.
 
 
-def chance(value: Any) -> float:
-    """A number from 0 to 1."""
-    part = number(value)
-    if not 0 <= part <= 1:
-        raise ValueError(value)
-    return part
+@dataclass(frozen=True, slots=True)
+class Created:
+    """The first event: the scenario as plain data, and the names of all models that may go."""
+
+    scenario: dict[str, Any]
+    elements: tuple[str, ...]
 
 
-def moment(value: Any) -> float:
-    """A Unix time, s, that a calendar can show."""
-    time = number(value)
-    if not 0 <= time < LATEST:
-        raise ValueError(value)
-    return time
+@dataclass(frozen=True, slots=True)
+class EngineStarted:
+    """`version` is that of ddenv, `simulator` has those of Drake and numpy, or the oracle, `machine` Python and the processor."""
+
+    pid: int
+    jobs: Natural
+    version: str
+    simulator: str
+    machine: str = ""
 
 
-def one_of(value: Any, *words: str) -> str:
-    """One of these words."""
-    if value not in words:
-        raise ValueError(value)
-    return str(value)
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """What has happened to a cluster, in `words`, and how many tests its workers can make at the same time now."""
+
+    jobs: Natural
+    words: str
 
 
-def vector(values: Iterable[Any], length: int) -> tuple[float, ...]:
-    """`length` finite numbers."""
-    numbers = tuple(number(value) for value in values)
-    if len(numbers) != length:
-        raise ValueError(values)
-    return numbers
+@dataclass(frozen=True, slots=True)
+class Comparing:
+    """A test is made again, because this engine computes with something else than the earlier ones."""
+
+    test: Number
 
 
-def names(elements: Names, numbers: list[int]) -> Names:
-    """The models with these indices."""
-    if min(numbers, default=0) < 0:
-        raise IndexError(numbers)
-    return tuple(elements[index] for index in numbers)
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Whether its bits are the same; if not, the user goes on with mixed tests."""
+
+    same: bool
 
 
-def moments(elements: Names, pairs: Iterable[Any]) -> tuple[tuple[str, float], ...]:
-    """(name, s) for each pair of a model's index and a time since the start of a test, s."""
-    found = [(index, number(time)) for index, time in pairs]
-    if not all(index >= 0 and time >= 0 for index, time in found):
-        raise ValueError(pairs)
-    return tuple((elements[index], time) for index, time in found)
+@dataclass(frozen=True, slots=True)
+class Paused:
+    """No new test starts."""
 
+
+@dataclass(frozen=True, slots=True)
+class Resumed:
+    """Tests start again."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiskSpace:
+    """Whether the disk has room for more tests: `needed` bytes; `free` are there."""
+
+    enough: bool
+    needed: Natural
+    free: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class ClockJumped:
+    """Unix time went on or back by so many seconds at once: the machine slept, or its clock was set."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The run ended by itself. `minimal` says whether no model can be removed."""
+
+    minimal: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EngineStopped:
+    """The engine was stopped and can be resumed."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EngineFailed:
+    """The engine could not go on."""
+
+    reason: str
+
+
+# The world.
+
+
+@dataclass(frozen=True, slots=True)
+class SupportsStarted:
+    """The piles are being settled, to find what rests on what; only if that takes more than a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Supports:
+    """The first model of each pair rests on the second once the whole world has settled; `why` that is unknown.
+
+    The first model of each tie would move by itself without the second; None if that is unknown.
+    """
+
+    pairs: tuple[Pair, ...]
+    ties: tuple[Pair, ...] | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """Nothing in the world moves by itself: there are no ties."""
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """A sentence about something that is wrong with the whole world; one `about` each thing."""
+
+    about: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentNamed:
+    """These models are environment number `environment`, from 0; the whole world is number 0 without an event."""
+
+    environment: Number
+    models: Environment
+
+
+# Tests.
+
+
+@dataclass(frozen=True, slots=True)
+class TestStarted:
+    """Run number `run` of an environment, with a seed of its own. `phase` says what for: see `ddenv.runfile.state.Test`.
+
+    `without` is the model that a fresh run leaves out, or puts back. It `audits` the test that implies it.
+    """
+
+    test: Number
+    environment: Natural
+    run: Natural
+    seed: Natural
+    phase: Phase
+    round: Number | None = None
+    candidate: Natural | None = None
+    trial: Number | None = None
+    without: Natural | None = None
+    audits: Number | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Implied:
+    """As `TestStarted`; the result is that of the test `by`, which has its trajectories."""
+
+    test: Number
+    by: Number
+    environment: Natural
+    run: Natural
+    seed: Natural
+    phase: Phase
+    round: Number | None = None
+    candidate: Natural | None = None
+    trial: Number | None = None
+    without: Natural | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TestFinished:
+    """How a test ended; its trajectories stand beside it.
+
+    `distance` is from the robot's end to that of f, m; `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` is a key of `DEEDS`, or
+    why the simulation broke. `first_sensed` and `first_touched` have (model, s). `cut`: it ended early. `took_part` are the models
+    that can have changed a bit of it. `taken` is the run whose result was copied.
+    """
+
+    test: Number
+    outcome: Outcome
+    failure: str
+    distance: float | None
+    end_pose: Pose | None
+    simulated_seconds: Seconds
+    wall_seconds: Seconds
+    first_sensed: tuple[tuple[Natural, Seconds], ...] = ()
+    first_touched: tuple[tuple[Natural, Seconds], ...] = ()
+    cut: bool = False
+    took_part: Environment | None = None
+    taken: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TestLost:
+    """A test was running when the engine ended."""
+
+    test: Number
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A failure that `runs` of the whole world showed; `test` is the one in their middle, which ended at `position`, m."""
+
+    test: Number
+    runs: Natural
+    kinds: tuple[str, ...]
+    position: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """Tests that are judged anew, by their ids: their outcomes, and how far from f they ended, m."""
+
+    outcomes: dict[int, Outcome]
+    distances: dict[int, float]
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineFinished:
+    """f is fixed: the fields are those of `ddenv.runfile.failures.Baseline`."""
+
+    runs: Natural
+    failures: Natural
+    rate: Share
+    low: Share
+    high: Share
+    failure_test: Number
+    position: Place
+    miss_chance: Share
+    iterations_95: Natural
+    judged: Outcomes
+    broken: Natural = 0
+    wall_limit: Seconds | None = None
+    seen: tuple[Seen, ...] = ()
+
+
+# The search.
+
+
+@dataclass(frozen=True, slots=True)
+class LegStarted:
+    """A search starts from the current environment, with round number `round`.
+
+    Its first round has `n_partitions`, None for the scenario's. It keeps `keep_rate` of the `rate`; with 0 the first run with f
+    decides.
+    """
+
+    round: Number
+    n_partitions: Number | None = None
+    rate: Share = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RoundStarted:
+    """An environment is split into partitions; candidates are "partition" or "complement", the number of the partition, and the
+    distance that ranks it, m, if it is one.
+    """
+
+    round: Number
+    n_partitions: Natural
+    environment: Natural
+    partitions: tuple[tuple[Natural, ...], ...]
+    candidates: tuple[tuple[Annotated[str, OneOf("partition", "complement")], Natural, float | None], ...]
+    pinned: Environment = NOTHING
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """How many tests were left, low, likely and high, when `tests_done` of them were finished."""
+
+    round: Number
+    tests: tuple[Natural, Natural, Natural]
+    tests_done: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateJudged:
+    """The verdict on a candidate, by these tests; `known` of them were made for something else."""
+
+    round: Number
+    candidate: Natural
+    verdict: Annotated[str, OneOf("similar", "missed", "dissimilar", "unknown")]
+    tests: tuple[Number, ...]
+    known: Natural = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A candidate showed f, and waits for the user."""
+
+    round: Number
+    candidate: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """The user accepts or rejects it."""
+
+    round: Number
+    candidate: Natural
+    decision: Annotated[str, OneOf("accept", "reject")]
+
+
+@dataclass(frozen=True, slots=True)
+class Reduced:
+    """A candidate becomes the environment; `evidence_test` is a run of it that showed f."""
+
+    round: Number
+    candidate: Natural
+    environment: Natural
+    evidence_test: Number
+
+
+@dataclass(frozen=True, slots=True)
+class RoundFinished:
+    """A round is over."""
+
+    round: Number
+
+
+@dataclass(frozen=True, slots=True)
+class Sliced:
+    """The environment is cut down to what took part in these tests. `audit`: one of them is simulated there, too."""
+
+    environment: Natural
+    tests: tuple[Number, ...]
+    evidence_test: Number
+    audit: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SlicesRefuted:
+    """The audit `test` does not repeat the test `by`, which implies it. Slices are no longer used, implied tests are void, and the
+    run goes back to a node.
+    """
+
+    test: Number
+    by: Number
+    node: Natural
+
+
+# Certificates.
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateStarted:
+    """Full runs with fresh seeds follow, from run number `run` on. What is left has to keep `keep_rate` of `rate`."""
+
+    certificate: Number
+    run: Natural
+    rate: Share
+    keep_rate: Share
+    error: Annotated[float, Range(1e-9, 1)]
+    at_least: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimMade:
+    """A claim about an environment: about what is left, or, if `without` is a model, about that without it.
+
+    `shown` of `runs` showed f, `low`..`high` is their interval; `outcomes` counts all of them.
+    """
+
+    without: Natural | None
+    environment: Natural
+    verdict: Annotated[str, OneOf("kept", "lost", "needed", "not needed", "not shown", "unknown")]
+    shown: Natural
+    runs: Natural
+    low: Share
+    high: Share
+    outcomes: dict[str, Natural]
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateFinished:
+    """What fresh runs show; the claims rest on these tests."""
+
+    claims: tuple[ClaimMade, ...]
+    tests: tuple[Number, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RateLost:
+    """The run goes back to `node`, since what is left lost the rate; the node `lost` after it is not taken again.
+
+    The groups `again` are left out at once, or in halves.
+    """
+
+    node: Natural
+    lost: Natural
+    again: tuple[tuple[Natural, ...], ...]
+    tests: tuple[Number, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A certificate showed that a model is not needed."""
+
+    without: Natural
+    environment: Natural
+    evidence_test: Number
+
+
+# Isolation.
+
+
+@dataclass(frozen=True, slots=True)
+class IsolationStarted:
+    """The fewest models are sought that have to go from the whole world so that the robot reaches its goal.
+
+    Fresh runs begin at number `run`; each check has `block` of them. A world passes at the rate `wanted` rather than `rather_than`.
+    The `suspects` go first to last, at first `size` of them. `before` is why the reduction had ended.
+    """
+
+    isolation: Number
+    run: Natural
+    block: Number
+    wanted: Share
+    rather_than: Share
+    keep_rate: Share
+    error: Annotated[float, Range(1e-9, 1)]
+    at_least: Natural
+    suspects: tuple[Natural, ...]
+    size: Natural
+    before: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemovalJudged:
+    """What the search says of an environment of isolation."""
+
+    environment: Natural
+    verdict: Annotated[str, OneOf("passes", "fails", "unknown")]
+    tests: tuple[Number, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnedMade:
+    """A claim of a check: about a world that passes, or, if `back` is a model, about that with it put back."""
+
+    back: Natural | None
+    verdict: Annotated[str, OneOf("passes", "fails", "needed", "not needed", "not shown", "unknown")]
+    reached: Natural
+    runs: Natural
+    low: Share
+    high: Share
+
+
+@dataclass(frozen=True, slots=True)
+class IsolationChecked:
+    """What fresh runs show of an environment; the claims rest on these tests."""
+
+    environment: Natural
+    claims: tuple[ReturnedMade, ...]
+    tests: tuple[Number, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class IsolationFinished:
+    """The environment in which the robot passes; None if there is none."""
+
+    environment: Natural | None
+
+
+@dataclass(frozen=True, slots=True)
+class IsolationGivenUp:
+    """The user ends it."""
+
+
+# Decisions of the user.
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptModeChanged:
+    """Reductions are made at once, or wait for the user."""
+
+    mode: Annotated[str, OneOf("automatic", "ask")]
+
+
+@dataclass(frozen=True, slots=True)
+class Vetoed:
+    """A candidate is left out; `again`: because the same models were refused before."""
+
+    round: Number
+    candidate: Natural
+    verdict: Annotated[str, OneOf("vetoed", "rejected", "undone")] = "vetoed"
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unvetoed:
+    """It is tried after all."""
+
+    round: Number
+    candidate: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class Pinned:
+    """These models always stay."""
+
+    models: tuple[Natural, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Unpinned:
+    """These models may go again."""
+
+    models: tuple[Natural, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialStarted:
+    """The user tries a selection."""
+
+    trial: Number
+    environment: Natural
+
+
+@dataclass(frozen=True, slots=True)
+class TrialJudged:
+    """Its verdict, as of a candidate."""
+
+    trial: Number
+    verdict: Verdict
+    tests: tuple[Number, ...]
+    known: Natural = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Adopted:
+    """A try becomes the environment."""
+
+    trial: Number
+    environment: Natural
+    evidence_test: Number
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedOther:
+    """The failure of a test counts as f from here on; `what` names it. `instead`: in a branch, in place of what was f."""
+
+    test: Number
+    what: str
+    environment: Natural
+    judged: Outcomes
+    trial: Number | None = None
+    instead: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class WentBack:
+    """A node is the current one again; `rejected` is the node that is undone. `judged` if other failures count as f there."""
+
+    node: Natural
+    rejected: Natural | None = None
+    judged: Outcomes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """New values of keys in the scenario's section `reduction`."""
+
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRefused:
+    """A command was not possible."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class CommandHandled:
+    """A command caused no other event."""
+
+
+Event = (
+    Created
+    | EngineStarted
+    | Cluster
+    | Comparing
+    | Compared
+    | Paused
+    | Resumed
+    | DiskSpace
+    | ClockJumped
+    | Finished
+    | EngineStopped
+    | EngineFailed
+    | SupportsStarted
+    | Supports
+    | Still
+    | Noted
+    | EnvironmentNamed
+    | TestStarted
+    | Implied
+    | TestFinished
+    | TestLost
+    | BaselineFinished
+    | LegStarted
+    | RoundStarted
+    | Forecast
+    | CandidateJudged
+    | Waiting
+    | Decided
+    | Reduced
+    | RoundFinished
+    | Sliced
+    | SlicesRefuted
+    | CertificateStarted
+    | CertificateFinished
+    | RateLost
+    | LeftOut
+    | IsolationStarted
+    | RemovalJudged
+    | IsolationChecked
+    | IsolationFinished
+    | IsolationGivenUp
+    | AcceptModeChanged
+    | Vetoed
+    | Unvetoed
+    | Pinned
+    | Unpinned
+    | TrialStarted
+    | TrialJudged
+    | Adopted
+    | AcceptedOther
+    | WentBack
+    | Changed
+    | CommandRefused
+    | CommandHandled
+)
+KINDS: dict[str, type[Event]] = {
+    "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in kind.__name__)[1:]: kind
+    for kind in get_args(Event)
+}
+NAMES: dict[type[Event], str] = {kind: name for name, kind in KINDS.items()}
 
 # What the robot did, by the `failure` of a test. Any other `failure` says why the simulation broke.
 DEEDS = {
@@ -164,15 +679,3 @@ DEEDS = {
 def deed(failure: str) -> str:
     """What the robot did, such as "tipped over"; "failed" if nothing more is known."""
     return DEEDS.get(failure, "failed")
-
-
-def as_it_was(scenario: Data) -> Data:
-    """A scenario of a run file, with what older versions of ddenv did without a setting for it."""
-    reduction, failure = scenario.get("reduction"), scenario.get("failure")
-    if isinstance(reduction, dict):
-        before = {"accept_rate": "first", "keep_rate": 0.8, "early_stop": False, "slice": False}
-        if isinstance(failure, dict) and "early_stop" in failure:
-            before["early_stop"] = failure["early_stop"]
-            scenario = {**scenario, "failure": {key: value for key, value in failure.items() if key != "early_stop"}}
-        scenario = {**scenario, "reduction": {**before, **reduction}}
-    return scenario

@@ -1,4 +1,7 @@
-"""Folds events into the state of a run. Pure: `apply(state, event)` returns the next state."""
+"""Folds events into the state of a run. Pure: `apply(state, recorded)` returns the next state.
+
+What each event changes stands here and in the files `fold_*.py` beside this one, a function for each.
+"""
 
 from __future__ import annotations
 
@@ -8,63 +11,63 @@ from functools import reduce
 from typing import Any
 
 from ddenv.amounts import count
+from ddenv.environment import Environment
 from ddenv.errors import UserError
-from ddenv.runfile import (
-    fold_ahead,
-    fold_baseline,
-    fold_certificates,
-    fold_decisions,
-    fold_isolation,
-    fold_rates,
-    fold_slices,
-    supports,
-    working,
-)
-from ddenv.runfile.events import Changes, Data, as_it_was, moments, names, number, one_of, vector, whole
-from ddenv.runfile.fold_decisions import arrived, counts, decision, here, waits_no_more, with_test
+from ddenv.runfile import events as e
+from ddenv.runfile import fold_claims, fold_decisions, fold_tests
+from ddenv.runfile.fold_decisions import arrived, decision, refused, waits_no_more
+from ddenv.runfile.fold_tests import Changes, current, tried, with_candidate, with_node
 from ddenv.runfile.persistent import PersistentTuple
-from ddenv.runfile.progress import Forecast, Point
-from ddenv.runfile.state import REFUSED, Candidate, Node, Round, RunState, Split, Test, Trial
-from ddenv.runfile.store import Event, uncollected
+from ddenv.runfile.progress import Forecast, Node, PastRound, Point
+from ddenv.runfile.state import Candidate, Round, RunState, Split
+from ddenv.runfile.store import Recorded, uncollected
 
 
-def fold(events: Iterable[Event], state: RunState | None = None) -> RunState:
-    """The state after `events`, from the beginning or from an earlier `state`. Raises UserError for invalid events."""
+def fold(recorded: Iterable[Recorded], state: RunState | None = None) -> RunState:
+    """The state after these events, from the beginning or from an earlier `state`. Raises UserError for invalid ones."""
     with uncollected():
-        return reduce(apply, events, state or RunState())
+        return reduce(apply, recorded, state or RunState())
 
 
-def apply(state: RunState, event: Event) -> RunState:
+def apply(state: RunState, recorded: Recorded) -> RunState:
     """The state after one more event. Raises UserError if the event is not valid in this state."""
-    handler = _HANDLERS.get(event.kind)
-    if handler is None:
-        raise UserError(f"damaged run file: event {event.id} is of an unknown kind {event.kind[:40]!a}")
+    event = recorded.event
     try:
-        changes = fold_ahead.counted(state, event.kind, event.data, handler(state, event.data, event.time))
-        if (command := event.data.get("command")) is not None:
-            changes["last_command"] = max(state.last_command, int(command))
+        changes = _HANDLERS[type(event)](state, event, recorded.time)
+        changes = fold_tests.counted_ahead(state, event, changes)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, RecursionError):
-        raise UserError(f"damaged run file: event {event.id} ({event.kind}) is invalid here") from None
-    return working.counted(state, state.changed(revision=event.id, updated_at=event.time, **changes))
+        raise UserError(f"damaged run file: event {recorded.id} ({recorded.kind}) is invalid here") from None
+    if recorded.command is not None:
+        changes["last_command"] = max(state.last_command, recorded.command)
+        if isinstance(event, e.CommandRefused):
+            changes["refusal"] = recorded.command, event.why
+    after = state.changed(revision=recorded.id, updated_at=recorded.time, **changes)
+    return _with_clock(state, after)
 
 
-def _created(state: RunState, data: Data, _: float) -> Changes:
+def _created(state: RunState, event: e.Created, _: float) -> Changes:
     if state.tests or len(state.nodes) > 1 or state.round is not None:
         raise ValueError("a second created")
-    elements = tuple(str(name) for name in data["elements"])
+    names = event.elements
     return {
-        "scenario": as_it_was(dict(data["scenario"])),
-        "elements": elements,
-        "environment": elements,
-        "history": (Point(0, len(elements)),),
-        "nodes": (Node(0, None, "start", "the whole world", elements),),
+        "scenario": event.scenario,
+        "elements": names,
+        "environments": PersistentTuple.of([Environment.whole(len(names))]),
+        "environment": names,
+        "history": (Point(0, len(names)),),
+        "nodes": (Node(0, None, "start", "the whole world", names),),
     }
 
 
-def _engine_started(state: RunState, data: Data, at: float) -> Changes:
+# The engine, and for how long it works: no pause counts, nor the time in which a reduction waits for the user or for the disk.
+
+
+def _engine_started(state: RunState, event: e.EngineStarted, at: float) -> Changes:
+    # Tests that broke are made again; verdicts that rest on them may change, so the search starts again.
+    anew = state.left_unknown and state.baseline is not None
     return {
         # A killed engine wrote no end: it worked at least until its last event.
-        **working.stopped(state, state.updated_at),
+        **_stopped(state, state.updated_at),
         "status": "baseline" if state.baseline is None else "running",
         "reason": "",
         "paused": False,
@@ -72,327 +75,323 @@ def _engine_started(state: RunState, data: Data, at: float) -> Changes:
         "waiting_candidate": None,
         "confirming": state.certificate is not None and not state.certificate.claims,
         "settling": False,
-        "jobs": whole(data["jobs"]),
-        "engine_version": str(data["version"]),
-        "simulator": str(data["simulator"]),
-        "physics": state.physics.started(data, state.tests_done),
+        "jobs": event.jobs,
+        "engines": state.engines + 1,
+        "left_unknown": False,
+        "search_due": state.search_due or anew,
+        "engine_version": event.version,
+        "simulator": event.simulator,
+        "physics": state.physics.started(event, state.tests_done),
         "started_at": at,
     }
 
 
-def _noted(state: RunState, data: Data, _: float) -> Changes:
-    return {"notes": (*state.notes, (str(data["about"]), str(data["words"])))}
+def _compared(state: RunState, event: e.Compared, _: float) -> Changes:
+    mixed_until = state.mixed_until if event.same else len(state.tests)
+    return {"physics": state.physics.compared(event.same), "mixed_until": mixed_until}
 
 
-def _test_started(state: RunState, data: Data, _: float) -> Changes:
-    round, candidate = data["round"], data["candidate"]
-    without = data.get("without")
-    tried = fold_ahead.tried(state, data) if round is None else _tried(state, candidate)
-    test = Test(
-        id=whole(data["test"]),
-        phase=str(data["phase"]),
-        round=round,
-        candidate=candidate,
-        run=whole(data["run"]),
-        seed=whole(data["seed"]),
-        without=None if without is None else names(state.elements, [without])[0],
-        trial=data.get("trial"),
-        removal=fold_isolation.removal_of(state, data),
-        audits=data.get("audits"),
-        node=data.get("node", state.node),
-        tried=tried,
-    )
-    # Raises IndexError if there is none.
-    here(state, test.node)
-    if test.id != len(state.tests) + 1:
-        raise ValueError(test.id)
-    more = {"audits": state.audits + (test.audits is not None), **fold_certificates.with_fresh(state, test)}
-    changes = {"tests": state.tests.added(test), **counts(state, None, test), **more}
-    if test.trial is not None:
-        return changes | {"trials": _with_test_of_trial(state, test)}
-    if round is None or tried is None:
-        return changes
-    if round != _current(state).number:
-        raise ValueError(round)
-    return changes | _with_candidate(state, replace(tried, tests=(*tried.tests, test.id)))
-
-
-def _test_finished(state: RunState, data: Data, _: float) -> Changes:
-    distance, pose = data["distance"], data["end_pose"]
-    values = {
-        "outcome": str(data["outcome"]),
-        "failure": str(data["failure"]),
-        "distance": None if distance is None else number(distance),
-        "end_pose": None if pose is None else vector(pose, 7),
-        "simulated_seconds": number(data["simulated_seconds"]),
-        "wall_seconds": number(data["wall_seconds"]),
-        "first_sensed": moments(state.elements, data["first_sensed"]),
-        "first_touched": moments(state.elements, data["first_touched"]),
-        "cut": bool(data["cut"]),
-        "took_part": None if data.get("took_part") is None else frozenset(names(state.elements, data["took_part"])),
-        "taken": "taken" in data,
+def _ended(state: RunState, status: str, reason: str, at: float) -> Changes:
+    return {
+        **_stopped(state, at),
+        "status": status,
+        "reason": reason,
+        "waiting_candidate": None,
+        "paused": False,
     }
-    return _ended_as(state, whole(data["test"]), values)
 
 
-def _ended_as(state: RunState, test: int, values: Data) -> Changes:
-    if values["outcome"] not in ("similar", "other"):
-        # Few tests fail: the rounds of all others need not be kept.
-        values["tried"] = None
-    changes = with_test(state, test, values)
-    return changes | fold_rates.noted(state, changes["tests"][test - 1])
+def _finished(state: RunState, event: e.Finished, at: float) -> Changes:
+    size, here = len(state.environment), state.nodes[state.node]
+    return {
+        **_ended(state, "finished", event.reason, at),
+        "minimal": event.minimal,
+        "nodes": with_node(state.nodes, replace(here, minimal=event.minimal)),
+        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
+    }
 
 
-def _implied(state: RunState, data: Data, at: float) -> Changes:
-    """A test that starts and ends at once."""
-    started = _test_started(state, data, at)
-    now = state.changed(**started)
-    ended = _ended_as(now, len(now.tests), fold_slices.result_of(now, whole(data["by"])))
-    return {**started, **ended, "implied": state.implied + 1}
-
-
-def _test_lost(state: RunState, data: Data, _: float) -> Changes:
-    changes = with_test(state, whole(data["test"]), {"outcome": "lost"})
-    lost = state.tests[whole(data["test"]) - 1]
-    return changes | {"audits": state.audits - (lost.audits is not None)}
-
-
-def _round_started(state: RunState, data: Data, _: float) -> Changes:
-    environment = names(state.elements, data["environment"])
-    partitions = tuple(names(state.elements, part) for part in data["partitions"])
-    split = Split(environment, partitions, names(state.elements, data.get("pinned", ())))
-    _check(split, data["candidates"])
-    if state.round is not None and whole(data["round"]) <= state.round.number:
-        raise ValueError(data["round"])
-    candidates = PersistentTuple.of(
-        Candidate(index, kind, partition, split, None if distance is None else number(distance))
-        for index, (kind, partition, distance) in enumerate(data["candidates"])
-    )
-    round = Round(whole(data["round"]), whole(data["n_partitions"]), split, candidates)
-    return {**waits_no_more(state), "round": round}
-
-
-def _forecast(_: RunState, data: Data, __: float) -> Changes:
-    low, likely, high = (whole(number(tests)) for tests in data["tests"])
-    found = Forecast(low, likely, high, whole(data["tests_done"]))
-    if not 0 <= low <= likely <= high or found.tests_done < 0:
-        raise ValueError(data)
-    return {"forecast": found}
-
-
-def _candidate_judged(state: RunState, data: Data, _: float) -> Changes:
-    candidate = replace(
-        _tried(state, data["candidate"]),
-        verdict=one_of(data["verdict"], "similar", "missed", "dissimilar", "unknown"),
-        tests=tuple(map(whole, data["tests"])),
-        known=whole(data["known"]),
-    )
-    round = _with(_current(state), candidate)
-    # Without tests it is part of what has lost the rate.
-    if candidate.verdict != "dissimilar" or not candidate.tests:
-        return {"round": round}
-    # Something in the part that it leaves out is needed, and these parts are disjoint.
-    apart = candidate.kind == "complement" or len(round.partitions) == 2
-    round = replace(round, missed=round.missed + apart)
-    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
-    if needed == state.lower_bound:
-        return {"round": round}
-    point = Point(state.tests_done, len(state.environment), needed)
-    return {"round": round, "lower_bound": needed, "history": (*state.history, point)}
-
-
-def _waiting(state: RunState, data: Data, _: float) -> Changes:
-    return {"status": "waiting", "waiting_candidate": _tried(state, data["candidate"]).index}
-
-
-def _decided(state: RunState, data: Data, at: float) -> Changes:
-    changes = {"status": "paused" if state.paused else "running", "waiting_candidate": None}
-    candidate = _tried(state, data["candidate"])
-    said = f"{'accepted' if data['decision'] == 'accept' else 'rejected'} {_described(state, candidate)}"
-    changes |= decision(state, at, str(data["decision"]), said)
-    if data["decision"] == "accept":
-        return changes
-    return changes | _with_candidate(state, replace(candidate, verdict="rejected"))
-
-
-def _reduced(state: RunState, data: Data, at: float) -> Changes:
-    winner = _tried(state, data["candidate"])
-    # One part alone shows f although several seemed to be needed: the lower bound was wrong.
-    if winner.kind == "partition" and _current(state).missed > 1:
-        state = state.changed(lower_bound=0)
-    changes = arrived(state, data, at, "reduced", winner.label, winner.tests)
-    return changes | {"round": replace(_current(state), winner=winner.index)}
-
-
-def _round_finished(state: RunState, _: Data, __: float) -> Changes:
-    round = _current(state)
-    return {"round": replace(round, done=True), "rounds_done": round.number}
-
-
-def _paused(state: RunState, _: Data, __: float) -> Changes:
+def _paused(state: RunState, _: e.Paused, __: float) -> Changes:
     return {"paused": True, "status": state.status if state.status == "waiting" else "paused"}
 
 
-def _resumed(state: RunState, _: Data, __: float) -> Changes:
+def _resumed(state: RunState, _: e.Resumed, __: float) -> Changes:
     working = "baseline" if state.baseline is None else "running"
     return {"paused": False, "status": working if state.status == "paused" else state.status}
 
 
-def _accept_mode(state: RunState, data: Data, at: float) -> Changes:
-    mode = one_of(data["mode"], "automatic", "ask")
-    if mode == state.accept_mode:
-        return {}
-    words = "reductions wait for accept or reject" if mode == "ask" else "reductions are accepted automatically"
-    return {"accept_mode": mode, **fold_decisions.decision(state, at, "accept_mode", words)}
+def spent(state: RunState, until: float) -> float:
+    """The time that engines have worked until Unix time `until`, s."""
+    return state.working_seconds + (0.0 if state.started_at is None else max(0.0, until - state.started_at))
 
 
-def _vetoed(state: RunState, data: Data, at: float) -> Changes:
-    verdict = one_of(data["verdict"], *REFUSED)
-    candidate = replace(_tried(state, data["candidate"]), verdict=verdict)
-    changes = _with_candidate(state, candidate)
-    if data.get("again"):
+def _stopped(state: RunState, at: float) -> Changes:
+    """No engine works from Unix time `at` on, s."""
+    return {"working_seconds": spent(state, at), "started_at": None}
+
+
+def _clock_jumped(state: RunState, event: e.ClockJumped, at: float) -> Changes:
+    """Nobody worked in that time."""
+    return {} if state.started_at is None else {"started_at": min(at, state.started_at + event.seconds)}
+
+
+def _with_clock(before: RunState, after: RunState) -> RunState:
+    """`after`, the state after one more event, with the clock stopped where the run stands still, and started where it goes on."""
+    stood, stands = _stands(before), _stands(after)
+    if stands and not stood:
+        return after.changed(**_stopped(after, after.updated_at))
+    if stood and not stands and not after.ended and after.started_at is None:
+        return after.changed(started_at=after.updated_at)
+    return after
+
+
+def _stands(state: RunState) -> bool:
+    return state.paused or state.needs_room > 0 or state.waiting_candidate is not None
+
+
+# The world.
+
+
+def _supports(state: RunState, event: e.Supports, _: float) -> Changes:
+    def named(pairs: Iterable[e.Pair]) -> tuple[tuple[str, str], ...]:
+        return tuple((state.elements[first], state.elements[second]) for first, second in pairs)
+
+    return {
+        "settling": False,
+        "unsettled": event.why,
+        "supports": named(event.pairs),
+        "ties": None if event.ties is None else named(event.ties),
+    }
+
+
+def _environment_named(state: RunState, event: e.EnvironmentNamed, _: float) -> Changes:
+    if event.environment != len(state.environments) or not event.models <= state.environments[0]:
+        raise ValueError(event.environment)
+    return {"environments": state.environments.added(event.models)}
+
+
+# The search.
+
+
+def _round_started(state: RunState, event: e.RoundStarted, _: float) -> Changes:
+    whole = state.environments[event.environment]
+    # The bits of a model that is not there could fill the memory.
+    if max((model for part in event.partitions for model in part), default=0) >= len(state.elements):
+        raise ValueError("partitions")
+    parts = tuple(map(Environment.of, event.partitions))
+    _check(event, whole, parts)
+    if state.round is not None and event.round <= state.round.number:
+        raise ValueError(event.round)
+    split = Split(
+        whole.names(state.elements),
+        tuple(tuple(map(state.elements.__getitem__, part)) for part in event.partitions),
+        event.pinned.names(state.elements),
+        whole,
+        parts,
+        event.pinned,
+    )
+    candidates = PersistentTuple.of(
+        Candidate(index, kind, partition, split, distance)
+        for index, (kind, partition, distance) in enumerate(event.candidates)
+    )
+    here = replace(state.nodes[state.node], n_partitions=event.n_partitions)
+    return {
+        **waits_no_more(state),
+        "round": Round(event.round, event.n_partitions, split, candidates),
+        "nodes": with_node(state.nodes, here),
+    }
+
+
+def _check(event: e.RoundStarted, whole: Environment, parts: tuple[Environment, ...]) -> None:
+    """Raises ValueError unless partitions are disjoint and inside the environment, and candidates unique."""
+    models = sum(map(len, event.partitions)) + len(event.pinned)
+    together = event.pinned
+    for part in parts:
+        together |= part
+    if len(together) != models or not together <= whole or not all(parts):
+        raise ValueError("partitions")
+    asked = {(kind, partition) for kind, partition, _ in event.candidates}
+    if len(asked) != len(event.candidates) or any(partition >= len(parts) for _, partition in asked):
+        raise ValueError("candidates")
+
+
+def _forecast(_: RunState, event: e.Forecast, __: float) -> Changes:
+    low, likely, high = event.tests
+    if not low <= likely <= high:
+        raise ValueError(event.tests)
+    return {"forecast": Forecast(low, likely, high, event.tests_done)}
+
+
+def _candidate_judged(state: RunState, event: e.CandidateJudged, _: float) -> Changes:
+    candidate = replace(tried(state, event), verdict=event.verdict, tests=event.tests, known=event.known)
+    changes = with_candidate(state, candidate)
+    changes["left_unknown"] = state.left_unknown or event.verdict == "unknown"
+    # Without tests it is part of what has lost the rate.
+    if event.verdict != "dissimilar" or not event.tests:
         return changes
-    return changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
+    # Something in the part that it leaves out is needed, and these parts are disjoint.
+    round: Round = changes["round"]
+    round = replace(round, missed=round.missed + (candidate.kind == "complement" or len(round.partitions) == 2))
+    needed = min(max(state.lower_bound, round.missed, 1), len(round.environment))
+    if needed == state.lower_bound:
+        return changes | {"round": round}
+    point = Point(state.tests_done, len(state.environment), needed)
+    return changes | {"round": round, "lower_bound": needed, "history": (*state.history, point)}
 
 
-def _unvetoed(state: RunState, data: Data, at: float) -> Changes:
-    candidate = _tried(state, data["candidate"])
-    words = f"took back the veto of {_described(state, candidate)}"
-    if candidate.verdict == "rejected":
-        words = f"took back the rejection of {_described(state, candidate)}"
-    if candidate.verdict == "undone":
-        words = f"allowed {_described(state, candidate)} again"
-    changes = _with_candidate(state, replace(candidate, verdict="")) | decision(state, at, "unveto", words)
+def _waiting(state: RunState, event: e.Waiting, _: float) -> Changes:
+    return {"status": "waiting", "waiting_candidate": tried(state, event).index}
+
+
+def _decided(state: RunState, event: e.Decided, at: float) -> Changes:
+    candidate, accepts = tried(state, event), event.decision == "accept"
+    words = f"{'accepted' if accepts else 'rejected'} {_described(state, candidate)}"
+    changes = {
+        "status": "paused" if state.paused else "running",
+        "waiting_candidate": None,
+        **decision(state, at, event.decision, words),
+    }
+    if accepts:
+        return changes | {"round": replace(current(state), accepted=candidate.index)}
+    rejected = replace(candidate, verdict="rejected")
+    return {**changes, **with_candidate(state, rejected), **refused(state, candidate.kept, "rejected", event.round)}
+
+
+def _reduced(state: RunState, event: e.Reduced, at: float) -> Changes:
+    winner, round = tried(state, event), current(state)
+    # One part alone shows f although several seemed to be needed: the lower bound was wrong.
+    if winner.kind == "partition" and round.missed > 1:
+        state = state.changed(lower_bound=0)
+    changes = arrived(state, event.environment, event.evidence_test, at, "reduced", winner.label, winner.tests)
+    return changes | {"round": replace(round, winner=winner.index)}
+
+
+def _round_finished(state: RunState, event: e.RoundFinished, _: float) -> Changes:
+    round = current(state)
+    changes: Changes = {"round": replace(round, done=True), "rounds_done": round.number}
+    if state.leg is not None:
+        last = len(round.candidates) if round.winner is None else round.winner + 1
+        judged = ("similar", "missed", "dissimilar", "unknown")
+        tests = (test for one in round.candidates[:last] if one.verdict in judged for test in one.tests)
+        evidence = None if round.winner is None else state.evidence_test
+        past = PastRound(digest(round.split.parts), round.winner, evidence, tuple(dict.fromkeys(tests)))
+        changes["leg"] = replace(state.leg, past=(*state.leg.past, past))
+    return changes
+
+
+def digest(parts: Iterable[Environment]) -> int:
+    """A number that tells the partitions of a round from others."""
+    return hash(tuple(part.bits for part in parts))
+
+
+def _accept_mode_changed(state: RunState, event: e.AcceptModeChanged, at: float) -> Changes:
+    if event.mode == state.accept_mode:
+        return {}
+    ask = event.mode == "ask"
+    words = "reductions wait for accept or reject" if ask else "reductions are accepted automatically"
+    return {"accept_mode": event.mode, **decision(state, at, "accept_mode", words)}
+
+
+def _vetoed(state: RunState, event: e.Vetoed, at: float) -> Changes:
+    candidate = replace(tried(state, event), verdict=event.verdict)
+    changes = {**with_candidate(state, candidate), **refused(state, candidate.kept, event.verdict, event.round)}
+    return changes if event.again else changes | decision(state, at, "veto", f"vetoed {_described(state, candidate)}")
+
+
+def _unvetoed(state: RunState, event: e.Unvetoed, at: float) -> Changes:
+    candidate, round = tried(state, event), current(state)
+    words = {
+        "rejected": f"took back the rejection of {_described(state, candidate)}",
+        "undone": f"allowed {_described(state, candidate)} again",
+    }.get(candidate.verdict, f"took back the veto of {_described(state, candidate)}")
+    known = next((one for one in state.refused if one.environment == candidate.kept), None)
+    changes = {
+        **with_candidate(state, replace(candidate, verdict="")),
+        **decision(state, at, "unveto", words),
+        "refused": tuple(one for one in state.refused if one is not known),
+        "refusals": state.refusals + 1,
+        # A refusal in an earlier round has blocked candidates since, so the search starts again.
+        "search_due": state.search_due or known is None or known.round != event.round,
+    }
+    if round.accepted == candidate.index:
+        changes["round"] = replace(changes["round"], accepted=None)
     # The first similar candidate wins: a later one must wait for the verdict of this one.
     if state.waiting_candidate is not None and state.waiting_candidate > candidate.index:
         changes |= waits_no_more(state)
     return changes
 
 
-def _finished(state: RunState, data: Data, at: float) -> Changes:
-    minimal, size = bool(data["minimal"]), len(state.environment)
-    nodes = list(state.nodes)
-    if nodes:
-        nodes[state.node] = replace(nodes[state.node], minimal=minimal)
-    return {
-        **_ended(state, "finished", data, at),
-        "minimal": minimal,
-        "nodes": tuple(nodes),
-        "history": (*state.history, Point(state.tests_done, size, min(size, state.lower_bound))),
-    }
+def _described(state: RunState, candidate: Candidate) -> str:
+    return f"{candidate.label} of round {current(state).number} ({count(candidate.size, 'model')})"
 
 
 # Each returns only the changed fields, so that the state is copied once per event.
-_HANDLERS: dict[str, Callable[[RunState, Data, float], Changes]] = {
-    "created": _created,
-    "engine_started": _engine_started,
-    "comparing": lambda *_: {},
-    "compared": lambda state, data, _: {"physics": state.physics.compared(bool(data["same"]))},
-    "supports_started": supports.supports_started,
-    "supports": supports.supports,
-    "noted": _noted,
-    "test_started": _test_started,
-    "test_finished": _test_finished,
-    "implied": _implied,
-    "still": lambda *_: {"ties": ()},
-    "sliced": fold_slices.sliced,
-    "slices_refuted": fold_slices.slices_refuted,
-    "test_lost": _test_lost,
-    "baseline_finished": fold_baseline.baseline_finished,
-    "round_started": _round_started,
-    "forecast": _forecast,
-    "candidate_judged": _candidate_judged,
-    "waiting": _waiting,
-    "decided": _decided,
-    "reduced": _reduced,
-    "round_finished": _round_finished,
-    "confirm_started": lambda *_: {"confirming": True},
-    "certificate_started": fold_certificates.certificate_started,
-    "certificate_finished": fold_certificates.certificate_finished,
-    "rate_lost": fold_certificates.rate_lost,
-    "left_out": fold_certificates.left_out,
-    "paused": _paused,
-    "resumed": _resumed,
-    **working.HANDLERS,
-    **fold_isolation.HANDLERS,
-    "accept_mode": _accept_mode,
-    "vetoed": _vetoed,
-    "unvetoed": _unvetoed,
-    "pinned": fold_decisions.pinned,
-    "unpinned": fold_decisions.unpinned,
-    "trial_started": fold_decisions.trial_started,
-    "trial_judged": fold_decisions.trial_judged,
-    "adopted": fold_decisions.adopted,
-    "accepted_other": fold_decisions.accepted_other,
-    "went_back": fold_decisions.went_back,
-    "changed": fold_decisions.changed,
-    "leg_started": fold_decisions.leg_started,
-    "command_refused": fold_decisions.command_refused,
-    "command_handled": lambda state, data, _: {"last_command": max(state.last_command, whole(data["command"]))},
-    "finished": _finished,
-    "engine_stopped": lambda state, data, at: _ended(state, "stopped", data, at),
-    "engine_failed": lambda state, data, at: _ended(state, "failed", data, at),
+_HANDLERS: dict[type[e.Event], Callable[[RunState, Any, float], Changes]] = {
+    e.Created: _created,
+    e.EngineStarted: _engine_started,
+    e.Cluster: lambda _, event, __: {"jobs": event.jobs, "cluster": event.words},
+    e.Comparing: lambda *_: {},
+    e.Compared: _compared,
+    e.Paused: _paused,
+    e.Resumed: _resumed,
+    e.DiskSpace: lambda _, event, __: {"needs_room": 0 if event.enough else event.needed},
+    e.ClockJumped: _clock_jumped,
+    e.Finished: _finished,
+    e.EngineStopped: lambda state, event, at: _ended(state, "stopped", event.reason, at),
+    e.EngineFailed: lambda state, event, at: _ended(state, "failed", event.reason, at),
+    e.SupportsStarted: lambda *_: {"settling": True},
+    e.Supports: _supports,
+    e.Still: lambda *_: {"ties": ()},
+    e.Noted: lambda state, event, _: {"notes": (*state.notes, (event.about, event.words))},
+    e.EnvironmentNamed: _environment_named,
+    e.TestStarted: fold_tests.test_started,
+    e.TestFinished: fold_tests.test_finished,
+    e.Implied: fold_tests.implied,
+    e.TestLost: fold_tests.test_lost,
+    e.BaselineFinished: fold_tests.baseline_finished,
+    e.LegStarted: fold_decisions.leg_started,
+    e.RoundStarted: _round_started,
+    e.Forecast: _forecast,
+    e.CandidateJudged: _candidate_judged,
+    e.Waiting: _waiting,
+    e.Decided: _decided,
+    e.Reduced: _reduced,
+    e.RoundFinished: _round_finished,
+    e.Sliced: fold_claims.sliced,
+    e.SlicesRefuted: fold_claims.slices_refuted,
+    e.CertificateStarted: fold_claims.certificate_started,
+    e.CertificateFinished: fold_claims.certificate_finished,
+    e.RateLost: fold_claims.rate_lost,
+    e.LeftOut: fold_claims.left_out,
+    e.IsolationStarted: fold_claims.isolation_started,
+    e.RemovalJudged: fold_claims.removal_judged,
+    e.IsolationChecked: fold_claims.isolation_checked,
+    e.IsolationFinished: lambda state, event, at: {
+        **fold_claims.isolation_finished(state, event),
+        **_as_it_was(state, at),
+    },
+    e.IsolationGivenUp: lambda state, _, at: {
+        "isolations": fold_decisions.without_open(state),
+        **_as_it_was(state, at),
+    },
+    e.AcceptModeChanged: _accept_mode_changed,
+    e.Vetoed: _vetoed,
+    e.Unvetoed: _unvetoed,
+    e.Pinned: fold_decisions.pinned,
+    e.Unpinned: fold_decisions.unpinned,
+    e.TrialStarted: fold_decisions.trial_started,
+    e.TrialJudged: fold_decisions.trial_judged,
+    e.Adopted: fold_decisions.adopted,
+    e.AcceptedOther: fold_decisions.accepted_other,
+    e.WentBack: fold_decisions.went_back,
+    e.Changed: fold_decisions.changed,
+    e.CommandRefused: lambda *_: {},
+    e.CommandHandled: lambda *_: {},
 }
 
 
-def _ended(state: RunState, status: str, data: Data, at: float) -> Changes:
-    return {
-        **working.stopped(state, at),
-        "status": status,
-        "reason": str(data["reason"]),
-        "waiting_candidate": None,
-        "paused": False,
-    }
-
-
-def _with_test_of_trial(state: RunState, test: Test) -> tuple[Trial, ...]:
-    if type(test.trial) is not int or not 0 < test.trial <= len(state.trials):
-        raise IndexError(test.trial)
-    trials = list(state.trials)
-    trial = trials[test.trial - 1]
-    trials[test.trial - 1] = replace(trial, tests=(*trial.tests, test.id))
-    return tuple(trials)
-
-
-def _check(split: Split, candidates: list[Any]) -> None:
-    """Raises ValueError unless partitions are disjoint and inside the environment, and candidates unique."""
-    models = [*(name for partition in split.partitions for name in partition), *split.pinned]
-    environment = set(split.environment)
-    if len(set(models)) != len(models) or not environment.issuperset(models) or not all(split.partitions):
-        raise ValueError("partitions")
-    if len(environment) != len(split.environment):
-        raise ValueError("environment")
-    if len({(kind, partition) for kind, partition, _ in candidates}) != len(candidates):
-        raise ValueError("candidates")
-    numbers = range(len(split.partitions))
-    if not all(
-        kind in ("partition", "complement") and type(part) is int and part in numbers for kind, part, _ in candidates
-    ):
-        raise ValueError("candidates")
-
-
-def _described(state: RunState, candidate: Candidate) -> str:
-    return f"{candidate.label} of round {_current(state).number} ({count(candidate.size, 'model')})"
-
-
-def _tried(state: RunState, index: int) -> Candidate:
-    """The candidate of the current round with this index. Raises IndexError or ValueError if there is none."""
-    if index < 0:
-        raise IndexError(index)
-    return _current(state).candidates[index]
-
-
-def _with_candidate(state: RunState, candidate: Candidate) -> Changes:
-    """The current round with `candidate` in place of the one with the same index."""
-    return {"round": _with(_current(state), candidate)}
-
-
-def _with(round: Round, candidate: Candidate) -> Round:
-    return replace(round, candidates=round.candidates.changed(candidate.index, candidate))
-
-
-def _current(state: RunState) -> Round:
-    """The current round. Raises ValueError if none was started."""
-    if state.round is None:
-        raise ValueError("no round")
-    return state.round
+def _as_it_was(state: RunState, at: float) -> Changes:
+    """After an isolation the reduction is as it was before."""
+    if state.isolating is None:
+        raise ValueError("no isolation")
+    return _ended(state, "finished", state.isolating.before, at)

@@ -1,4 +1,4 @@
-"""Folds the user's decisions: pins, selections tried by hand, changed settings, going back and branches."""
+"""Folds the user's decisions: pins, selections tried by hand, changed settings, going back and branches; and each arrival."""
 
 from __future__ import annotations
 
@@ -6,26 +6,30 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ddenv.amounts import count
-from ddenv.runfile.events import Changes, Data, names, number, one_of, whole
-from ddenv.runfile.fold_isolation import without_open
-from ddenv.runfile.fold_rates import counted_again, same_runs, seen
-from ddenv.runfile.progress import Point
-from ddenv.runfile.state import Decision, Node, RunState, Test, Trial
+from ddenv.environment import Environment
+from ddenv.runfile import events as e
+from ddenv.runfile.fold_tests import Changes, counted_again, same_runs, seen, with_node, with_outcomes, with_trial
+from ddenv.runfile.progress import Decision, Isolation, Leg, Node, Point, Refusal
+from ddenv.runfile.state import RunState, Test, Trial
 
 # Maximum number of models that a decision names, and maximum length of a name.
 NAMED, LONGEST = 3, 40
 
 
-def pinned(state: RunState, data: Data, at: float) -> Changes:
-    models = names(state.elements, data["models"])
+def pinned(state: RunState, event: e.Pinned, at: float) -> Changes:
+    models = _named(state, event.models)
     words = f"pinned {listed(models)}{_cut_short(state)}"
     return {**searched_anew(state), "pinned": state.pinned.union(models), **decision(state, at, "pin", words)}
 
 
-def unpinned(state: RunState, data: Data, at: float) -> Changes:
-    models = names(state.elements, data["models"])
+def unpinned(state: RunState, event: e.Unpinned, at: float) -> Changes:
+    models = _named(state, event.models)
     words = f"unpinned {listed(models)}{_cut_short(state)}"
     return {**searched_anew(state), "pinned": state.pinned.difference(models), **decision(state, at, "unpin", words)}
+
+
+def _named(state: RunState, models: Iterable[int]) -> tuple[str, ...]:
+    return tuple(map(state.elements.__getitem__, models))
 
 
 def _cut_short(state: RunState) -> str:
@@ -37,59 +41,59 @@ def _cut_short(state: RunState) -> str:
     return f"; round {state.round.number} ended with {untried} untried" if state.round and untried else ""
 
 
-def trial_started(state: RunState, data: Data, at: float) -> Changes:
-    trial = Trial(whole(data["trial"]), names(state.elements, data["models"]), state.node)
-    if trial.number != len(state.trials) + 1 or len(set(trial.models)) != len(trial.models):
+def trial_started(state: RunState, event: e.TrialStarted, at: float) -> Changes:
+    names = state.environments[event.environment].names(state.elements)
+    trial = Trial(event.trial, names, state.node, event.environment)
+    if trial.number != len(state.trials) + 1:
         raise ValueError(trial.number)
-    inside = frozenset(trial.models)
+    inside = frozenset(names)
     without = [name for name in state.environment if name not in inside]
-    what = f"without {listed(without)}" if 0 < len(without) <= trial.size else f"with {listed(trial.models)} alone"
+    what = f"without {listed(without)}" if 0 < len(without) <= trial.size else f"with {listed(names)} alone"
     words = f"tried {trial.size} of {len(state.environment)} models ({trial.label}): {what}"
     return {"trials": (*state.trials, trial), **decision(state, at, "try", words)}
 
 
-def trial_judged(state: RunState, data: Data, _: float) -> Changes:
-    tests = tuple(map(whole, data["tests"]))
-    trial, verdict = tried(state, data["trial"]), one_of(data["verdict"], "similar", "dissimilar", "unknown")
-    return _with_trial(state, replace(trial, verdict=verdict, tests=tests, known=whole(data["known"])))
+def trial_judged(state: RunState, event: e.TrialJudged, _: float) -> Changes:
+    trial = state.trials[event.trial - 1]
+    judged = replace(trial, verdict=event.verdict, tests=event.tests, known=event.known)
+    return with_trial(state, judged) | {"left_unknown": state.left_unknown or event.verdict == "unknown"}
 
 
-def adopted(state: RunState, data: Data, at: float) -> Changes:
-    trial = replace(tried(state, data["trial"]), adopted=True)
+def adopted(state: RunState, event: e.Adopted, at: float) -> Changes:
+    trial = replace(state.trials[event.trial - 1], adopted=True)
     words = f"adopted {trial.label}: {count(trial.size, 'model')}"
     return {
-        **_with_trial(state, trial),
-        **arrived(state, data, at, "adopted", trial.label, trial.tests),
+        **with_trial(state, trial),
+        **arrived(state, event.environment, event.evidence_test, at, "adopted", trial.label, trial.tests),
         **decision(state, at, "adopt", words),
     }
 
 
-def accepted_other(state: RunState, data: Data, at: float) -> Changes:
+def accepted_other(state: RunState, event: e.AcceptedOther, at: float) -> Changes:
     """Another failure counts as f from now on, and the environment that showed it becomes the current one."""
-    test = state.tests[_index(data["test"])]
+    test = state.tests[event.test - 1]
     # A trial has a number; otherwise `what` names the candidate.
-    trial = None if data.get("trial") is None else tried(state, data["trial"])
-    what = trial.label if trial else str(data["what"])
-    judged = with_outcomes(state, data)
+    trial = None if event.trial is None else state.trials[event.trial - 1]
+    what = event.what if trial is None else trial.label
+    judged = with_outcomes(state, event.judged)
     judged = judged.changed(nodes=counted_again(judged.nodes, judged.tests))
-    if data.get("instead"):
-        return _branched(judged, test, data, at, what)
-    changes = {} if trial is None else _with_trial(state, replace(trial, adopted=True))
+    if event.instead:
+        return _branched(judged, test, event, at, what)
+    runs = same_runs(judged, test)
     return {
         "tests": judged.tests,
         "tally": judged.tally,
         "failures": (*state.failures, test.id),
-        **changes,
-        **arrived(judged, {**data, "evidence_test": test.id}, at, "accepted", what, same_runs(judged, test)),
+        **({} if trial is None else with_trial(state, replace(trial, adopted=True))),
+        **arrived(judged, event.environment, test.id, at, "accepted", what, runs),
         **decision(state, at, "accept_other", f"accepted another failure as f: {what}, test {test.id}"),
     }
 
 
-def _branched(state: RunState, test: Test, data: Data, at: float, what: str) -> Changes:
+def _branched(state: RunState, test: Test, event: e.AcceptedOther, at: float, what: str) -> Changes:
     """Another failure is f from now on, in place of what was f, in the environment that showed it."""
-    arrival = arrived(
-        state, {**data, "evidence_test": test.id}, at, "instead", what, same_runs(state, test), below=test.node
-    )
+    runs = same_runs(state, test)
+    arrival = arrived(state, event.environment, test.id, at, "instead", what, runs, below=test.node)
     gone = state.pinned.difference(arrival["environment"])
     words = f"branched to another failure, now f: {what}{_unpinned(state, gone)}"
     return {
@@ -107,30 +111,40 @@ def _unpinned(state: RunState, gone: frozenset[str]) -> str:
     return f"; unpinned {listed([name for name in state.elements if name in gone])}" if gone else ""
 
 
-def went_back(state: RunState, data: Data, at: float) -> Changes:
-    node = here(state, data["node"])
-    undone = data.get("rejected")
-    nodes = list(state.nodes)
-    nodes[node.number] = replace(node, rejected=False, lost_rate=False)
-    if undone is None:
+def went_back(state: RunState, event: e.WentBack, at: float) -> Changes:
+    """An undone reduction is not accepted again; an environment that the user goes to is wanted."""
+    node = state.nodes[event.node]
+    wanted = state.environments[node.id]
+    state = state.changed(
+        refused=tuple(refusal for refusal in state.refused if refusal.environment != wanted),
+        lost=tuple(
+            (failures, lost) for failures, lost in state.lost if failures != state.failures or not wanted <= lost
+        ),
+    )
+    changes: Changes = {"refused": state.refused, "lost": state.lost}
+    nodes = with_node(state.nodes, replace(node, rejected=False, lost_rate=False))
+    if event.rejected is None:
         words = f"went to {place(node)}"
     else:
-        last = nodes[here(state, undone).number]
-        nodes[last.number] = replace(last, rejected=True)
+        last = nodes[event.rejected]
+        nodes = with_node(nodes, replace(last, rejected=True))
         words = f"took back {last.what}: {count(len(node.environment), 'model')} again"
+        changes |= refused(state, state.environments[last.id], "undone", None)
     gone = state.pinned.difference(node.environment)
     words += _unpinned(state, gone)
     # A failure accepted after this node does not count as f here.
     judged = state
-    if "outcomes" in data:
-        judged = with_outcomes(state, data)
-        nodes = list(counted_again(nodes, judged.tests))
+    if event.judged is not None:
+        judged = with_outcomes(state, event.judged)
+        nodes = counted_again(nodes, judged.tests)
     return {
+        **changes,
         **left_round(state),
+        "search_due": True,
         "tests": judged.tests,
         "tally": judged.tally,
         "failures": failures_at(state, node.number),
-        "nodes": tuple(nodes),
+        "nodes": nodes,
         "node": node.number,
         "came_at": state.tests_done,
         "environment": node.environment,
@@ -139,37 +153,60 @@ def went_back(state: RunState, data: Data, at: float) -> Changes:
         "lower_bound": 0,
         "minimal": False,
         "history": (*state.history, Point(state.tests_done, len(node.environment))),
-        **decision(state, at, "undo" if undone is not None else "go_back", words),
+        **decision(state, at, "undo" if event.rejected is not None else "go_back", words),
     }
 
 
-def changed(state: RunState, data: Data, at: float) -> Changes:
-    settings = dict(data["settings"])
+def changed(state: RunState, event: e.Changed, at: float) -> Changes:
     before = dict(state.scenario["reduction"])
-    words = ", ".join(f"{key} from {_limit(before.get(key))} to {_limit(value)}" for key, value in settings.items())
-    scenario = {**state.scenario, "reduction": before | settings}
+    words = ", ".join(
+        f"{key} from {_limit(before.get(key))} to {_limit(value)}" for key, value in event.settings.items()
+    )
+    scenario = {**state.scenario, "reduction": before | event.settings}
     # The budget does not affect the search.
-    anew = {} if set(settings) == {"budget"} else searched_anew(state)
+    anew = {} if set(event.settings) == {"budget"} else searched_anew(state)
     return {**anew, "scenario": scenario, **decision(state, at, "change", f"changed {words}")}
 
 
-def leg_started(state: RunState, data: Data, _: float) -> Changes:
-    """A new search starts from the current environment."""
-    n_partitions = data["n_partitions"]
-    if type(data["round"]) is not int or not (n_partitions is None or (type(n_partitions) is int and n_partitions > 0)):
-        raise ValueError(data)
-    return {**searched_anew(state), "forecast": None}
+def _limit(value: object) -> object:
+    """A setting in words; a budget may be None."""
+    return "no limit" if value is None else value
 
 
-def command_refused(state: RunState, data: Data, _: float) -> Changes:
-    return {"refusal": (whole(data["command"]), str(data["why"]))}
+def leg_started(state: RunState, event: e.LegStarted, _: float) -> Changes:
+    """A search starts from the current environment."""
+    if state.evidence_test is None:
+        raise ValueError("f is not known")
+    leg = Leg(
+        first_round=event.round,
+        node=state.node,
+        n_partitions=event.n_partitions,
+        pinned=state.pinned,
+        evidence_test=state.evidence_test,
+        settings=state.scenario["reduction"],
+        rate=event.rate,
+        steps_back=state.steps_back,
+        tests=tuple(test for test in state.judged if state.tests[test - 1].is_finished),
+        again=state.again,
+    )
+    return {**searched_anew(state), "search_due": False, "forecast": None, "leg": leg, "again": ()}
+
+
+# What several events do.
 
 
 def arrived(
-    state: RunState, data: Data, at: float, how: str, what: str, tests: Iterable[int], below: int | None = None
+    state: RunState,
+    number: int,
+    evidence_test: int,
+    at: float,
+    how: str,
+    what: str,
+    tests: Iterable[int],
+    below: int | None = None,
 ) -> Changes:
-    """The run moves to another environment, a new node below the current one, or below node number `below`; `tests` ran it."""
-    environment = names(state.elements, data["environment"])
+    """The run moves to environment `number`, a new node below the current one, or below node number `below`; `tests` ran it."""
+    environment = state.environments[number].names(state.elements)
     reduction = state.scenario.get("reduction", {})
     runs, shown = seen(state.tests, tests)
     parent = state.node if below is None else below
@@ -179,25 +216,27 @@ def arrived(
         how=how,
         what=what,
         environment=environment,
+        id=number,
+        n_partitions=None if state.round is None else state.round.n_partitions,
         round=None if state.round is None else state.round.number,
         tests=state.tests_done,
         own_tests=state.nodes[parent].own_tests + (state.tests_done - state.came_at) * (parent == state.node),
         time=at,
-        evidence_test=whole(data["evidence_test"]),
+        evidence_test=evidence_test,
         method=f"{reduction.get('algorithm', '')} {reduction.get('pair', '')}".strip(),
         runs=runs,
         shown=shown,
     )
-    inside = set(environment) <= set(state.environment)
+    inside = state.environments[number] <= state.environments[state.nodes[state.node].id]
     # Nothing is known yet about what another failure needs.
     needed = min(state.lower_bound, len(environment)) if inside and how not in ("accepted", "instead") else 0
-    changes = {} if how == "reduced" else left_round(state)
+    changes = {} if how == "reduced" else left_round(state) | {"search_due": True}
     return changes | {
         "nodes": (*state.nodes, node),
         "node": node.number,
         "came_at": state.tests_done,
         "environment": environment,
-        "evidence_test": node.evidence_test,
+        "evidence_test": evidence_test,
         "lower_bound": needed,
         "minimal": False,
         "history": (*state.history, Point(state.tests_done, len(environment), needed)),
@@ -206,8 +245,14 @@ def arrived(
 
 def decision(state: RunState, at: float, kind: str, words: str) -> Changes:
     """One more decision of the user."""
-    one = Decision(at, state.tests_done, state.node, kind, words)
-    return {"decisions": (*state.decisions, one)}
+    return {"decisions": (*state.decisions, Decision(at, state.tests_done, state.node, kind, words))}
+
+
+def refused(state: RunState, environment: Environment, verdict: str, round: int | None) -> Changes:
+    """An environment is not taken any more, because of a decision in this round."""
+    known = any(refusal.environment == environment for refusal in state.refused)
+    more = () if known else (Refusal(environment, verdict, round),)
+    return {"refused": (*state.refused, *more), "refusals": state.refusals + 1}
 
 
 def failures_at(state: RunState, number: int) -> tuple[int, ...]:
@@ -233,7 +278,7 @@ def origin(state: RunState, number: int) -> Node:
 def left_round(state: RunState) -> Changes:
     """The current search and its round are over."""
     last = state.certificates[-1:]
-    past = (*state.certificates[:-1], *(replace(one, past=True) for one in last))
+    past = (*state.certificates[:-1], *(replace(certificate, past=True) for certificate in last))
     changes: Changes = {
         "confirming": False,
         "certificates": past,
@@ -245,6 +290,12 @@ def left_round(state: RunState) -> Changes:
     return changes
 
 
+def without_open(state: RunState) -> tuple[Isolation, ...]:
+    """All isolations; the one that is under way, if there is one, is broken off."""
+    last = state.isolating
+    return state.isolations if last is None else (*state.isolations[:-1], replace(last, broken_off=True))
+
+
 def waits_no_more(state: RunState) -> Changes:
     """No reduction waits for the user any more."""
     working = "paused" if state.paused else "running"
@@ -253,36 +304,8 @@ def waits_no_more(state: RunState) -> Changes:
 
 def searched_anew(state: RunState) -> Changes:
     """The current search is over; the environment may no longer be minimal."""
-    here = state.nodes[state.node]
-    nodes = (*state.nodes[: here.number], replace(here, minimal=False), *state.nodes[here.number + 1 :])
-    return {**left_round(state), "minimal": False, "nodes": nodes}
-
-
-def with_outcomes(state: RunState, data: Data) -> RunState:
-    """The state with the outcomes of tests updated, after f was fixed or another failure began to count as f."""
-    for test, outcome in data["outcomes"].items():
-        distance = data["distances"].get(test)
-        values = {"outcome": str(outcome), "distance": None if distance is None else number(distance)}
-        state = state.changed(**with_test(state, int(test), values))
-    return state
-
-
-def with_test(state: RunState, id: int, values: Data) -> Changes:
-    if id < 1:
-        raise IndexError(id)
-    before = state.tests[id - 1]
-    after = replace(before, **values)
-    return {"tests": state.tests.changed(id - 1, after), **counts(state, before, after)}
-
-
-def counts(state: RunState, before: Test | None, after: Test) -> Changes:
-    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
-    # An unknown outcome is a KeyError, so that a file cannot make the tally long.
-    tally[after.outcome] += 1
-    if before is not None:
-        tally[before.outcome] -= 1
-        reruns -= before.is_deflake_run
-    return {"tally": tally, "deflake_runs": reruns}
+    nodes = with_node(state.nodes, replace(state.nodes[state.node], minimal=False))
+    return {**left_round(state), "search_due": True, "minimal": False, "nodes": nodes}
 
 
 def place(node: Node) -> str:
@@ -296,32 +319,3 @@ def listed(models: Sequence[str]) -> str:
     shown = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in models[:NAMED]]
     more = f" and {len(models) - NAMED} more" if len(models) > NAMED else ""
     return ", ".join(shown) + more
-
-
-def tried(state: RunState, number: int) -> Trial:
-    """The trial with this number. Raises IndexError if there is none."""
-    return state.trials[_index(number)]
-
-
-def _limit(value: object) -> object:
-    """A setting in words; a budget may be None."""
-    return "no limit" if value is None else value
-
-
-def _with_trial(state: RunState, trial: Trial) -> Changes:
-    trials = list(state.trials)
-    trials[trial.number - 1] = trial
-    return {"trials": tuple(trials)}
-
-
-def _index(number: int) -> int:
-    if type(number) is not int or number < 1:
-        raise IndexError(number)
-    return number - 1
-
-
-def here(state: RunState, number: int) -> Node:
-    """The node with this number. Raises IndexError if there is none."""
-    if type(number) is not int or not 0 <= number < len(state.nodes):
-        raise IndexError(number)
-    return state.nodes[number]

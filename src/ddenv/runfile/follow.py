@@ -6,15 +6,15 @@ from collections.abc import Iterable, Iterator
 
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.store import Recorded, RunFile
 
 
-def steps(events: Iterable[Event], state: RunState | None = None) -> Iterator[tuple[Event, RunState, RunState]]:
+def steps(events: Iterable[Recorded], state: RunState | None = None) -> Iterator[tuple[Recorded, RunState, RunState]]:
     """(event, before, after) for each event, from the beginning or from an earlier `state`. Raises UserError at an invalid one."""
     after = state or RunState()
-    for event in events:
-        before, after = after, apply(after, event)
-        yield event, before, after
+    for recorded in events:
+        before, after = after, apply(after, recorded)
+        yield recorded, before, after
 
 
 class Follower:
@@ -23,8 +23,8 @@ class Follower:
     def __init__(self, file: RunFile, state: RunState | None = None) -> None:
         self._file, self.state = file, state or RunState()
 
-    def new(self, most: int = -1) -> Iterator[tuple[Event, RunState, RunState]]:
+    def new(self, most: int = -1) -> Iterator[tuple[Recorded, RunState, RunState]]:
         """The events since then as `steps`, at most `most` unless that is negative. Raises UserError."""
-        for event, before, after in steps(self._file.events(self.state.revision, most), self.state):
+        for recorded, before, after in steps(self._file.read(self.state.revision, most), self.state):
             self.state = after
-            yield event, before, after
+            yield recorded, before, after

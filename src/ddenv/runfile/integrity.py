@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import moment
+from ddenv.runfile.events import Created, Implied, TestFinished
 from ddenv.runfile.fold import apply
+from ddenv.runfile.reading import plain
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.runfile.store import Event, Motions, RunFile, create
+from ddenv.runfile.store import Motions, Recorded, Request, RunFile, create, recorded
 
 # How many faults SQLite lists.
 MOST_FAULTS = 3
@@ -49,7 +50,7 @@ def whole(file: RunFile) -> Whole:
     return _read(file, lambda _: None)
 
 
-def _read(file: RunFile, keep: Callable[[Event], None]) -> Whole:
+def _read(file: RunFile, keep: Callable[[Recorded], None]) -> Whole:
     """Calls `keep` with each event that makes sense, up to the first one that does not."""
     state, count, bare, trouble = RunState(), 0, 0, ""
     try:
@@ -74,7 +75,7 @@ def rescue(file: RunFile, copy: Path) -> Whole:
         first = next(_events(file), None)
     except UserError:
         first = None
-    if first is None or first.kind != "created":
+    if first is None or not isinstance(first.event, Created):
         raise UserError(f"{file.path}: nothing can be repaired: its first event is lost")
     try:
         documents = file.documents("")
@@ -83,7 +84,7 @@ def rescue(file: RunFile, copy: Path) -> Whole:
     try:
         with tempfile.TemporaryDirectory(prefix=f".{copy.name}.", dir=copy.parent) as folder:
             made = Path(folder) / copy.name
-            create(made, documents, first.data)
+            create(made, documents, first.event)
             found = _fill(file, made)
             copy.hardlink_to(made)
     except (OSError, sqlite3.Error) as error:
@@ -94,10 +95,11 @@ def rescue(file: RunFile, copy: Path) -> Whole:
 def _fill(file: RunFile, made: Path) -> Whole:
     with closing(_connected(file)) as source, closing(sqlite3.connect(made, isolation_level=None)) as db:
 
-        def keep(event: Event) -> None:
-            samples = _samples(source, event).items()
+        def keep(event: Recorded) -> None:
             db.execute("INSERT INTO event VALUES (?, ?, ?, ?)", _row(event))
-            db.executemany("INSERT INTO motion VALUES (?, ?, ?)", [(event.data["test"], *each) for each in samples])
+            if isinstance(event.event, TestFinished | Implied):
+                samples = _samples(source, event.event.test).items()
+                db.executemany("INSERT INTO motion VALUES (?, ?, ?)", [(event.event.test, *row) for row in samples])
 
         db.execute("BEGIN")
         db.execute("DELETE FROM event")
@@ -108,24 +110,21 @@ def _fill(file: RunFile, made: Path) -> Whole:
     return found
 
 
-def _is_bare(file: RunFile, event: Event) -> bool:
+def _is_bare(file: RunFile, event: Recorded) -> bool:
     """Whether a test has ended without a trajectory. Raises UserError if it has one that is damaged."""
-    if event.kind != "test_finished" or event.data["outcome"] in BROKEN:
+    if not isinstance(event.event, TestFinished) or event.event.outcome in BROKEN:
         return False
-    test = event.data["test"]
+    test = event.event.test
     return not file.motion(test) or not file.trajectory(test)
 
 
-def _events(file: RunFile) -> Iterator[Event]:
+def _events(file: RunFile) -> Iterator[Recorded]:
     """One after the other, so that those before a fault can be read. Raises UserError at the first that is damaged."""
     try:
         with closing(_connected(file)) as db:
-            for id, at, kind, data in db.execute("SELECT id, time, kind, data FROM event ORDER BY id"):
-                found = json.loads(data)
-                if not isinstance(found, dict):
-                    raise ValueError(id)
-                yield Event(id, moment(at), str(kind), found)
-    except (sqlite3.Error, ValueError, TypeError, RecursionError) as error:
+            for row in db.execute("SELECT id, time, kind, data FROM event ORDER BY id"):
+                yield recorded(*row)
+    except sqlite3.Error as error:
         raise UserError(f"{file.path}: damaged run file: {error}") from None
 
 
@@ -135,15 +134,17 @@ def _connected(file: RunFile) -> sqlite3.Connection:
     return db
 
 
-def _row(event: Event) -> tuple[int, float, str, str]:
-    return event.id, event.time, event.kind, json.dumps(event.data, allow_nan=False, separators=(",", ":"))
+def _row(entry: Recorded | Request) -> tuple[int, float, str, str]:
+    if isinstance(entry, Request):
+        data = entry.data
+    else:
+        data = plain(entry.event) | ({} if entry.command is None else {"command": entry.command})
+    return entry.id, entry.time, entry.kind, json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def _samples(source: sqlite3.Connection, event: Event) -> Motions:
-    """What the file has beside an event, as it is in the file."""
-    if event.kind not in ("test_finished", "implied"):
-        return {}
+def _samples(source: sqlite3.Connection, test: int) -> Motions:
+    """What the file has beside the end of a test, as it is in the file."""
     try:
-        return dict(source.execute("SELECT model, samples FROM motion WHERE test = ?", (event.data["test"],)))
+        return dict(source.execute("SELECT model, samples FROM motion WHERE test = ?", (test,)))
     except sqlite3.Error as error:
         raise UserError(f"damaged run file: {error}") from None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+
+from ddenv.runfile.events import EngineStarted
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,9 +19,9 @@ class Physics:
     proven: str = ""
     mixed: tuple[str, ...] = ()
 
-    def started(self, data: Mapping[str, Any], tests: int) -> Physics:
+    def started(self, engine: EngineStarted, tests: int) -> Physics:
         """After the start of an engine, when `tests` tests were finished."""
-        words = (f"ddenv {data['version']}", str(data["simulator"]), str(data.get("machine", "")))
+        words = (f"ddenv {engine.version}", engine.simulator, engine.machine)
         now = ", ".join(each for each in words if each)
         return replace(self, now=now, proven=self.proven if tests else now)
 

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from ddenv.runfile.fold import apply
 from ddenv.runfile.state import RunState
-from ddenv.runfile.store import Event
+from ddenv.runfile.store import Recorded
 
 # What a step goes to: the next event that a viewer sees; the end of the next chapter; the next reduction; the next verdict or
 # decision of the user.
@@ -21,11 +21,11 @@ GAP, KEPT = 64, 512
 _UNSEEN = (
     "command_handled",
     "command_refused",
+    "environment_named",
     "forecast",
     "round_finished",
     "leg_started",
     "comparing",
-    "confirm_started",
 )
 _VERDICTS = ("candidate_judged", "trial_judged", "certificate_finished")
 
@@ -50,7 +50,7 @@ class Chapter:
 class Moment:
     """An event, with the states before and after it."""
 
-    event: Event
+    recorded: Recorded
     before: RunState
     after: RunState
 
@@ -62,7 +62,7 @@ class Position:
     by the one who folds them, or by `catch_up`. Event ids stand for positions; `at` is None at the end, also while it grows.
     """
 
-    def __init__(self, read: Callable[[int, int], list[Event]]) -> None:
+    def __init__(self, read: Callable[[int, int], list[Recorded]]) -> None:
         self._read = read
         self.at: int | None = None
         self.end = RunState()
@@ -151,9 +151,9 @@ class Position:
         if place <= 0:
             return None
         wanted = self._ids[place]
-        if not (self._near and self._near[0].event.id <= wanted <= self._near[-1].event.id):
+        if not (self._near and self._near[0].recorded.id <= wanted <= self._near[-1].recorded.id):
             self._load((place - 1) // self._gap)
-        near = [each.event.id for each in self._near]
+        near = [each.recorded.id for each in self._near]
         return self._near[bisect_right(near, wanted) - 1]
 
     def start_of(self, test: int) -> Moment | None:
@@ -197,10 +197,10 @@ class Position:
         return True
 
 
-def position_in(events: Sequence[Event]) -> Position:
+def position_in(events: Sequence[Recorded]) -> Position:
     """A position at the end of all these events. Raises UserError for an invalid one."""
 
-    def read(after: int, most: int) -> list[Event]:
+    def read(after: int, most: int) -> list[Recorded]:
         begin = bisect_right(events, after, key=lambda event: event.id)
         return list(events[begin : None if most < 0 else begin + most])
 

@@ -1,15 +1,62 @@
-"""What a run has found so far, as plain frozen data: its environments, certificates, how many tests are left, its sizes,
-and what the user decided.
-"""
+"""What a run has found so far, as plain frozen data: searches, environments, certificates, decisions of the user, isolation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+from ddenv.environment import Environment
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """The start of a search: the number of its first round, the node that it starts from, and what was known then.
+
+    `n_partitions` is None for the scenario's value. `tests` are those that verdicts rested on, for schemas that learn. A candidate
+    has to keep the `rate` of f, 0 if its first run with f decides; the search had gone back so many `steps_back`. The groups
+    `again` are left out first. `past` are its rounds that are over.
+    """
+
+    first_round: int
+    node: int
+    n_partitions: int | None
+    pinned: frozenset[str]
+    evidence_test: int
+    settings: dict[str, Any]
+    rate: float = 0.0
+    steps_back: int = 0
+    tests: tuple[int, ...] = ()
+    again: tuple[tuple[int, ...], ...] = ()
+    past: tuple[PastRound, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PastRound:
+    """A round of the current search that is over: a `digest` of its partitions, its winner, and the tests of its verdicts.
+
+    `evidence_test` is the run of the winner that guides the next rounds.
+    """
+
+    digest: int
+    winner: int | None
+    evidence_test: int | None
+    tests: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """The user refused an environment in round number `round`: it is "vetoed", "rejected" or "undone"."""
+
+    environment: Environment
+    verdict: str
+    round: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
     """An environment that the run has reached, in the tree of its reductions; number 0 is the whole world, without parent.
+
+    `id` is the number of its environment. The last round in it had `n_partitions`, None before one.
 
     `how` is "start", "reduced" (a candidate showed f), "adopted" (a trial did), "accepted" (the user accepted another failure,
     too), "instead" (from here on another failure is f), "certified" (its certificate showed that one more model can go) or "sliced"
@@ -26,6 +73,8 @@ class Node:
     how: str
     what: str
     environment: tuple[str, ...]
+    id: int = 0
+    n_partitions: int | None = None
     round: int | None = None
     tests: int = 0
     own_tests: int = 0
@@ -79,6 +128,7 @@ class Claim:
     low: float
     high: float
     outcomes: tuple[tuple[str, int], ...] = ()
+    environment: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,3 +162,71 @@ class Decision:
     node: int
     kind: str
     words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Removal:
+    """The whole world without `models` was tried.
+
+    `verdict` is "" while it is open, then "passes", "fails" or "unknown" (its tests broke), by the `tests` with these ids.
+    """
+
+    models: tuple[str, ...]
+    environment: int
+    verdict: str = ""
+    tests: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Returned:
+    """What fresh runs show of a world that passes; or, if `back` is a model, of that with it (and its stack) put back.
+
+    `verdict`: the world "passes" or "fails"; a model has to go ("needed") or not ("not needed"); "not shown" if the runs do not
+    decide, "unknown" if they broke. The robot reached its goal in `reached` of `runs`; `low`..`high` is Wilson's 95 % interval of
+    that rate, 0..1 without runs.
+    """
+
+    back: str | None
+    verdict: str
+    reached: int
+    runs: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Fresh runs of removal number `removal` (from 1), and of it with each model put back."""
+
+    removal: int
+    claims: tuple[Returned, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Isolation:
+    """A search for the fewest models that have to go from the whole world so that the robot reaches its goal.
+
+    It passes if it reaches it at the rate `wanted` rather than at `rather_than`; of a world with a model put back, the rate has to
+    fall below `keep_rate` of what it is without it. All claims are wrong with a probability of at most `error`. `first_run` is the
+    number of the first run with a fresh seed; each check has `block` of them. The `suspects` are removed first to last, at first
+    `size` of them: what the reduction left. `before` is why the reduction had ended.
+    `checks` are fresh runs of what the search found; a check that shows something else sends it on. `ended`: the last word is
+    spoken; `found` is then the removal after which the robot passes, None if there is none. `broken_off`: the user
+    gave it up, or ended it by another decision.
+    """
+
+    number: int
+    first_run: int
+    block: int
+    wanted: float
+    rather_than: float
+    keep_rate: float
+    error: float
+    at_least: int
+    suspects: tuple[str, ...]
+    size: int
+    before: str
+    checks: tuple[Check, ...] = ()
+    ended: bool = False
+    found: int | None = None
+    broken_off: bool = False

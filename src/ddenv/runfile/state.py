@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from ddenv.resting import Supports
+from ddenv.environment import NOTHING, Environment
 from ddenv.runfile.failures import Baseline, Place
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.physics import Physics
-from ddenv.runfile.progress import Certificate, Forecast, Point
-from ddenv.runfile.progress import Decision as Decision
-from ddenv.runfile.progress import Node as Node
-from ddenv.runfile.removals import Isolation, Removal
+from ddenv.runfile.progress import Certificate, Decision, Forecast, Isolation, Leg, Node, Point, Refusal, Removal
+
+# The first of each two models rests on the second, or is tied to it.
+Pairs = tuple[tuple[str, str], ...]
 
 OUTCOMES = ("similar", "other", "pass", "error", "timeout")
 # Tests that ended so say nothing about f.
@@ -23,10 +23,8 @@ REFUSED = ("vetoed", "rejected", "undone")
 # Other outcomes of tests; a baseline run may also be "failed" until f is fixed.
 UNFINISHED = ("running", "lost")
 _TALLY = (*OUTCOMES, "failed", *UNFINISHED)
-# The phases of full runs of what is left. Files of format 4 have "confirm", with the seeds that the search had used.
-FRESH = ("certify", "confirm")
-# The phase of runs of the whole world without the models of a removal: all are full; and of candidates whose round may come.
-ISOLATE, AHEAD = "isolate", "ahead"
+# The phase of full runs of what is left with fresh seeds, and of runs of the whole world without the models of a removal.
+CERTIFY, ISOLATE = "certify", "isolate"
 # The first run with a fresh seed; the search never comes so far. A certificate has so many seeds, or more if it is asked for more.
 FIRST_FRESH_RUN, FRESH_RUNS = 10_000, 1000
 
@@ -46,17 +44,23 @@ class RunState:
 
     `confirming`: the rounds are over, and full runs with fresh seeds show what the result is worth: the last of `certificates`;
     `fresh` are the ids of its tests. `pinned` models stay. `nodes` are the environments that the run has reached, `node` is the
-    number of the current one; the run came to it when `came_at` tests were finished.
+    number of the current one; the run came to it when `came_at` tests were finished. `environments` are all that were named;
+    tests, nodes and tries have their numbers. `leg` is the current search; once `search_due`, a new one has to begin. `judged` are
+    the tests that verdicts rest on, in their order. `refused` environments are not taken because the user said so, `lost` ones with
+    all of their parts because they lost the rate of f, each beside the failures that counted as f then: the search went so many
+    `steps_back`, and leaves out the groups `again` first in the next leg.
     `trials` are the user's own selections, `decisions` all decisions of the user. The ends of the tests in `failures` count
     as f in the current node.
     `lower_bound` is the minimum number of models needed, if f shows wherever everything it needs is present.
     `supports` has (upper, lower) where a model rests on another once the whole world has settled. That is being found while
     `settling`; `unsettled` says why it could not be found. `ties` has (model, other)
     where a model is tied to another; None if that is unknown. Of the tests, `implied` ones were not simulated, and
-    `audits` were although they were implied. If one of these, the first of `refuted`, did not repeat the second, slices are no
+    `audits` were although they were implied. Tests up to `mixed_until` were computed with something else, and imply nothing now.
+    If one of these, the first of `refuted`, did not repeat the second, slices are no
     longer used.
     `isolations` are searches for the nearest world that passes, `removals` what they removed from the whole world. `ahead` tests
-    were made ahead of time and are not needed so far; decisions rest on those with the bits 1 << id of `rests_on`.
+    were made ahead of time and are not needed so far; decisions rest on those with the bits 1 << id of `rests_on`. `engines` counts
+    the engines that have worked on it. After one broke tests that a verdict needs (`left_unknown`), the next one makes them again.
     `notes` say what is wrong with the whole world: a word and a sentence each.
     `engine_version` is the version of ddenv that last worked on it, `simulator` what it computed with, `physics` the same
     with the machine, compared with what the tests were made with.
@@ -71,7 +75,19 @@ class RunState:
     reason: str = ""
     scenario: dict[str, Any] = field(default_factory=dict)
     elements: tuple[str, ...] = ()
+    environments: PersistentTuple[Environment] = field(default_factory=PersistentTuple)
     environment: tuple[str, ...] = ()
+    leg: Leg | None = None
+    search_due: bool = False
+    judged: PersistentTuple[int] = field(default_factory=PersistentTuple)
+    refused: tuple[Refusal, ...] = ()
+    refusals: int = 0
+    lost: tuple[tuple[tuple[int, ...], Environment], ...] = ()
+    steps_back: int = 0
+    again: tuple[tuple[int, ...], ...] = ()
+    engines: int = 0
+    left_unknown: bool = False
+    mixed_until: int = 0
     accept_mode: str = "automatic"
     paused: bool = False
     needs_room: int = 0
@@ -99,8 +115,8 @@ class RunState:
     isolations: tuple[Isolation, ...] = ()
     removals: PersistentTuple[Removal] = field(default_factory=PersistentTuple)
     lower_bound: int = 0
-    supports: Supports = ()
-    ties: tuple[tuple[str, str], ...] | None = None
+    supports: Pairs = ()
+    ties: Pairs | None = None
     implied: int = 0
     ahead: int = 0
     rests_on: int = 0
@@ -126,6 +142,10 @@ class RunState:
         state = object.__new__(RunState)
         state.__dict__.update(self.__dict__, **values)
         return state
+
+    def models_of(self, test: Test) -> tuple[str, ...]:
+        """The names of the models in the world of a test, collected at each call."""
+        return self.environments[test.environment].names(self.elements)
 
     @property
     def f_test(self) -> Test | None:
@@ -202,7 +222,7 @@ class RunState:
 
     @property
     def certified(self) -> bool:
-        """Whether the run ended as minimal, and fresh runs show it; files of format 4 have no certificate."""
+        """Whether the run ended as minimal, and fresh runs show it."""
         return self.minimal and self.certificate is not None and bool(self.certificate.claims)
 
     @property
@@ -235,7 +255,10 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round: `partitions` in the order they are tried, `winner`'s index or None, and without how many parts f was `missed`."""
+    """One round: `partitions` in the order they are tried, and without how many parts f was `missed`.
+
+    `winner` is the index of the candidate that became the environment, `accepted` that of one that the user accepted, or None.
+    """
 
     number: int
     n_partitions: int
@@ -244,6 +267,7 @@ class Round:
     winner: int | None = None
     done: bool = False
     missed: int = 0
+    accepted: int | None = None
 
     @property
     def environment(self) -> tuple[str, ...]:
@@ -261,7 +285,7 @@ class Round:
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """An environment and its disjoint parts, shared by all candidates of a round.
+    """An environment and its disjoint parts, shared by all candidates of a round; by name, and as `whole` and `parts` by number.
 
     `pinned` models of the environment are in no part, but in every candidate.
     """
@@ -269,6 +293,9 @@ class Split:
     environment: tuple[str, ...]
     partitions: tuple[tuple[str, ...], ...]
     pinned: tuple[str, ...] = ()
+    whole: Environment = NOTHING
+    parts: tuple[Environment, ...] = ()
+    always: Environment = NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,6 +316,12 @@ class Candidate:
     verdict: str = ""
     tests: tuple[int, ...] = ()
     known: int = 0
+
+    @property
+    def kept(self) -> Environment:
+        """Its models."""
+        part = self.split.parts[self.partition]
+        return part | self.split.always if self.kind == "partition" else self.split.whole - part
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -322,6 +355,7 @@ class Trial:
     number: int
     models: tuple[str, ...]
     node: int
+    environment: int = 0
     verdict: str = ""
     tests: tuple[int, ...] = ()
     known: int = 0
@@ -339,22 +373,21 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """One run of the robot.
+    """Run number `run` of environment number `environment`, with its seed.
 
     `outcome` is "running" until it ends; a baseline run that failed is "failed" until f is fixed. `phase` is "baseline", "round",
-    "hand" (for the user's trial number `trial`), "audit" (of the slice in `node`), "ahead" (of a round that may come: of `tried`)
-    or "certify": a run with a fresh seed of the environment of `node`, or of that without the model `without`; or "isolate": a
-    run of the whole world after removal number `removal`. In other phases `node` was the current one. `run` is i in
-    seed = base + i; above 0 in a round it is a re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is
-    x, y, z m, qw, qx, qy, qz. `failure` says how it ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and
-    `first_touched` are the models that the robot sensed or touched, with the simulated time of the first time, s. `cut`: ended
-    early, because the robot was stuck for good.
-    `took_part` are the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that
-    test implies it; `audits`: it was, although that test implies it.
-    `taken`: its result was copied from another run. `tried` is the candidate of a failed test in a round.
+    "hand" (for the user's trial number `trial`), "audit" (of a slice), "certify" (with a fresh seed, of what is left, of the whole
+    world, or of what is left without the model `without`) or "isolate" (of the whole world after removal number `removal`). `node`
+    was the current one; for a fresh run it is the last one on the way there with its environment. In a round, a `run` above 0 is a
+    re-run (deflaking). `distance` is from the robot's end to f's, m. `end_pose` is x, y, z m, qw, qx, qy, qz. `failure` says how it
+    ended short of the goal, see `ddenv.runfile.events`. `first_sensed` and `first_touched` are the models that the robot sensed or
+    touched, with the simulated time of the first time, s. `cut`: ended early, because the robot was stuck for good. `took_part` are
+    the models that can have changed a bit of it, None if unknown. `implied_by`: it was not simulated, since that test implies it;
+    `audits`: it was, although that test implies it. `taken`: its result was copied from another run. `engine` made it, from 1.
     """
 
     id: int
+    environment: int
     phase: str
     round: int | None
     candidate: int | None
@@ -369,7 +402,7 @@ class Test:
     first_sensed: tuple[tuple[str, float], ...] = ()
     first_touched: tuple[tuple[str, float], ...] = ()
     cut: bool = False
-    took_part: frozenset[str] | None = None
+    took_part: Environment | None = None
     implied_by: int | None = None
     audits: int | None = None
     without: str | None = None
@@ -377,7 +410,7 @@ class Test:
     removal: int | None = None
     taken: bool = False
     node: int = 0
-    tried: Candidate | None = field(default=None, repr=False, compare=False)
+    engine: int = 0
 
     @property
     def is_finished(self) -> bool:
@@ -386,7 +419,7 @@ class Test:
     @property
     def is_deflake_run(self) -> bool:
         """Whether it is a finished re-run of a candidate."""
-        return self.phase in ("round", AHEAD) and self.run > 0 and self.is_finished
+        return self.phase == "round" and self.run > 0 and self.is_finished
 
 
 def partition_letter(index: int) -> str:

@@ -22,12 +22,15 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.events import LARGEST, moment, number, vector, whole
+from ddenv.runfile.events import KINDS, NAMES, Created, Event, Implied, TestFinished
 from ddenv.runfile.lock import engine_lock
+from ddenv.runfile.reading import LARGEST, Invalid, number, plain, read, vector
 
 APPLICATION_ID = 0x64644531
-# The format of the file. Formats before 4 were never released; 5 has certificates, 6 slices.
-SCHEMA_VERSION, OLDEST_VERSION = 6, 4
+# The format of the file. Earlier ones were never released; from this one on, all are read.
+SCHEMA_VERSION = OLDEST_VERSION = 7
+# The maximum time, Unix time in s: the year 5138.
+LATEST = 1e11
 COLUMNS = 8  # time s, x, y, z m, quaternion w, x, y, z
 # Maximum wait for another process to finish writing, s: a screen must not freeze, an engine must not give up.
 VIEWER_WAIT, ENGINE_WAIT = 1.0, 30.0
@@ -51,8 +54,23 @@ Motions = dict[str, bytes | int]
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """An event, or an entry of the command table: a viewer's request. `time` is Unix time, s."""
+class Recorded:
+    """An event of a run file. `time` is Unix time, s; `command` is the number of the viewer's request that caused it."""
+
+    id: int
+    time: float
+    event: Event
+    command: int | None = None
+
+    @property
+    def kind(self) -> str:
+        """The name of its kind in the file."""
+        return NAMES[type(self.event)]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """An entry of the command table: what a viewer asks of the engine. `time` is Unix time, s."""
 
     id: int
     time: float
@@ -71,8 +89,8 @@ class Live:
     models: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
 
 
-def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> None:
-    """Creates a run file atomically, with `created` as the data of its first event.
+def create(path: Path, documents: dict[str, bytes], created: Created) -> None:
+    """Creates a run file atomically, with `created` as its first event.
 
     Raises UserError if it exists or cannot be written.
     """
@@ -88,7 +106,7 @@ def create(path: Path, documents: dict[str, bytes], created: dict[str, Any]) -> 
         connection.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
         connection.executescript(_SCHEMA)
         connection.executemany("INSERT INTO document VALUES (?, ?)", documents.items())
-        first = (time.time(), "created", json.dumps(created, allow_nan=False))
+        first = (time.time(), "created", json.dumps(plain(created), allow_nan=False))
         connection.execute("INSERT INTO event (time, kind, data) VALUES (?, ?, ?)", first)
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
@@ -176,7 +194,7 @@ class RunFile:
         if not OLDEST_VERSION <= version <= SCHEMA_VERSION:
             which = "a newer ddenv" if version > SCHEMA_VERSION else "a ddenv from before its first release"
             raise UserError(
-                f"{path}: was written by {which} (format {version}); this one reads formats {OLDEST_VERSION} to {SCHEMA_VERSION}"
+                f"{path}: was written by {which} (format {version}); this one reads format {SCHEMA_VERSION}"
             )
         # A view or trigger in place of a table could run forever.
         if {sql for (sql,) in self._all("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")} != _TABLES:
@@ -202,24 +220,32 @@ class RunFile:
         rows = self._all("SELECT name, content FROM document WHERE substr(name, 1, ?) = ?", (len(prefix), prefix))
         return {name[len(prefix) :]: content for name, content in rows if isinstance(content, bytes)}
 
-    def events(self, after: int = 0, most: int = -1) -> list[Event]:
-        """All events with an id above `after`, in order; at most `most` unless that is negative."""
+    def events(self, after: int = 0, most: int = -1) -> list[Recorded]:
+        """All events with an id above `after`, in order; at most `most` unless that is negative. Raises UserError."""
         with uncollected():
-            return self._entries("event", after, most)
+            return list(self.read(after, most))
 
-    def commands(self, after: int = 0) -> list[Event]:
-        """The requests of viewers with an id above `after`, in order."""
-        return self._entries("command", after)
+    def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
+        """The same, one after the other, so that those before a damaged one can be used."""
+        for row in self._rows("event", after, most):
+            yield recorded(*row)
+
+    def commands(self, after: int = 0) -> list[Request]:
+        """The requests of viewers with an id above `after`, in order. Raises UserError."""
+        return [
+            Request(id, _moment(at), str(kind), _object(id, data))
+            for id, at, kind, data in self._rows("command", after)
+        ]
 
     def last_command(self) -> int:
         """The id of the last request; 0 before the first one."""
         row = self._one("SELECT max(id) FROM command")
-        return whole(row[0]) if row and row[0] else 0
+        return int(row[0]) if row and row[0] else 0
 
     def send(self, kind: str, **data: Any) -> int:
         """Sends a command to the engine; returns its id. Raises UserError."""
         with self._writing() as db:
-            return self._insert(db, "command", kind, data)
+            return _insert(db, "command", kind, data)
 
     def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
@@ -247,10 +273,8 @@ class RunFile:
         """The running tests, by worker slot."""
         rows = self._all("SELECT slot, test, time, pose FROM live ORDER BY slot")
         try:
-            return [
-                Live(whole(slot), whole(test), number(at), *_poses(json.loads(text))) for slot, test, at, text in rows
-            ]
-        except (ValueError, TypeError, OverflowError, RecursionError, KeyError):
+            return [Live(int(slot), int(test), number(at), *_poses(json.loads(text))) for slot, test, at, text in rows]
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, KeyError):
             raise UserError(f"{self.path}: damaged run file: the pose of a running test is invalid") from None
 
     # The methods below are for the engine alone.
@@ -268,30 +292,32 @@ class RunFile:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
-    def append(self, kind: str, data: dict[str, Any], motions: Motions | None = None) -> Event:
-        """Records one event, with the trajectories of its test, in one transaction.
+    def append(self, event: Event, motions: Motions | None = None, command: int | None = None) -> Recorded:
+        """Records one event, with the trajectories of its test, in one transaction; `command` is the number of what caused it.
 
         Raises UserError if the run file was deleted or replaced meanwhile: SQLite would go on to write what nobody can read.
         """
         while True:
             try:
-                return self._append(kind, data, motions)
+                return self._append(event, motions, command)
             except NoRoom as full:
                 if self._wait is None or not self._wait(full):
                     raise
 
-    def _append(self, kind: str, data: dict[str, Any], motions: Motions | None) -> Event:
+    def _append(self, event: Event, motions: Motions | None, command: int | None) -> Recorded:
+        data = plain(event) | ({} if command is None else {"command": command})
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
-            id = self._insert(db, "event", kind, data)
-            for model, samples in (motions or {}).items():
-                db.execute("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", (data["test"], model, samples))
+            id = _insert(db, "event", NAMES[type(event)], data)
+            if motions and isinstance(event, TestFinished | Implied):
+                rows = [(event.test, model, samples) for model, samples in motions.items()]
+                db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
             at = db.execute("SELECT time FROM event WHERE id = ?", (id,)).fetchone()[0]
             db.execute("COMMIT")
         if not self._logs:
             logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
             self._logs = {log: _identity(log) for log in logs if log.exists()}
-        return Event(id, at, kind, data)
+        return Recorded(id, at, event, command)
 
     def _take_log(self) -> None:
         """Merges the log into the file, wherever it is now, and removes it: SQLite would add it to another file of this name."""
@@ -316,21 +342,8 @@ class RunFile:
         with suppress(NoRoom), self._writing() as db:
             db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
-    def _insert(self, db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
-        text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-        cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text))
-        assert cursor.lastrowid is not None
-        return cursor.lastrowid
-
-    def _entries(self, table: str, after: int, most: int = -1) -> list[Event]:
-        rows = self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
-        try:
-            entries = [Event(id, moment(at), str(kind), json.loads(data)) for id, at, kind, data in rows]
-        except (ValueError, TypeError, RecursionError):
-            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is invalid") from None
-        if not all(isinstance(entry.data, dict) for entry in entries):
-            raise UserError(f"{self.path}: damaged run file: an entry of '{table}' is not a JSON object")
-        return entries
+    def _rows(self, table: str, after: int, most: int = -1) -> list[tuple[Any, ...]]:
+        return self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
 
     def _one(self, query: str, values: tuple[Any, ...] = ()) -> tuple[Any, ...] | None:
         rows = self._all(query, values)
@@ -359,9 +372,48 @@ class RunFile:
             raise kind(f"{self.path}: cannot be written: {error}; its content is intact") from None
 
 
+def recorded(id: Any, at: Any, kind: Any, data: Any) -> Recorded:
+    """A row of the event table. Raises UserError, with what is wrong where."""
+    try:
+        content = _object(id, data)
+        command = content.pop("command", None)
+        if kind not in KINDS:
+            raise Invalid(f"is of an unknown kind {str(kind)[:40]!a}")
+        if command is not None and (type(command) is not int or not 0 <= command <= LARGEST):
+            raise Invalid("command: expected a whole number")
+        return Recorded(int(id), _moment(at), read(KINDS[kind], content), command)
+    except Invalid as invalid:
+        named = f" ({kind})" if kind in KINDS else ""
+        raise UserError(f"damaged run file: event {id}{named}: {invalid}") from None
+
+
+def _object(id: Any, data: Any) -> dict[str, Any]:
+    try:
+        content = json.loads(data)
+    except (ValueError, TypeError, RecursionError):
+        raise UserError(f"damaged run file: entry {id} is no JSON") from None
+    if not isinstance(content, dict):
+        raise UserError(f"damaged run file: entry {id} is not a JSON object")
+    return content
+
+
+def _moment(value: Any) -> float:
+    """A Unix time, s, that a calendar can show."""
+    if type(value) not in (int, float) or not 0 <= value < LATEST:
+        raise UserError("damaged run file: the time of an entry is no date")
+    return float(value)
+
+
+def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text))
+    assert cursor.lastrowid is not None
+    return cursor.lastrowid
+
+
 def _poses(stored: Any) -> tuple[tuple[float, ...], dict[str, tuple[float, ...]]]:
-    """The robot's pose, and those of models. A run that an older version left behind has the robot's alone."""
-    poses = {name: vector(pose, 7) for name, pose in (stored if isinstance(stored, dict) else {ROBOT: stored}).items()}
+    """The robot's pose, and those of models."""
+    poses = {str(name): vector(pose) for name, pose in stored.items()}
     return poses.pop(ROBOT), poses
 
 

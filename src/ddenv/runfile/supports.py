@@ -1,33 +1,14 @@
-"""What rests on what in a run's world: its events, and what they mean for a removal."""
+"""What rests on what in a run's world: what falls when other models go, and which models form a stack."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable
+from functools import lru_cache
 
-from ddenv.resting import Names, dropped, stacks
-from ddenv.runfile.events import Changes, Data, names
-from ddenv.runfile.state import Candidate, RunState, Trial
+from ddenv.runfile.state import Candidate, Pairs, RunState, Trial
 from ddenv.settings import SETTINGS, read
 
-
-def supports_started(_: RunState, __: Data, ___: float) -> Changes:
-    return {"settling": True}
-
-
-def supports(state: RunState, data: Data, _: float) -> Changes:
-    return {
-        "settling": False,
-        "unsettled": str(data.get("why", "")),
-        "supports": tuple(_pairs(state, data["pairs"])),
-        "ties": None if data.get("ties") is None else tuple(_pairs(state, data["ties"])),
-    }
-
-
-def _pairs(state: RunState, pairs: Any) -> Iterator[tuple[str, str]]:
-    for pair in pairs:
-        one, other = names(state.elements, pair)
-        yield one, other
+Names = tuple[str, ...]
 
 
 def drops(state: RunState, tried: Candidate | Trial) -> Names:
@@ -58,3 +39,43 @@ def stack_with(state: RunState, environment: Names, name: str | None) -> Names:
 
 def _keeps_stacks(state: RunState) -> bool:
     return bool(read(state.scenario, SETTINGS["keep_supports"]))
+
+
+def dropped(supports: Pairs, keep: Iterable[str], environment: Iterable[str]) -> Names:
+    """The models of `keep` that lose something that they rest on, or rest on one that does, in the order of `keep`.
+
+    What is not in the `environment` was removed before: what rested on it has fallen already.
+    """
+    keep = tuple(keep)
+    kept, there = frozenset(keep), frozenset(environment)
+    falling = {
+        upper
+        for upper, lower in supports
+        if upper in kept and lower not in kept and (lower in there or upper not in there)
+    }
+    new = falling
+    while new:
+        new = {upper for upper, lower in supports if lower in new and upper in kept} - falling
+        falling |= new
+    return tuple(name for name in keep if name in falling)
+
+
+@lru_cache(maxsize=16)
+def stacks(environment: Names, supports: Pairs) -> tuple[Names, ...]:
+    """The models of `environment` in groups that are connected by support; what is not there connects nothing.
+
+    A model that neither rests on another nor carries one is a stack of its own. Models, and stacks by their first models, are in
+    the environment's order.
+    """
+    group_of = {name: [name] for name in environment}
+    for pair in supports:
+        one, other = (group_of.get(name) for name in pair)
+        if one is None or other is None or one is other:
+            continue
+        # The smaller group moves, so that no model moves often.
+        small, large = sorted((one, other), key=len)
+        large += small
+        group_of |= dict.fromkeys(small, large)
+    place = {name: number for number, name in enumerate(environment)}
+    groups = {id(group): tuple(sorted(group, key=place.__getitem__)) for group in group_of.values()}
+    return tuple(sorted(groups.values(), key=lambda group: place[group[0]]))

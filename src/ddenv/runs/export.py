@@ -9,8 +9,8 @@ from typing import Any
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import RESOURCE, read_parts
 from ddenv.runs.nearest import removed_in_passing
+from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
 from ddenv.world.files.access import Missing, Unusable, write_file
 from ddenv.world.files.resolve import find

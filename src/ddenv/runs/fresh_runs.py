@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from ddenv.rates import wilson_interval
+from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.fold_decisions import origin
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import BROKEN, OUTCOMES, RunState, Test

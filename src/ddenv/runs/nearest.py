@@ -11,12 +11,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ddenv.amounts import first_of
-from ddenv.claims import is_nearest, of_passing
 from ddenv.errors import UserError
-from ddenv.runfile.removals import Isolation
-from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.evidence.claims import is_nearest, of_passing
+from ddenv.runfile.progress import Isolation
+from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
-from ddenv.runs.reasons import GOAL, F, Parting, parted, parting_unknown, where_they_part
+from ddenv.runs.reasons import GOAL, F, Parting, parting_of, parting_unknown, where_they_part
 
 # Instants at which the two runs are compared, from where they part to the end of the shorter one.
 INSTANTS = 8
@@ -76,29 +76,17 @@ def nearest(file: RunFile, state: RunState) -> Nearest | None:
         first, second = file.trajectory(failing.id), file.trajectory(passing.id)
     except UserError as error:
         return Nearest(gone, words, shown, lacks=str(error))
-    equal, apart, place = parted(first, second)
-    touched = {model: at for model, at in failing.first_touched if model in gone}
-    met = touched or {model: at for model, at in failing.first_sensed if model in gone}
-    earliest = min(met, key=met.__getitem__, default="")
-    parting = Parting(failing.id, passing.id, failing.seed, equal, apart, place, met.get(earliest), bool(touched))
-    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, equal)))
+    parting, earliest = parting_of(failing, passing, first, second, gone=gone)
+    return Nearest(gone, words, shown, parting, earliest, tuple(_side_by_side(first, second, parting.equal)))
 
 
 def _pair(state: RunState, one: Isolation, found: int) -> tuple[Test, Test] | None:
     """A run of the whole world that fails, if possible as in f, and one of its seed, in the passing world, that does not."""
     passing = {test.run: test for test in state.tests if test.removal == found and test.outcome == GOAL}
-    whole = [test for test in state.tests if test.run in passing and _is_whole(state, test)]
+    whole = [test for test in state.tests if test.run in passing and test.environment == 0]
     failing = [test for test in whole if test.outcome in (F, "other")]
     chosen = min(failing, key=lambda test: (test.outcome != F, test.cut, test.id), default=None)
     return None if chosen is None else (chosen, passing[chosen.run])
-
-
-def _is_whole(state: RunState, test: Test) -> bool:
-    if test.phase in FRESH:
-        return test.without is None and len(state.nodes[test.node].environment) == len(state.elements)
-    if test.removal is not None:
-        return not state.removals[test.removal - 1].models
-    return test.phase == "baseline"
 
 
 def _met(parting: Parting, first: str) -> str:

@@ -27,7 +27,7 @@ ANOTHER_SIMULATOR = "Another simulator made this run: only the robot's way is st
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """A finished test. `words` say what it was made for; `models` were in it, None if that is known no more.
+    """A finished test. `words` say what it was made for; `models` were in it.
 
     `rows` are the robot's, flat rows of `COLUMNS` floats, empty if the run file lacks them; `moving` has those of each model that
     moved. `lacks` says in sentences what is missing.
@@ -35,7 +35,7 @@ class Played:
 
     test: Test
     words: str
-    models: tuple[str, ...] | None
+    models: tuple[str, ...]
     rows: array[float]
     moving: dict[str, np.ndarray]
     lacks: tuple[str, ...] = ()
@@ -67,12 +67,9 @@ def played(file: RunFile, position: Position, number: int) -> Played:
     lacks = [ANOTHER_SIMULATOR] if position.end.scenario.get("oracle") else []
     try:
         start = position.start_of(number)
-        made = purpose(position.end if start is None else start.after, test)
-        words, models = made.words, made.models
+        words = purpose(position.end if start is None else start.after, test)
     except UserError:
-        words, models = f"test {number}", None
-    if models is None:
-        lacks.append("Which models were in it is not known any more: the map shows what is left.")
+        words = f"test {number}"
     rows, moving = array("d"), {}
     for name, samples in _motions(file, number, lacks):
         if name == ROBOT:
@@ -81,7 +78,7 @@ def played(file: RunFile, position: Position, number: int) -> Played:
             moving[name] = _table(samples)
     if not rows:
         lacks.append(f"The run file has no way of the robot in test {number}: nothing moves here.")
-    return Played(test, words, models, rows, moving if rows else {}, tuple(lacks))
+    return Played(test, words, position.end.models_of(test), rows, moving if rows else {}, tuple(lacks))
 
 
 def _motions(file: RunFile, number: int, lacks: list[str]) -> Iterator[tuple[str, array[float]]]:

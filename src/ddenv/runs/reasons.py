@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from statistics import median
 
 from ddenv.amounts import count, percent
-from ddenv.claims import current, verdict_on
 from ddenv.errors import UserError
-from ddenv.rates import wilson_interval
+from ddenv.evidence.claims import current, verdict_on
+from ddenv.evidence.rates import wilson_interval
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState, Test
 from ddenv.runfile.store import COLUMNS, RunFile
@@ -126,7 +126,8 @@ def _reason(
     pairs = ((left[test.run], test) for test in mine if test.run in left and _kind(test) == shown)
     pair = next(pairs, None)
     try:
-        return Reason(name, gone, len(mine), ends, None if pair is None else _parting(file, *pair, gone))
+        ways = [file.trajectory(test.id) for test in pair or ()]
+        return Reason(name, gone, len(mine), ends, None if pair is None else parting_of(*pair, *ways, gone=gone)[0])
     except UserError as error:
         return Reason(name, gone, len(mine), ends, None, str(error))
 
@@ -154,12 +155,16 @@ def _middle(tests: Sequence[Test], height: float) -> tuple[tuple[float, float], 
     return (x, y), 0.0 if math.isnan(z - height) else z - height, reach
 
 
-def _parting(file: RunFile, with_it: Test, without: Test, gone: Sequence[str]) -> Parting:
-    equal, apart, place = parted(file.trajectory(with_it.id), file.trajectory(without.id))
-    touched = [at for model, at in with_it.first_touched if model in gone]
-    met = touched or [at for model, at in with_it.first_sensed if model in gone]
+def parting_of(
+    with_it: Test, without: Test, first: array[float], second: array[float], *, gone: Sequence[str]
+) -> tuple[Parting, str]:
+    """Where two tests part, with the trajectories `first` and `second`; and which of `gone` took part first, "" if none did."""
+    equal, apart, place = parted(first, second)
+    touched = {model: at for model, at in with_it.first_touched if model in gone}
+    met = touched or {model: at for model, at in with_it.first_sensed if model in gone}
+    earliest = min(met, key=met.__getitem__, default="")
     seed = with_it.seed
-    return Parting(with_it.id, without.id, seed, equal, apart, place, min(met, default=None), bool(touched))
+    return Parting(with_it.id, without.id, seed, equal, apart, place, met.get(earliest), bool(touched)), earliest
 
 
 def parted(first: array[float], second: array[float]) -> tuple[float, float | None, tuple[float, float] | None]:

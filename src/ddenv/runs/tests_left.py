@@ -9,11 +9,12 @@ import math
 from dataclasses import dataclass
 from itertools import islice
 
-from ddenv.certificate_cost import certificate_tests
-from ddenv.claims import expected_fresh_runs, fresh_runs_made
+from ddenv.evidence.certificate_cost import certificate_tests
+from ddenv.evidence.claims import expected_fresh_runs, fresh_runs_made
 from ddenv.runfile.progress import Certificate
+from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.settings import SETTINGS, Reduction, read
+from ddenv.settings import Reduction
 
 # The latest tests show how long one takes. Workers wait for each other for some of the time.
 LATEST, BUSY = 50, 0.9
@@ -77,7 +78,7 @@ def _expected(state: RunState) -> tuple[int, int, int] | None:
         return None
     left = min(len(state.environment), max(state.lower_bound, SURVIVORS))
     rate = (baseline.failures + 0.5) / (baseline.runs + 1)
-    certificate = certificate_tests(rate, _keep_rate(state), left, baseline.runs, baseline.runs)
+    certificate = certificate_tests(rate, settings(state).keep_rate, left, baseline.runs, baseline.runs)
     search = (max(0, each - done) for each in (forecast.low, forecast.likely, forecast.high))
     low, likely, high = (one + other for one, other in zip(search, certificate, strict=True))
     return low, likely, high
@@ -88,12 +89,6 @@ def _of_certificate(state: RunState, now: Certificate) -> tuple[int, int, int] |
         return None
     (low, likely, high), done = expected_fresh_runs(state, now), fresh_runs_made(state, now)
     return low - done, likely - done, high - done
-
-
-def _keep_rate(state: RunState) -> float:
-    """As it is in the run's settings; its default where they make no sense."""
-    value = read(state.scenario, SETTINGS["keep_rate"])
-    return value if isinstance(value, float) else float(str(SETTINGS["keep_rate"].default))
 
 
 def _seconds_of_a_test(state: RunState) -> float | None:

@@ -105,9 +105,10 @@ def _content(path: Path) -> str:
         return ""
 
 
-def is_trusted(program: Program) -> bool:
-    """Whether the user has trusted it as it is now."""
-    return _trusted().issuperset(program.digests)
+def untrusted(scenario: Scenario) -> Program | None:
+    """The program that tests of `scenario` start, if the user has not trusted it as it is now."""
+    program = program_of(scenario)
+    return None if program is None or _trusted().issuperset(program.digests) else program
 
 
 def trust(program: Program) -> None:
@@ -154,6 +155,5 @@ def trust_cluster(scenario: Scenario) -> None:
 
 def check_trusted(scenario: Scenario, where: Path | str) -> None:
     """Raises UserError, naming `where` it is from, if tests would start a program that the user has not trusted."""
-    program = program_of(scenario)
-    if program is not None and not is_trusted(program):
+    if program := untrusted(scenario):
         raise UserError(f"{where}: would start {program.words}; if you trust it, give --trust")

@@ -16,10 +16,10 @@ from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import COLUMNS, Live, RunFile
-from ddenv.runs.creation import read_parts
 from ddenv.runs.nearest import nearest
 from ddenv.runs.playback import played
 from ddenv.runs.reasons import Parting, reasons
+from ddenv.runs.subject import read_parts
 from ddenv.runs.wanted import Wanted, row_of
 from ddenv.scene import colors
 from ddenv.scene.camera import set_up, view

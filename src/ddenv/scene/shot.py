@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.store import Live
-from ddenv.runfile.tested import Purpose, purpose
+from ddenv.runfile.tested import purpose
 from ddenv.world.motion import pose_of
 from ddenv.world.pose import Pose
 
@@ -61,7 +61,7 @@ def shot_of(state: RunState, row: Candidate | Trial, live: Sequence[Live]) -> Sh
     if not found:
         return _shot(state, "start", None, frozenset(row.models), f"{row.label} · not tested yet")
     kind = "live" if any(each.test == found[0].id for each in live) and running else "replay"
-    return _of_test(state, kind, found[0], Purpose(row.label, row.models))
+    return _of_test(state, kind, found[0], row)
 
 
 def _is_running(state: RunState, test: int) -> bool:
@@ -79,10 +79,9 @@ def _to_replay(state: RunState) -> Test | None:
     return next((test for test in reversed(state.tests) if test.is_finished), None)
 
 
-def _of_test(state: RunState, kind: str, test: Test, made: Purpose | None = None) -> Shot:
-    made, chosen = made or purpose(state, test), made is not None
-    name, models = made.words, frozenset(state.environment if made.models is None else made.models)
-    if test.id == state.evidence_test and kind == "replay" and not chosen:
+def _of_test(state: RunState, kind: str, test: Test, row: Candidate | Trial | None = None) -> Shot:
+    name, models = purpose(state, test) if row is None else row.label, frozenset(state.models_of(test))
+    if test.id == state.evidence_test and kind == "replay" and row is None:
         name = "the failure f" if test.id in state.failures[:1] else "the failure in what is left"
         models = frozenset(state.environment)
     words = [name, f"test {test.id}"]

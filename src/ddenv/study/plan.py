@@ -11,7 +11,7 @@ from typing import Any
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.runfile.state import FIRST_FRESH_RUN
-from ddenv.runs.scenarios import load_parts, with_options
+from ddenv.runs.subject import load_parts, with_options
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 
@@ -112,7 +112,7 @@ def make_plan(
 ) -> Plan:
     """The study of these words; each may hold several names separated by commas. Raises UserError.
 
-    `options` are those of `ddenv.runs.scenarios.with_options` for all of it.
+    `options` are those of `ddenv.runs.subject.with_options` for all of it.
     """
     names = scenario_names(scenarios)
     chosen_pairs, chosen_algorithms = _pairs(pairs), _algorithms(algorithms)

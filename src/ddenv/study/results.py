@@ -7,13 +7,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ddenv.claims import current, is_minimal
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current, is_minimal
+from ddenv.runfile.events import (
+    BaselineFinished,
+    CandidateJudged,
+    CertificateFinished,
+    Created,
+    Finished,
+    LeftOut,
+    RateLost,
+    Reduced,
+    TestFinished,
+)
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.follow import steps
 from ddenv.runfile.progress import Certificate
-from ddenv.runfile.state import FRESH, RunState, Test
-from ddenv.runfile.store import Event, RunFile
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import Recorded, RunFile
 from ddenv.study.plan import Cell
 from ddenv.study.study_folder import run_path
 from ddenv.world.files.access import read_bytes
@@ -21,11 +32,11 @@ from ddenv.world.files.access import read_bytes
 
 def difference(file: RunFile, cell: Cell) -> str:
     """How the run file differs from the cell, "" if it does not. Raises UserError if it cannot be read."""
-    first = next(iter(file.events(most=1)), None)
-    if first is None:
-        raise UserError(f"{file.path}: damaged run file: it has no events")
+    first = next((recorded.event for recorded in file.events(most=1)), None)
+    if not isinstance(first, Created):
+        raise UserError(f"{file.path}: damaged run file: it does not begin with its scenario")
     asked = json.loads(cell.scenario.model_dump_json())
-    if _compared(first.data.get("scenario")) != _compared(asked):
+    if _compared(first.scenario) != _compared(asked):
         return "another scenario, or with other options"
     if file.document("world") != read_bytes(cell.scenario.world):
         return "another world"
@@ -108,7 +119,9 @@ def read_cell(folder: Path, cell: Cell) -> Found:
     certificate = current(state) if state.status == "finished" else None
     minimal = state.minimal and certificate is not None and is_minimal(certificate)
     whole = [
-        test.outcome for test in (*tests, *fresh) if _is_whole(test) and test.outcome in ("similar", "other", "pass")
+        test.outcome
+        for test in (*tests, *fresh)
+        if test.environment == 0 and test.outcome in ("similar", "other", "pass")
     ]
     return Found(
         cell,
@@ -147,11 +160,6 @@ def _problem(state: RunState) -> str:
     return state.reason if state.ended else "has not ended"
 
 
-def _is_whole(test: Test) -> bool:
-    """Whether it ran the whole world."""
-    return test.phase == "baseline" or (test.phase in FRESH and test.node == 0 and test.without is None)
-
-
 @dataclass(frozen=True, slots=True)
 class _Story:
     """What a run's events add up to. `search` and `certificates` are the tests that those rest on, in order; each entry of `misses`
@@ -166,24 +174,23 @@ class _Story:
     steps_back: int
 
 
-def _story(events: Iterable[Event]) -> _Story:
+def _story(events: Iterable[Recorded]) -> _Story:
     state, steps_back = RunState(), 0
     search: dict[int, None] = {}
     certificates: dict[int, None] = {}
     sizes: list[tuple[int, int]] = []
     misses: list[int] = []
-    for event, _, state in steps(events):
-        data = event.data
-        match event.kind:
-            case "test_finished" if state.tests[data["test"] - 1].phase == "baseline":
-                search[data["test"]] = None
-            case "candidate_judged":
-                search |= dict.fromkeys(data["tests"])
-                if data["verdict"] == "dissimilar" and data["tests"]:
-                    misses.append(len(data["tests"]))
-            case "certificate_finished" | "rate_lost":
-                certificates |= dict.fromkeys(data.get("tests", ()))
-                steps_back += event.kind == "rate_lost"
-        if event.kind in ("baseline_finished", "reduced", "rate_lost", "left_out", "finished"):
+    for recorded, _, state in steps(events):
+        match event := recorded.event:
+            case TestFinished(test) if state.tests[test - 1].phase == "baseline":
+                search[test] = None
+            case CandidateJudged():
+                search |= dict.fromkeys(event.tests)
+                if event.verdict == "dissimilar" and event.tests:
+                    misses.append(len(event.tests))
+            case CertificateFinished() | RateLost():
+                certificates |= dict.fromkeys(event.tests)
+                steps_back += isinstance(event, RateLost)
+        if isinstance(event, BaselineFinished | Reduced | RateLost | LeftOut | Finished):
             sizes.append((len(search), len(state.environment)))
     return _Story(state, tuple(search), tuple(certificates), tuple(sizes), tuple(misses), steps_back)

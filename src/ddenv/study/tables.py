@@ -9,9 +9,9 @@ from html import escape
 from pathlib import Path
 
 from ddenv.errors import UserError
+from ddenv.evidence.rates import wilson_interval
 from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, say
 from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
-from ddenv.rates import wilson_interval
 from ddenv.report.report_map import CORNERS, picture
 from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name

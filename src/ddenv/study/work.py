@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ddenv.claims import current
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import BROKEN, RunState

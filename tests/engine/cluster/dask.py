@@ -4,6 +4,7 @@ import os
 import socket
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import yaml
@@ -110,7 +111,7 @@ def said(run: Path) -> str:
     if not run.exists():
         return ""
     with RunFile(run) as file:
-        return "\n".join(event.data["words"] for event in file.events() if event.kind == "cluster")
+        return "\n".join(asdict(event.event)["words"] for event in file.events() if event.kind == "cluster")
 
 
 def until_said(run: Path, words: str) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -144,7 +145,7 @@ def test_the_tests_of_a_killed_engine_end_and_the_next_one_uses_the_same_workers
     program = start(held.file, run, "--cluster", cluster.address)
     wait_until(lambda: len(held.begun()) >= 2, lambda: said(run))
     with RunFile(run) as file:
-        engine = next(event.data["pid"] for event in file.events() if event.kind == "engine_started")
+        engine = next(asdict(event.event)["pid"] for event in file.events() if event.kind == "engine_started")
     os.kill(engine, signal.SIGKILL)
     program.communicate(timeout=PATIENCE)
     wait_until(lambda: not any(map(is_alive, held.begun())))

@@ -8,7 +8,7 @@ from ddenv.robot.drake import template as variants
 from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose

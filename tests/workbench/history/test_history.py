@@ -9,7 +9,7 @@ from attached import Attached, starts
 from textual.widgets import DataTable
 
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import Node
+from ddenv.runfile.progress import Node
 from ddenv.workbench.history.history_screen import Compare, History, compare
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.shared import branches

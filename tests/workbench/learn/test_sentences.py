@@ -8,7 +8,6 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.run.browsing import Moments, what_happened
 from ddenv.workbench.run.explain import explain
-from tests.conftest import DATA
 from tests.learn.lessons import RUNS
 from tests.tiers import slow
 
@@ -30,40 +29,38 @@ def moments(run):
             yield moment, explain(snapshots.of(moment, what_happened(moment)))
 
 
-ALL = [*RUNS, *sorted(DATA.glob("*.ddenv"))]
-QUICK = [run for run in ALL if run.stem in ("delivery", "quay-kept", "ditch-sliced", "format4")]
+QUICK = [run for run in RUNS if run.stem in ("delivery", "quay-kept", "ditch-sliced")]
 # What is said of a test in any phase: its sign and words by outcome.
 SIGNS = {"similar": "●", "other": "◇", "pass": "○"}
 
 
-@pytest.mark.parametrize("run", slow(pytest.mark.screens, ALL, but=QUICK), ids=lambda run: run.stem)
+@pytest.mark.parametrize("run", slow(pytest.mark.screens, RUNS, but=QUICK), ids=lambda run: run.stem)
 def test_every_sentence_fits_its_moment(run):
     seen = set()
     for moment, explained in moments(run):
-        here = f"event {moment.event.id}, {moment.event.kind}: {explained}"
+        here = f"event {moment.recorded.id}, {moment.recorded.kind}: {explained}"
         assert explained.sentences, here
         # Nothing is said twice.
         assert len({sentence.lower() for sentence in explained.sentences}) == len(explained.sentences), here
-        if (check := CHECKS.get(moment.event.kind)) is not None:
+        if (check := CHECKS.get(moment.recorded.kind)) is not None:
             lines = LINES[settings(moment.after).algorithm]
             seen |= {check(moment, explained, lines, " ".join(explained.sentences), here)}
     assert "similar" in seen and len(seen) > 2
 
 
 def of_start(moment, explained, lines, said, here):
-    data = moment.event.data
-    if data["phase"] != "round":
+    event = moment.recorded.event
+    if event.phase != "round":
         return
     first, again, *_ = lines
     # With idle workers the algorithm may still be at the first run while a re-run starts.
     ahead = first if "re-run of it at the same time" in said else set()
-    assert explained.line in (first if data["run"] == 0 else again | ahead), here
+    assert explained.line in (first if event.run == 0 else again | ahead), here
     assert "shows f" not in said.replace("It shows f if", ""), here
 
 
 def of_end(moment, explained, lines, said, here):
-    state, data = moment.after, moment.event.data
-    test = state.tests[data["test"] - 1] if "test" in data else state.tests[-1]
+    test = moment.after.tests[moment.recorded.event.test - 1]
     happened = explained.sentences[0]
     assert f"est {test.id} " in happened, here
     for outcome, sign in SIGNS.items():
@@ -71,7 +68,7 @@ def of_end(moment, explained, lines, said, here):
     if test.outcome == "pass":
         assert not any(word in happened for word in FAILING), here
     values_fit(moment, test.outcome, here)
-    if test.phase == "round" and moment.event.kind == "test_finished":
+    if test.phase == "round" and moment.recorded.kind == "test_finished":
         words_fit(test.outcome, said, here)
     return test.outcome
 
@@ -93,7 +90,7 @@ def words_fit(outcome, said, here):
 
 
 def of_verdict(moment, explained, lines, said, here):
-    one = moment.after.round.candidates[moment.event.data["candidate"]]
+    one = moment.after.round.candidates[moment.recorded.event.candidate]
     if one.verdict == "similar":
         assert explained.line in lines[2] and f"{one.label} shows f" in said, here
         assert "No candidate" not in said and "Next is" not in said, here

@@ -11,11 +11,12 @@ from textual.app import App
 from textual.containers import Vertical
 from textual.events import MouseScrollUp
 
+from ddenv.environment import Environment
 from ddenv.map.footprints import Footprint
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import Trial
 from ddenv.runfile.store import Live, RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from ddenv.workbench.map import map_drawing
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
@@ -218,7 +219,7 @@ async def test_layers_are_shown_or_not(run, layer):
     async with Shown(run) as (pilot, world):
         state = world.snapshot.state
         sensed = tuple((f"crate_{number:02}", 5.0 - number) for number in range(3))
-        tests = [each if each.id != test else fake_sensed(each, sensed) for each in state.tests]
+        tests = [each if each.id != test else fake_sensed(state, each, sensed) for each in state.tests]
         world.show(
             Snapshot(state.changed(tests=type(state.tests).of(tests)), (), "absent", world.snapshot.evidence), None
         )
@@ -235,8 +236,9 @@ async def test_layers_are_shown_or_not(run, layer):
         assert layer in LAYERS
 
 
-def fake_sensed(test, sensed):
-    return replace(test, first_sensed=sensed, took_part=frozenset(name for name, _ in sensed))
+def fake_sensed(state, test, sensed):
+    met = Environment.of(state.elements.index(name) for name, _ in sensed)
+    return replace(test, first_sensed=sensed, took_part=met)
 
 
 async def test_the_original_path_is_dashed_beside_the_last_similar_one(busy):

@@ -6,7 +6,7 @@ from textual.widgets import Select, Static
 from textual.worker import WorkerCancelled
 
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import read_parts
+from ddenv.runs.subject import read_parts
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.methods import KINDS

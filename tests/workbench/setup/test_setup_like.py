@@ -7,7 +7,8 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runfile.store import RunFile
-from ddenv.runs.creation import create_like, create_run, read_parts
+from ddenv.runs.creation import create_like, create_run
+from ddenv.runs.subject import read_parts
 from ddenv.workbench.setup.setup_screen import SetupScreen
 from ddenv.world.load import load_scenario
 from tests.workbench.setup.setup_session import Opened

@@ -9,7 +9,7 @@ from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
 from ddenv.runs.remembered import state_file
-from ddenv.runs.scenarios import load_parts
+from ddenv.runs.subject import load_parts
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.setup.missing_list import AskRemedy, MissingList
 from ddenv.workbench.setup.remedies import KEPT, REMEDIES, remedy, remember_remedies, remembered

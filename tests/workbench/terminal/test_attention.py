@@ -53,7 +53,7 @@ async def test_a_reduction_that_waits_is_noticed(run, sent):
     run.created().baseline().hold()
     run.start_round(3)
     async with Attached(run) as session:
-        run.write("accept_mode", mode="ask")
+        run.write("accept_mode_changed", mode="ask")
         run.similar(0)
         run.write("waiting", candidate=0)
         await session.look()

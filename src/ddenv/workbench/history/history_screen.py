@@ -14,13 +14,14 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
 
-from ddenv.claims import of_runs, seen
+from ddenv.evidence.claims import of_runs, seen
+from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
-from ddenv.runfile.state import Decision, Node, RunState
+from ddenv.runfile.progress import Decision, Node
+from ddenv.runfile.state import RunState
 from ddenv.text import plain, shortened
-from ddenv.took_part import slice_in_short
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed

@@ -13,8 +13,8 @@ from typing import TextIO
 
 from ddenv import processor
 from ddenv.amounts import rounded
-from ddenv.claims import drift
 from ddenv.errors import UserError
+from ddenv.evidence.claims import drift
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
 from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.pace import StartEngine

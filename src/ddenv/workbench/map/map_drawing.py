@@ -9,12 +9,12 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from ddenv.evidence.took_part import in_last
 from ddenv.map.cells import Cell
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
 from ddenv.runfile.state import Candidate
 from ddenv.runfile.store import COLUMNS
-from ddenv.took_part import in_last
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
@@ -170,7 +170,7 @@ class MapDrawing:
                 pinned=who.pinned if "pinned" in layers else frozenset(),
                 selected=shown.selection,
                 sensed=sensed_order(state) if "sensed" in layers else {},
-                shown=who.shown if met is None else met,
+                shown=who.shown if met is None else frozenset(met.names(state.elements)),
             )
 
         return self._kept.get((*made_of, shown.selection, layers, place.elements), gather)

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.runfile.events import Names
+from ddenv.evidence.took_part import in_last
 from ddenv.runfile.state import RunState, partition_letter
-from ddenv.runfile.supports import drops
+from ddenv.runfile.supports import Names, drops
 from ddenv.text import shortened
-from ddenv.took_part import in_last
 from ddenv.workbench.map.place import Shown
 from ddenv.workbench.shared.wording import DROPS, count, dropping
 

@@ -104,7 +104,7 @@ def place_of(world: World, scenario: Scenario | None = None) -> Place:
 def place_of_run(path: Path) -> Place:
     """The world and the scenario of a run file. Raises UserError."""
     # Reading scenarios needs pydantic, which is not needed for the first look at a run.
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     until = time.monotonic() + PATIENCE
     while True:

@@ -54,7 +54,7 @@ class Beside(ModalScreen[int | None]):
 
     def _words(self, test: Test) -> Text:
         same = "= " if test.seed == self._test.seed else ""
-        return _line(str(test.id), purpose(self._state, test).words, f"{same}{test.seed}", outcome(test))
+        return _line(str(test.id), purpose(self._state, test), f"{same}{test.seed}", outcome(test))
 
 
 def others(tests: Sequence[Test], one: Test) -> list[Test]:

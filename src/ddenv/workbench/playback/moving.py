@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from ddenv.map.footprints import Footprint
-from ddenv.runfile.events import Names
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round, RunState, Split, Trial
+from ddenv.runfile.supports import Names
 from ddenv.runs.playback import Played
 from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.place import Place, Way

@@ -6,11 +6,12 @@ import time
 from array import array
 
 from ddenv.errors import UserError
+from ddenv.runfile.events import Implied, TestFinished, TestLost, TestStarted
+from ddenv.runfile.fold import spent
 from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
-from ddenv.runfile.tested import OF_TESTS, pointed, purpose
-from ddenv.runfile.working import spent
+from ddenv.runfile.tested import pointed, purpose
 from ddenv.text import plain
 from ddenv.words import news
 from ddenv.workbench.shared.poll import Poll, Snapshot
@@ -108,15 +109,15 @@ def _spent(state: RunState) -> int:
 
 def happened(moment: Moment) -> str:
     """What happened in a moment, with its time of day."""
-    at = time.strftime("%H:%M:%S", time.localtime(moment.event.time))
+    at = time.strftime("%H:%M:%S", time.localtime(moment.recorded.time))
     return f"{at}, after {count(moment.after.tests_done, 'test')}: {what_happened(moment)}."
 
 
 def what_happened(moment: Moment) -> str:
     """The same in a few words, without the time."""
-    kind, state = moment.event.kind, moment.after
-    if kind in OF_TESTS:
-        return _of_test(state, state.tests[moment.event.data["test"] - 1])
+    kind, event, state = moment.recorded.kind, moment.recorded.event, moment.after
+    if isinstance(event, TestStarted | TestFinished | TestLost | Implied):
+        return _of_test(state, state.tests[event.test - 1])
     if kind == "created":
         return "the run was made"
     if kind == "finished":
@@ -126,7 +127,7 @@ def what_happened(moment: Moment) -> str:
 
 
 def _of_test(state: RunState, test: Test) -> str:
-    what = f"test {test.id} ({purpose(state, test).words}, seed {test.seed})"
+    what = f"test {test.id} ({purpose(state, test)}, seed {test.seed})"
     if test.implied_by is not None:
         return f"{what} follows from test {test.implied_by}: {outcome(test)}"
     return f"{what} starts" if test.outcome == "running" else f"{what}: {outcome(test) or test.outcome}"

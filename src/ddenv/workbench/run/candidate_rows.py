@@ -9,13 +9,13 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
-from ddenv.claims import fresh_runs_made, in_the_making, made_of_usual, short
+from ddenv.evidence.claims import fresh_runs_made, in_the_making, made_of_usual, short
+from ddenv.evidence.took_part import implied_words
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
 from ddenv.text import plain, shortened
-from ddenv.took_part import implied_words
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import (
     CLAIM,

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.claims import current, ended, fresh_runs_made, missed, of_runs, promise, terms, usual_runs
+from ddenv.evidence.claims import current, ended, fresh_runs_made, missed, of_runs, promise, terms, usual_runs
+from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, deed
-from ddenv.runfile.fold_rates import seen
+from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.text import plain
-from ddenv.took_part import TEACHING, refuted_words, slice_words
 from ddenv.words import failed_in, isolating, other_failures
 from ddenv.workbench.run.explain_decisions import (
     arrival,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ddenv.claims import drift, has_dropped
+from ddenv.evidence.claims import drift, has_dropped
 from ddenv.guiding.situation import named
+from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import Node, RunState, Trial
+from ddenv.runfile.state import RunState, Trial
 from ddenv.text import plain
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.wording import count

@@ -48,20 +48,19 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     if start is None:
         return None
     state, test = position.end, position.end.tests[number - 1]
-    made = purpose(start.after, test)
-    models = made.models or ()
+    models = state.models_of(test)
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
     said = (
         ("end", how_it_ended(test)),
         ("place", _place(test)),
         ("seed", f"{test.seed} (run {test.run})"),
         ("time", _took(test)),
-        ("started", time.strftime("%-d %b %Y, %H:%M:%S", time.localtime(start.event.time))),
+        ("started", time.strftime("%-d %b %Y, %H:%M:%S", time.localtime(start.recorded.time))),
         ("models", f"{len(models)} of {count(len(state.elements), 'model')}: {_names(models)}"),
         ("touched", _names([name for name, _ in test.first_touched])),
         ("counts in", _counts(position, state, test)),
     )
-    title = f"Test {number} of {len(state.tests)} · {made.words}{again}"
+    title = f"Test {number} of {len(state.tests)} · {purpose(start.after, test)}{again}"
     command = f"ddenv test {run} --test {number}"
     return Facts(title, tuple((name, words) for name, words in said if words), met(test), command)
 

@@ -17,7 +17,7 @@ from textual.widgets.option_list import Option
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.selections import AcceptOther
 from ddenv.guiding.situation import Situation
-from ddenv.runfile.atlas import OtherFailure, atlas, models_of
+from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
 from ddenv.text import plain, shortened
@@ -96,7 +96,7 @@ class FailuresMet(ModalScreen[int | None]):
         if one is None:
             words = Text("No test shows a failure other than f.\n").append_text(words)
         else:
-            names = [plain(shortened(name, 40)) for name in models_of(state, state.tests[one.smallest - 1])]
+            names = [plain(shortened(name, 40)) for name in state.models_of(state.tests[one.smallest - 1])]
             words = Text(f"{_smallest(one)}: {first_of(names, NAMED) or 'no models'}\n").append_text(words)
         self.query_one("#failure", Static).update(words)
 

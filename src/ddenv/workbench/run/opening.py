@@ -15,7 +15,7 @@ from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
-from ddenv.runfile.state import FRESH, RunState, Test
+from ddenv.runfile.state import CERTIFY, RunState, Test
 from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
@@ -250,5 +250,5 @@ def _tests(state: RunState, item: Item | None) -> list[Test]:
 
 def _fresh(state: RunState, node: int, without: str | None) -> list[Test]:
     first = 0 if state.certificate is None else state.certificate.first_run
-    own = (test for test in state.confirm_tests if test.phase in FRESH and test.run >= first)
+    own = (test for test in state.confirm_tests if test.phase == CERTIFY and test.run >= first)
     return [test for test in own if test.node == node and test.without == without]

@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.amounts import between, percent, rounded
-from ddenv.claims import drift, ended, has_dropped
+from ddenv.evidence.claims import drift, ended, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test

@@ -45,7 +45,7 @@ class Choice:
     @cached_property
     def robot(self) -> Model:
         """Raises UserError if its file cannot be read."""
-        from ddenv.runs.creation import read_parts
+        from ddenv.runs.subject import read_parts
         from ddenv.world.read import read_model
 
         if not self.run:
@@ -102,7 +102,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
     """A scenario, a world or a run file; `options` are the command line's on how to read worlds. Raises UserError."""
     if path.suffix == ".ddenv":
         return _read_run(path)
-    from ddenv.runs.scenarios import reading_of, scenario_for_world
+    from ddenv.runs.subject import reading_of, scenario_for_world
     from ddenv.world.load import load_scenario
     from ddenv.world.scenario import PLAIN
 
@@ -119,7 +119,7 @@ def read_choice(path: Path, options: Mapping[str, Any]) -> Choice:
 def _read_run(path: Path) -> Choice:
     """The scenario and the world that a run file holds, wherever their own files are."""
     from ddenv.runfile.store import RunFile
-    from ddenv.runs.creation import read_parts
+    from ddenv.runs.subject import read_parts
 
     with RunFile(path) as run:
         scenario, world, robot = read_parts(run)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ddenv.amounts import about, between, rounded
 from ddenv.errors import UserError
+from ddenv.runfile.events import BaselineFinished, TestFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.tests_left import rough_run
 from ddenv.workbench.shared.wording import count
@@ -54,9 +55,9 @@ def _costs(path: Path, scenario: Scenario) -> tuple[list[float], list[float]] | 
             events = run.events()
     except (UserError, ValueError, RecursionError):
         return None
-    times = [_positive(event.data.get("wall_seconds")) for event in events if event.kind == "test_finished"]
-    rates = [_positive(event.data.get("rate")) for event in events if event.kind == "baseline_finished"]
-    return [each for each in times if each is not None], [min(each, 1.0) for each in rates if each is not None]
+    times = [one.event.wall_seconds for one in events if isinstance(one.event, TestFinished)]
+    rates = [one.event.rate for one in events if isinstance(one.event, BaselineFinished)]
+    return [time for time in times if 0 < time < 1e7], [rate for rate in rates if rate]
 
 
 def _alike(data: Any, scenario: Scenario) -> bool:
@@ -67,10 +68,6 @@ def _alike(data: Any, scenario: Scenario) -> bool:
         return data["name"] == scenario.name and files == asked and timeout == scenario.failure.timeout
     except (KeyError, TypeError, AttributeError):
         return False
-
-
-def _positive(value: Any) -> float | None:
-    return float(value) if isinstance(value, int | float) and 0 < value < 1e7 else None
 
 
 def whole_cost(scenario: Scenario, models: int, jobs: int, past: Past) -> str:

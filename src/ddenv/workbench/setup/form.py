@@ -179,7 +179,7 @@ def texts_of(scenario: Scenario) -> dict[str, str]:
 
 def asked_of(base: Scenario, texts: Mapping[str, str], pair: str, algorithm: str) -> Scenario:
     """`base` with the values of the fields. Raises UserError, or FieldError if a text is not a number."""
-    from ddenv.runs.scenarios import with_values
+    from ddenv.runs.subject import with_values
     from ddenv.world.load import validate
 
     data = base.model_dump(mode="json")

@@ -78,7 +78,7 @@ def read_with_remedies(
 
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
     """
-    from ddenv.runs.scenarios import reading_of
+    from ddenv.runs.subject import reading_of
     from ddenv.world.files.access import MissingFiles
     from ddenv.world.read import read_world
     from ddenv.world.sdf.standin import AUTO

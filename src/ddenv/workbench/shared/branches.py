@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ddenv.runfile.state import Node
+from ddenv.runfile.progress import Node
 
 HERE, MINIMAL, REJECTED, OTHER = "●", "◆", "✗", "○"
 

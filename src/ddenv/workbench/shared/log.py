@@ -9,7 +9,8 @@ from textwrap import wrap
 
 from rich.text import Text
 
-from ddenv.runfile.state import Decision, RunState
+from ddenv.runfile.progress import Decision
+from ddenv.runfile.state import RunState
 from ddenv.text import plain
 from ddenv.words import news
 

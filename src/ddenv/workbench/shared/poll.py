@@ -12,11 +12,11 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
+from ddenv.runfile.fold import spent
 from ddenv.runfile.follow import Follower
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.runfile.working import spent
 from ddenv.version import __version__
 from ddenv.workbench.shared.observed import Busy, Gone, Observed
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from ddenv.claims import current, in_the_making, made_of_usual, meaning, rate
-from ddenv.runfile.events import Names
+from ddenv.evidence.claims import current, in_the_making, made_of_usual, meaning, rate
 from ddenv.runfile.progress import Claim
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.store import RunFile
+from ddenv.runfile.supports import Names
 from ddenv.runs.nearest import Nearest, nearest
 from ddenv.runs.reasons import Parting, Reason, no_reasons, parting_sentence, reasons, sentence
 from ddenv.text import padded, plain, shortened

@@ -15,8 +15,8 @@ from textual.screen import Screen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.claims import current
 from ddenv.errors import UserError
+from ddenv.evidence.claims import current
 from ddenv.guiding.pace import Isolate, Stop
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState

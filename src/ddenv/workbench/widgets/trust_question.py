@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 def once_trusted(app: App[Any], scenario: Scenario, where: Path, then: Callable[[bool], None]) -> None:
     """Calls `then` with whether the user trusts what `scenario` (of the file `where`) starts; asks only where that is not known."""
-    from ddenv.runs.trust import is_trusted, program_of, trust
+    from ddenv.runs.trust import trust, untrusted
 
-    program = program_of(scenario)
-    if program is None or is_trusted(program):
+    program = untrusted(scenario)
+    if program is None:
         then(True)
         return
     from ddenv.workbench.widgets.question import Question

@@ -1,0 +1,61 @@
+"""A disk without space stops no reduction: no test starts until there is some, and none that has ended is lost."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from contextlib import suppress
+
+from ddenv.errors import UserError
+from ddenv.runfile import events
+from ddenv.runfile.store import NoRoom, RunFile
+
+# What has to be free before a test starts, bytes: the results of tests in flight, and SQLite's log of them.
+NEEDED = 32_000_000
+# The time between two looks, s.
+PERIOD = 1.0
+
+
+class DiskSpace:
+    """Watches the disk of a run file. `terminated` ends all waiting."""
+
+    def __init__(self, file: RunFile, terminated: threading.Event) -> None:
+        self._file = file
+        self._terminated = terminated
+        self._next = 0.0
+        self._enough = True
+        self._telling = False
+
+    def enough(self) -> bool:
+        """Whether a test may start. Writes an event when that changes."""
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + PERIOD
+            free = self._free()
+            self._tell(free >= NEEDED, free)
+        return self._enough
+
+    def wait(self, full: NoRoom) -> bool:
+        """Waits for a moment; returns whether to try again what found no room."""
+        if self._telling or self._terminated.is_set():
+            return False
+        if self._enough:
+            # The log may be on the same disk.
+            with suppress(OSError):
+                print(f"{full}; waits until {NEEDED / 1e6:.0f} MB are free", file=sys.stderr, flush=True)
+        self._tell(False, self._free())
+        return not self._terminated.wait(PERIOD)
+
+    def _tell(self, enough: bool, free: int) -> None:
+        changed, self._enough = enough != self._enough, enough
+        if not changed:
+            return
+        # A small event may find room where a result does not.
+        self._telling = True
+        with suppress(UserError):
+            self._file.append(events.DiskSpace(enough, NEEDED, free))
+        self._telling = False
+
+    def _free(self) -> int:
+        return shutil.disk_usage(self._file.path.parent).free

@@ -1,0 +1,356 @@
+"""What a run may claim of its result, in words: made here alone, from the runs that show it, with their number and interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from ddenv.amounts import between, count, first_of, percent
+from ddenv.evidence.certificate_cost import Made, certificate_tests
+from ddenv.evidence.rates import miss_chance, wilson_interval
+from ddenv.runfile.fold_decisions import failures_at, origin
+from ddenv.runfile.progress import Certificate, Claim, Isolation, Node, Returned
+from ddenv.runfile.run_settings import settings
+from ddenv.runfile.state import BROKEN, RunState, Trial
+from ddenv.runfile.supports import stack_with
+
+MOST_NAMES = 3
+NO_FRESH_RUNS = "no fresh runs were made"
+
+
+def is_minimal(certificate: Certificate) -> bool:
+    """Whether a certificate shows that what is left keeps the rate, and that each model in it is needed."""
+    claims = certificate.claims
+    return bool(claims) and all(claim.verdict == ("kept" if claim.without is None else "needed") for claim in claims)
+
+
+def verdict_on(certificate: Certificate, pinned: int = 0, each: str = "single model") -> str:
+    """What a finished certificate shows, in one sentence without a full stop.
+
+    `pinned` models could not be left out; `each` is what was left out at a time.
+    """
+    left, *removals = certificate.claims
+    share = percent(certificate.keep_rate)
+    if left.verdict == "lost":
+        return f"f is rarer in what is left, not shown to keep {share} of {_whole_rate(certificate)}: {rate(left)}"
+    if left.verdict != "kept":
+        return f"not shown that what is left keeps {share} of {_whole_rate(certificate)}: {rate(left)}"
+    for word, start in (
+        ("unknown", "not shown that each model is needed: tests broke without"),
+        ("not shown", "not shown that each model is needed: undecided without"),
+        ("not needed", "not minimal: f shows about as often without"),
+    ):
+        names = [claim.without for claim in removals if claim.verdict == word and claim.without is not None]
+        if names:
+            return f"{start} {first_of(names, MOST_NAMES)}; with all that is left {rate(left)}"
+    but = f"; {_stayed(pinned)}" if pinned else ""
+    if not removals:
+        return f"nothing is left that can be removed: {rate(left)}{but}"
+    most, one = max(removals, key=lambda claim: claim.high), f"{'other ' if pinned else ''}{each}"
+    without = f"any one of these {len(removals)} at most" if len(removals) > 1 else removals[0].without
+    return f"no {one} can be removed: {rate(left)}; without {without} {rate(most)}{but}"
+
+
+def _stayed(pinned: int) -> str:
+    """That nothing is claimed of models that were never left out."""
+    return "1 pinned model was never left out" if pinned == 1 else f"{pinned} pinned models were never left out"
+
+
+def never_left_out(state: RunState, certificate: Certificate) -> int:
+    """How many models of a finished certificate's environment no run leaves out: those that were pinned, with their stacks."""
+    there = state.nodes[certificate.node].environment
+    gone = {name for claim in certificate.claims for name in stack_with(state, there, claim.without)}
+    return len(there) - len(gone) if is_minimal(certificate) else 0
+
+
+class Counted(Protocol):
+    """Runs with their rate of f, as in a claim."""
+
+    @property
+    def shown(self) -> int: ...
+    @property
+    def runs(self) -> int: ...
+    @property
+    def low(self) -> float: ...
+    @property
+    def high(self) -> float: ...
+
+
+def rate(fresh: Counted) -> str:
+    """How often fresh runs showed f: "f in 23 of 23 fresh runs (86 % to 100 %)"."""
+    interval = f" ({percent(fresh.low)} to {percent(fresh.high)})" if fresh.runs else ""
+    return f"f in {fresh.shown} of {count(fresh.runs, 'fresh run')}{interval}"
+
+
+def for_everyone(certificate: Certificate) -> str:
+    """What a finished certificate shows, for readers who know no statistics; one sentence without a full stop."""
+    left, *removals = certificate.claims
+    share = f"{percent(left.low)} to {percent(left.high)} of all drives, with 95 % confidence"
+    said = f"It failed so in {left.shown} of {count(left.runs, 'new drive')} with nothing else there ({share})"
+    if not is_minimal(certificate):
+        return f"{said}, but not every part of this result is shown to hold"
+    if not removals:
+        return said
+    most = max(removals, key=lambda claim: claim.high)
+    one = "it" if len(removals) == 1 else "any one of them"
+    seldom = f"at most {most.shown}" if most.shown else "none"
+    return f"{said}; without {one} in {seldom} of {most.runs} (at most {percent(most.high)})"
+
+
+def in_another_simulator(name: str, fails: bool | None, there: Claim, here: Claim) -> str:
+    """What runs `there`, in another simulator, show of what is left, or of that without a model; without a full stop.
+
+    The certificate says `here` of what is left. `fails` is what `rates.shows_at` says of the runs at the low end of its interval.
+    """
+    share = f"f in {of_runs(there.shown, there.runs)} ({percent(there.low)} to {percent(there.high)})"
+    if there.without is not None:
+        verdicts = {True: f"not needed in {name}", False: f"needed in {name}, too", None: f"not shown for {name}"}
+        return f"{there.without}: {verdicts[fails]}: without it {share}"
+    verdicts = {
+        True: f"fails in {name}, too",
+        False: f"does not fail in {name} as it did",
+        None: f"the runs do not say whether it fails in {name} as it did",
+    }
+    return f"{verdicts[fails]}: {share}; by its certificate {rate(here)}"
+
+
+def meaning(claim: Claim, certificate: Certificate) -> str:
+    """What the verdict of a claim means, in plain words."""
+    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+    share = rate.removesuffix(" rate")
+    return {
+        "kept": f"keeps {rate}",
+        "lost": f"f is rarer: not shown to keep {share}",
+        "needed": f"needed: without it the rate falls below {share}",
+        "not needed": "not needed: f shows about as often without it",
+        "not shown": "not shown: the runs do not decide",
+        "unknown": "unknown: too many runs broke",
+    }.get(claim.verdict, "")
+
+
+def _whole_rate(certificate: Certificate) -> str:
+    """The rate that what is left has to keep a part of."""
+    return "the rate where its branch begins" if certificate.branch else "the whole world's rate"
+
+
+def of_passing(state: RunState, one: Isolation) -> str:
+    """What an isolation that has ended shows, in one sentence without a full stop."""
+    if not one.checks:
+        return (
+            "no world was found that passes: the robot does not reach its goal often enough even without all "
+            f"{count(len(_may_go(state, one)), 'model')} that may go"
+        )
+    check = one.checks[-1]
+    gone, (first, *backs) = state.removals[check.removal - 1].models, check.claims
+    names = f"{count(len(gone), 'model')} of {len(state.elements)} ({first_of(gone, MOST_NAMES)})"
+    if one.found is None:
+        return f"no world is shown to pass: without {names} {_reaching(first)}"
+    said = (
+        f"the nearest world that passes lacks {names}: without {'it' if len(gone) == 1 else 'them'} {_reaching(first)}"
+    )
+    for word, start in (
+        ("unknown", "not shown that each of them has to go: tests broke with"),
+        ("not shown", "not shown that each of them has to go: undecided with"),
+        ("not needed", "not the nearest: the robot passes about as often with"),
+    ):
+        found = [claim.back for claim in backs if claim.verdict == word and claim.back is not None]
+        if found:
+            return f"{said}; {start} {first_of(found, MOST_NAMES)} put back"
+    most = max(backs, key=lambda claim: claim.high)
+    back = "it" if len(backs) == 1 else f"any one of these {len(backs)}"
+    return f"{said}; with {back} put back in {'' if len(backs) == 1 else 'at most '}{_share(most)}"
+
+
+def is_nearest(one: Isolation) -> bool:
+    """Whether fresh runs show that a world passes, and that it does not with any one model put back."""
+    return one.found is not None and all(claim.verdict in ("passes", "needed") for claim in one.checks[-1].claims)
+
+
+def _may_go(state: RunState, one: Isolation) -> frozenset[str]:
+    stacks = (stack_with(state, state.elements, name) for name in one.suspects)
+    return frozenset(name for stack in stacks for name in stack)
+
+
+def _reaching(claim: Returned) -> str:
+    return f"the robot reaches its goal in {_share(claim)}"
+
+
+def _share(claim: Returned) -> str:
+    interval = f" ({percent(claim.low)} to {percent(claim.high)})" if claim.runs else ""
+    return f"{claim.reached} of {count(claim.runs, 'fresh run')}{interval}"
+
+
+def of_all_parts(left: Sequence[str], could_go: Sequence[str], smaller: Sequence[str]) -> str:
+    """What is known of an environment that shows f where it is known of every part of the world; without a full stop.
+
+    `could_go` are its models without which f still shows; `smaller` is a smaller set that shows f, somewhere in the world.
+    """
+    if could_go:
+        any_one = "any one of " if len(could_go) > 1 else ""
+        return f"not 1-minimal: f also shows without {any_one}{first_of(could_go, MOST_NAMES)}"
+    if not left:
+        return "nothing is left that can be removed"
+    known = f"1-minimal: f is gone without {'it' if len(left) == 1 else f'any one of these {len(left)} models'}"
+    if smaller:
+        return f"{known}; but not the smallest: {', '.join(smaller)} show f, too"
+    return f"{known}. No smaller set shows f, either, which 1-minimal alone does not promise"
+
+
+def current(state: RunState) -> Certificate | None:
+    """The finished certificate of the current environment, if there is one."""
+    last = state.certificate
+    return last if last is not None and last.claims else None
+
+
+def in_the_making(state: RunState) -> Certificate | None:
+    """The certificate that is being made, if there is one."""
+    now = state.certificate
+    return now if now is not None and state.confirming and not now.claims else None
+
+
+def fresh_runs_made(state: RunState, now: Certificate) -> int:
+    """How many runs of the last certificate are finished."""
+    return sum(test.run >= now.first_run and test.is_finished for test in state.confirm_tests)
+
+
+def expected_fresh_runs(state: RunState, now: Certificate) -> tuple[int, int, int]:
+    """How many runs a certificate of the current environment takes, as (low, likely, high)."""
+    left = len(state.environment) - len(state.pinned.intersection(state.environment))
+    first, made = origin(state, now.node).number, 0
+    shown: dict[tuple[int, str | None], tuple[int, int]] = {}
+    for test in state.confirm_tests:
+        if test.run < now.first_run or not test.is_finished:
+            continue
+        made += 1
+        if test.outcome not in BROKEN:
+            hits, runs = shown.get((test.node, test.without), (0, 0))
+            shown[test.node, test.without] = hits + (test.outcome == "similar"), runs + 1
+    # The rate that it began with rests on the runs before; its own narrow the range.
+    hits, runs = shown.get((first, None), (0, 0))
+    before = 0 if state.baseline is None else state.baseline.runs
+    rate = (now.rate * before + hits) / (before + runs) if before + runs else now.rate
+    without = [each for (node, model), each in shown.items() if node == now.node and model is not None]
+    done = Made(made, shown.get((now.node, None), (0, 0)), without)
+    return certificate_tests(rate, now.keep_rate, left, now.at_least, before + runs, done)
+
+
+def usual_runs(state: RunState, now: Certificate) -> str:
+    """How many runs a certificate is expected to take, such as "30 to 150 runs"."""
+    low, _, high = expected_fresh_runs(state, now)
+    return f"{between(low, high)} runs"
+
+
+def made_of_usual(state: RunState, now: Certificate) -> str:
+    """How far a certificate is: "23 of about 30 to 150 runs"."""
+    return f"{fresh_runs_made(state, now)} of about {usual_runs(state, now)}"
+
+
+def short(claim: Claim) -> str:
+    """The verdict of a claim in a word or two."""
+    return {"lost": "too rare", "unknown": "tests broke"}.get(claim.verdict, claim.verdict)
+
+
+def terms(certificate: Certificate, pinned: int = 0) -> str:
+    """What a certificate asks for, in one sentence without a full stop."""
+    rate = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}"
+    return f"what is left has to keep {rate}, and to fall below that without {_any_one(pinned)}"
+
+
+def promise(state: RunState, certificate: Certificate) -> str:
+    """What "minimal" means by a certificate of a run, in one sentence without a full stop."""
+    rate, pinned = f"{percent(certificate.keep_rate)} of {_whole_rate(certificate)}", never_left_out(state, certificate)
+    return (
+        f"minimal means: what is left keeps {rate}, and falls below that without {_any_one(pinned)}; "
+        f"the chance that this is wrong is at most {math.ceil(1000 * certificate.error) / 10:g} %"
+    )
+
+
+def _any_one(pinned: int) -> str:
+    return f"any one model that is not pinned ({_stayed(pinned)})" if pinned else "any one model"
+
+
+def ended(state: RunState) -> str:
+    """Why a finished run ended, without a full stop; it says so where no fresh runs show what the result is worth."""
+    said = (state.reason, "" if state.baseline is None else missing(state), smaller_known(state))
+    return "; ".join(words for words in said if words)
+
+
+def smaller_known(state: RunState) -> str:
+    """That a smaller environment is known to show f, which the search may not take, and where it is; "" if there is none."""
+    left = len(state.environment)
+    nodes = [
+        (len(node.environment), f"#{node.number} in the history{', taken back' if node.rejected else ''}")
+        for node in state.nodes
+        if node.shown and not node.lost_rate and len(node.environment) < left and _same_f(state, node)
+    ]
+    trials = [(one.size, one.label) for one in state.trials if one.size < left and _shows_f(state, one)]
+    if not nodes and not trials:
+        return ""
+    size, where = min((*nodes, *trials), key=lambda each: each[0])
+    return f"a smaller environment is known to show f: {count(size, 'model')} ({where})"
+
+
+def _same_f(state: RunState, node: Node) -> bool:
+    """Whether the same failures count as f in a node as now."""
+    return failures_at(state, node.number) == state.failures
+
+
+def _shows_f(state: RunState, trial: Trial) -> bool:
+    tests = (state.tests[id - 1] for id in trial.tests if 0 < id <= len(state.tests))
+    return trial.verdict == "similar" and any(test.outcome == "similar" for test in tests)
+
+
+def missing(state: RunState) -> str:
+    """Why the current environment has no finished certificate; "" if it has one."""
+    if current(state) is not None:
+        return ""
+    return NO_FRESH_RUNS if state.certificate is None else "its certificate is not finished"
+
+
+def has_dropped(state: RunState) -> bool:
+    """Whether the runs of the current environment so far show that f is rarer in it than it may be."""
+    here = state.here
+    whole = None if here is None else origin(state, here.number)
+    if here is None or whole is None or here is whole or not here.runs or not whole.runs:
+        return False
+    least = settings(state).keep_rate * whole.shown / len(whole.runs)
+    return wilson_interval(here.shown, len(here.runs))[1] < least
+
+
+def drift(state: RunState) -> tuple[str, ...]:
+    """How often f showed in the current environment and where it was seen first, from all runs; shorter and shorter forms.
+
+    Empty in the whole world, and where a certificate says more.
+    """
+    here = state.here
+    if here is None or not here.runs or current(state) is not None:
+        return ()
+    whole = origin(state, here.number)
+    if whole is here:
+        return ()
+    long, brief = ("in the whole world", "whole world") if whole.parent is None else ("where the branch began", "first")
+    return (
+        f"f in {seen(here)} here, {seen(whole)} {long}",
+        f"f {here.shown}/{len(here.runs)} here, {whole.shown}/{len(whole.runs)} {brief}",
+        f"f {here.shown}/{len(here.runs)} here",
+    )
+
+
+def seen(node: Node) -> str:
+    """How often f showed in an environment, from all runs so far; "" without runs."""
+    return f"{node.shown} of {len(node.runs)}" if node.runs else ""
+
+
+def missed(state: RunState) -> str:
+    """How likely all runs of a candidate miss f, by the baseline's rate, and by the lower end of its interval."""
+    base, iterations = state.baseline, settings(state).iterations
+    if base is None:
+        return ""
+    middle, most = (percent(miss_chance(rate, iterations)) for rate in (base.rate, base.low))
+    return middle if middle == most else f"{middle} (at most {most})"
+
+
+def of_runs(shown: int, runs: int) -> str:
+    """3 of 5 runs."""
+    return f"{shown} of {count(runs, 'run')}"

@@ -1,0 +1,68 @@
+"""Statistics of a flaky failure: the interval of its rate, and how many re-runs it needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Literal
+
+Z_95 = 1.959963984540054
+# Few runs never show that f is certain.
+HIGHEST_RATE = 0.985
+# The rate of f where something that it needs is missing: another failure may end in the same place by chance.
+SPURIOUS = 0.03
+# Whether a run showed f. A broken one says nothing; None is a run that is not finished.
+Shown = bool | Literal["broken"] | None
+
+
+def wilson_interval(successes: int, trials: int, deviations: float = Z_95) -> tuple[float, float]:
+    """The Wilson interval of a rate that was seen `successes` times in `trials`, of 95 % or of so many standard deviations.
+
+    Raises ValueError for impossible counts.
+    """
+    if trials < 1 or not 0 <= successes <= trials:
+        raise ValueError(f"{successes} of {trials}")
+    rate, z2 = successes / trials, deviations**2
+    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = deviations / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    # Rounding must not push the rate out of its own interval.
+    return min(rate, max(0.0, centre - half)), max(rate, min(1.0, centre + half))
+
+
+def miss_chance(rate: float, iterations: int) -> float:
+    """The probability that `1 + iterations` runs all miss a failure that shows at `rate`."""
+    return (1.0 - rate) ** (1 + iterations)
+
+
+def iterations_needed(rate: float, confidence: float = 0.95) -> int:
+    """The fewest iterations with which a failure that shows at `rate` (above 0) is seen with probability `confidence`."""
+    if rate >= 1.0:
+        return 0
+    return max(0, math.ceil(math.log(1.0 - confidence) / math.log(1.0 - rate) - 1e-9) - 1)
+
+
+def shows_at(outcomes: Iterable[bool], rate: float, error: float = 0.01) -> bool | None:
+    """Whether runs show a failure at `rate` (above 0) rather than at half of it: True, False, or None if they do not decide yet.
+
+    Wald's sequential test ("Sequential tests of statistical hypotheses", 1945): at either rate it is wrong with a probability of
+    at most about `error`, although it may be asked after each run.
+    """
+    rate, runs, hits = min(rate, 0.99), 0, 0
+    for shown in outcomes:
+        runs, hits = runs + 1, hits + shown
+        found = leans_to(hits, runs - hits, rate, rate / 2, error)
+        if found is not None:
+            return found
+    return None
+
+
+def leans_to(hits: int, misses: int, rate: float, other: float, error: float) -> bool | None:
+    """The same after `hits` and `misses`, if no fewer runs decided: whether they speak for `rate` or for `other`, a lower one."""
+    rate = min(rate, 0.99)
+    ratio = hits * math.log(rate / other) + misses * math.log((1.0 - rate) / (1.0 - other))
+    return ratio > 0 if abs(ratio) >= math.log((1.0 - error) / error) else None
+
+
+def estimated_rate(shown: int, runs: int) -> float:
+    """The rate of a failure that `shown` of `runs` showed, never 0 or 1."""
+    return (shown + 0.5) / (runs + 1)

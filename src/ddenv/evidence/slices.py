@@ -1,0 +1,102 @@
+"""Slices: what is known of a run because nothing that it lacks took part in another one. Pure.
+
+Tests share their seeds, and a simulation repeats bit for bit where what took no part in it is removed. So a finished run of models
+E1 implies the run of E2 with the same seed if E2 is a part of E1, has all that took part, and breaks no tie. It implies nothing
+for other seeds. In programs this is dynamic slicing.
+
+Who uses this keeps to three rules, so that neither workers nor kills change a result:
+
+- An implied test has the outcome that a simulation would have. So verdicts, which follow from the outcomes of tests in their order,
+  are the same whichever tests are implied.
+- An environment is cut down to its slice by the runs that decisions rest on, and by no run that only ran ahead of time.
+- That a slice was taken, or found to be wrong, is an event. What follows from it follows from the event.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ddenv.environment import NOTHING, Environment
+
+
+@dataclass(frozen=True)
+class Ties:
+    """What each model is tied to: without one of these it would move by itself, so without a test it stays with them, or goes.
+
+    `of` has these models by number; `on` has, by number, the models that are tied to each.
+    """
+
+    of: Mapping[int, Environment]
+    on: Mapping[int, Environment]
+
+    @classmethod
+    def among(cls, pairs: Iterable[tuple[int, int]]) -> Ties:
+        """The ties `pairs` of a model and one that it is tied to."""
+        of, on = defaultdict[int, set[int]](set), defaultdict[int, set[int]](set)
+        for model, other in pairs:
+            of[model].add(other)
+            on[other].add(model)
+        both = ({model: Environment.of(others) for model, others in each.items()} for each in (of, on))
+        return cls(*both)
+
+    def breaks(self, there: Environment, keep: Environment) -> bool:
+        """Whether a tie of the models `there` is broken where only `keep`, a part of them, stay."""
+        removed = there - keep
+        # Of thousands of models few stay, or few go.
+        if len(keep) < len(removed):
+            return any(not removed.isdisjoint(self.of.get(model, NOTHING)) for model in keep)
+        return any(not keep.isdisjoint(self.on.get(model, NOTHING)) for model in removed)
+
+    def closed(self, models: Environment, there: Environment) -> Environment:
+        """`models`, with all models `there` that they are tied to, directly or by others."""
+        found, new = models, models
+        while new:
+            tied = NOTHING
+            for model in new:
+                tied |= self.of.get(model, NOTHING)
+            new = (tied & there) - found
+            found |= new
+        return found
+
+
+def implies(took_part: Environment, there: Environment, keep: Environment, ties: Ties) -> bool:
+    """Whether a run of the models `there` implies the run of `keep` with the same seed."""
+    return took_part <= keep <= there and not ties.breaks(there, keep)
+
+
+def fresh_chance(met: Sequence[Environment]) -> float:
+    """The chance that a fresh run meets a model that none of these runs `met`, estimated by the models that only one of them met.
+
+    Good, "The population frequencies of species and the estimation of population parameters", 1953.
+    """
+    once, more = NOTHING, NOTHING
+    for models in met:
+        more |= once & models
+        once = (once | models) - more
+    return min(1.0, len(once) / len(met)) if met else 1.0
+
+
+def reasons(
+    elements: Sequence[str],
+    before: Environment,
+    after: Environment,
+    met: Sequence[Environment],
+    pinned: Environment = NOTHING,
+) -> dict[str, str]:
+    """Why each model of `before` stays in `after` or goes, by name in the order of `elements`, the names of all models.
+
+    `met` took part in each of the runs known there.
+    """
+    one, runs = len(met) == 1, f"{len(met)} run{'s' * (len(met) != 1)}"
+
+    def why(model: int) -> str:
+        took_part = sum(model in models for models in met)
+        if model not in after:
+            return "took no part in the one run known" if one else f"took part in none of {runs}"
+        if took_part:
+            return f"took part in {took_part} of {runs}"
+        return "is pinned" if model in pinned else "one that took part is tied to it"
+
+    return {elements[model]: why(model) for model in before}

@@ -1,0 +1,464 @@
+"""What ddenv does, from the first run of the whole world to a certified end: one pure coroutine.
+
+It runs nothing itself. Where it needs tests it yields `Wants`, with the tests in the order of need, and goes on once some of them
+have ended; the driver makes the first, and as many more as it has workers. Every other step that it yields says what was found, and
+`Driver` has all that it asks. The engine drives it with workers and a run file, `ddenv.reduce` with a function, the forecast with
+dice. A resumed run drives it again through what is known.
+
+1. `baseline`: the whole world is run; its failure is f.
+2. `search_on`: an algorithm yields rounds of candidates. The first one that shows f becomes the environment.
+3. `certify`: fresh runs show whether what is left keeps the rate of f, and that without each model the rate falls.
+4. `onward`: where a claim fails, the search goes back to the last environment that kept the rate, or on without a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any, Protocol
+
+from ddenv.environment import Environment
+from ddenv.evidence.certificate import Claim, Procedure, Terms, falls, good_enough, keeps, settle
+from ddenv.evidence.rates import Shown
+from ddenv.reduction.guide import Search
+from ddenv.reduction.round import Candidate, Partition, Round
+from ddenv.reduction.stepping_back import groups_again, last_good
+from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE, Acceptance, Rule, decided_by, standing
+
+# After this many steps back what is left stays as it is, and is not called minimal.
+MOST_STEPS_BACK = 14
+
+
+@dataclass(frozen=True)
+class Test:
+    """Run number `run` of an environment. With `full` it runs to its end, even if the robot is stuck for good.
+
+    `why` is "baseline", "round" (for candidate number `candidate`), "certify" or "isolate"; "hand" and "audit" are tests that the
+    driver makes beside the procedure. `without` is the model that a fresh run leaves out.
+    """
+
+    environment: Environment
+    run: int
+    why: str
+    candidate: int | None = None
+    without: int | None = None
+
+
+# The steps of the procedure. Each comment says what the driver answers; None unless it says something else.
+
+
+@dataclass(frozen=True)
+class Wants:
+    """The tests that are needed next, in the order in which a single worker would make them."""
+
+    tests: tuple[Test, ...]
+
+
+@dataclass(frozen=True)
+class BaselineRan:
+    """The whole world was run so often. The answer is how many of these runs showed f, or None if there is no failure to reduce."""
+
+    runs: int
+
+
+@dataclass(frozen=True)
+class FailureFixed:
+    """The baseline of so many runs is over. The answer is the leg with which the search begins."""
+
+    runs: int
+
+
+@dataclass(frozen=True)
+class RoundBegan:
+    """A round of the search. The answer is None, or what is known of it if it was judged before this driver began."""
+
+    number: int
+    round: Round
+
+
+@dataclass(frozen=True)
+class Past:
+    """The answer to `RoundBegan` where the round is known: its winner's place among the candidates, or None."""
+
+    winner: int | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Candidate number `index` has the verdict "similar", "missed" (by fewer runs than usual), "dissimilar" or "unknown".
+
+    Its first `runs` runs decided; with none, it is part of what lost the rate.
+    """
+
+    index: int
+    environment: Environment
+    verdict: str
+    runs: int
+
+
+@dataclass(frozen=True)
+class Similar:
+    """Candidate number `index` of a round can become the environment. The answer is whether it does."""
+
+    number: int
+    index: int
+    environment: Environment
+
+
+@dataclass(frozen=True)
+class RoundEnded:
+    """A round is over; `winner` is the place of the candidate that became the environment, or None."""
+
+    number: int
+    winner: int | None
+
+
+@dataclass(frozen=True)
+class SearchEnded:
+    """Nothing more can be left out of an environment by the search."""
+
+    environment: Environment
+
+
+@dataclass(frozen=True)
+class CertificateDue:
+    """Fresh runs are due. The answer is the `Certificate` that they are made for."""
+
+
+@dataclass(frozen=True)
+class Certified:
+    """What fresh runs show of what is left, and then of it without each model, up to a claim that ends the certificate."""
+
+    certificate: Certificate
+    claims: tuple[NamedClaim, ...]
+
+
+@dataclass(frozen=True)
+class SteppedBack:
+    """What is left lost the rate. The search goes back to place number `place` of the chain.
+
+    It leaves out the groups `again` first. The environment at `place` + 1 and all parts of it are not taken again. This rests on
+    fresh `tests`, as (environment, run). The answer is the next leg.
+    """
+
+    place: int
+    again: tuple[Partition, ...]
+    tests: tuple[tuple[Environment, int], ...]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Without `model` f shows about as often, so the search goes on in `environment`. The answer is the next leg."""
+
+    model: int
+    environment: Environment
+
+
+Step = (
+    Wants
+    | BaselineRan
+    | FailureFixed
+    | RoundBegan
+    | Judged
+    | Similar
+    | RoundEnded
+    | SearchEnded
+    | CertificateDue
+    | Certified
+    | SteppedBack
+    | LeftOut
+)
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Where a search begins: `chain` leads to the environment that is searched, from the first one to which it may go back.
+
+    What is left has to keep the rate of f in `whole`.
+
+    `pinned` models always stay. `free` are the models that may go, each with those that go with it, by the one that stands for
+    them. `rule` says when a candidate is taken. Rounds are numbered from `first_round`; the first has `n_partitions`, None for the
+    usual number. The groups `again` are left out first.
+    """
+
+    first_round: int
+    whole: Environment
+    chain: tuple[Environment, ...]
+    pinned: Environment
+    free: dict[int, Environment]
+    rule: Acceptance
+    n_partitions: int | None = None
+    again: tuple[Partition, ...] = ()
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The terms of all claims of a certificate together. Its run number 0 has the seed of run `first_run`."""
+
+    number: int
+    first_run: int
+    terms: Terms
+
+
+@dataclass(frozen=True)
+class NamedClaim:
+    """A claim about an environment: about what is left, or about that without `model`."""
+
+    model: int | None
+    environment: Environment
+    claim: Claim
+
+
+class Runs(Protocol):
+    """The runs of one predicate, as far as they are known: what judges candidates and settles claims asks for."""
+
+    def shown(self, environment: Environment, run: int, full: bool = False) -> Shown:
+        """Whether a run showed what is looked for; None if it has not ended. With `full` only a run to its end counts."""
+
+    def refused(self, environment: Environment) -> bool:
+        """Whether the environment is not taken: the user refused it, or it is part of what lost the rate."""
+
+    def refused_by_user(self, environment: Environment) -> bool:
+        """Whether the user refused it."""
+
+    @property
+    def refusals(self) -> int:
+        """How often that has changed."""
+
+    @property
+    def workers(self) -> int:
+        """How many tests can be made at the same time."""
+
+
+class Driver(Runs, Protocol):
+    """What the procedure asks. All answers follow from tests that have ended, and from decisions of the user."""
+
+    def rate(self) -> float:
+        """The rate of f in the world in which it was seen, from all of its runs that decisions rest on."""
+
+    def goes_on(self) -> bool:
+        """Whether the search goes on by itself where a claim of its certificate fails."""
+
+    def algorithm(self, leg: Leg) -> Search:
+        """The algorithm, before its first round."""
+
+
+class Changed(Exception):
+    """Thrown into the procedure by its driver where a decision of the user, or a slice, ends a search: it goes on with `leg`."""
+
+    def __init__(self, leg: Leg) -> None:
+        super().__init__()
+        self.leg = leg
+
+
+def procedure(
+    driver: Driver, whole: Environment, baseline_runs: int, keeps_rate: bool, leg: Leg | None = None
+) -> Generator[Step, Any, Certified | None]:
+    """The whole reduction, or all from `leg` on. Returns the last certificate; None if there was no failure to reduce."""
+    if leg is None and (leg := (yield from baseline(driver, whole, baseline_runs, keeps_rate))) is None:
+        return None
+    while True:
+        try:
+            chain = yield from search_on(driver, leg)
+            yield SearchEnded(chain[-1])
+            certified = yield from certify(driver, leg, chain)
+            after = yield from onward(driver, leg, chain, certified)
+        except Changed as change:
+            after = change.leg
+        if after is None:
+            return certified
+        leg = after
+
+
+def baseline(driver: Driver, whole: Environment, runs: int, keeps_rate: bool) -> Generator[Step, Any, Leg | None]:
+    """Runs the whole world. To keep the rate of a rare f, it goes on, one run at a time, so that workers change nothing."""
+    while True:
+        while missing := [run for run in range(runs) if driver.shown(whole, run) is None]:
+            yield Wants(tuple(Test(whole, run, "baseline") for run in missing))
+        failures: int | None = yield BaselineRan(runs)
+        if failures is None:
+            return None
+        if not keeps_rate or failures >= FEWEST_SHOWN or runs >= LONGEST_BASELINE:
+            leg: Leg = yield FailureFixed(runs)
+            return leg
+        runs += 1
+
+
+def search_on(driver: Driver, leg: Leg) -> Generator[Step, Any, tuple[Environment, ...]]:
+    """Takes what the algorithm finds, to its end; returns the chain of environments."""
+    chain, algorithm, winner, number = leg.chain, driver.algorithm(leg), None, leg.first_round
+    while True:
+        try:
+            round = algorithm.send(winner)
+        except StopIteration:
+            return chain
+        winner = yield from _round(driver, leg, number, round)
+        if winner is not None:
+            chain = (*chain, winner.models | leg.pinned)
+        number += 1
+
+
+def _round(driver: Driver, leg: Leg, number: int, round: Round) -> Generator[Step, Any, Candidate | None]:
+    """Tests the candidates of a round until one is similar, and accepted; returns it, or None."""
+    past: Past | None = yield RoundBegan(number, round)
+    if past is not None:
+        return None if past.winner is None else round.candidates[past.winner]
+    environments = [candidate.models | leg.pinned for candidate in round.candidates]
+    rule = leg.rule.within(round.runs)
+    while True:
+        winner = yield from judge(driver, environments, rule, "round", leg.rule)
+        if winner is None:
+            break
+        accepted: bool = yield Similar(number, winner, environments[winner])
+        if accepted:
+            break
+    yield RoundEnded(number, winner)
+    return None if winner is None else round.candidates[winner]
+
+
+def judge(
+    driver: Runs, environments: Sequence[Environment], rule: Rule, why: str, usual: Rule | None = None
+) -> Generator[Step, Any, int | None]:
+    """Tests environments until one is similar by `rule`; returns its place, or None when all are judged.
+
+    Verdicts come in order: tests of later ones that have ended wait for their turn. What is dissimilar, but not by the `usual`
+    rule, was missed: the algorithm may come back to it.
+    """
+    judged, refusals = 0, driver.refusals
+    while True:
+        if refusals != driver.refusals:
+            # The user may want a candidate that was passed over after all.
+            judged, refusals = 0, driver.refusals
+        candidates = islice(environments, judged, None)
+        now = standing(candidates, driver.shown, rule, driver.refused, first=judged, enough=driver.workers)
+        for verdict in now.verdicts:
+            if not verdict:
+                break
+            environment = environments[judged]
+            if not driver.refused_by_user(environment):
+                yield _judged(driver, judged, environment, verdict, rule, usual or rule)
+            if verdict == "similar":
+                return judged
+            judged += 1
+        if not now.wanted:
+            return None
+        yield Wants(tuple(Test(environments[index], run, why, index) for index, run in now.wanted))
+
+
+def _judged(driver: Runs, index: int, environment: Environment, verdict: str, rule: Rule, usual: Rule) -> Judged:
+    if driver.refused(environment):
+        return Judged(index, environment, "missed", 0)
+    # By these runs alone: more of them may have ended.
+    runs, hits = decided_by(lambda run: driver.shown(environment, run), rule)
+    missed = verdict == "dissimilar" and not usual.verdict(hits, runs - hits)
+    return Judged(index, environment, "missed" if missed else verdict, runs)
+
+
+def certify(driver: Driver, leg: Leg, chain: Sequence[Environment]) -> Generator[Step, Any, Certified]:
+    """Fresh runs show whether what is left keeps the rate of f, and whether it falls without each model."""
+    left, whole = chain[-1], leg.whole
+    certificate: Certificate = yield CertificateDue()
+    terms = replace(certificate.terms, error=certificate.terms.error / 2)
+    rests = {model: left - stack for model, stack in leg.free.items() if stack <= left}
+
+    def claims() -> Iterator[tuple[int | None, Environment, Procedure]]:
+        yield None, left, keeps(left, whole, terms)
+        for model, rest in rests.items():
+            yield model, rest, falls(rest, whole, replace(terms, error=terms.error / len(rests)))
+
+    def ends(claim: NamedClaim) -> bool:
+        if claim.model is None:
+            return claim.claim.verdict == "lost"
+        return claim.claim.verdict == "not needed" and driver.goes_on() and not driver.refused(claim.environment)
+
+    certified = Certified(certificate, (yield from settled(driver, claims, ends, certificate.first_run, "certify")))
+    yield certified
+    return certified
+
+
+def settled(
+    driver: Runs,
+    claims: Callable[[], Iterable[tuple[int | None, Environment, Procedure]]],
+    ends: Callable[[NamedClaim], bool],
+    first_run: int,
+    why: str,
+) -> Generator[Step, Any, tuple[NamedClaim, ...]]:
+    """Makes fresh runs until each of `claims` has a verdict, up to one that `ends` them; returns them."""
+
+    def fresh(environment: Environment, run: int) -> Shown:
+        return driver.shown(environment, first_run + run, full=True)
+
+    # Hundreds of runs need not be looked at again once they have decided.
+    decided: dict[int | None, NamedClaim] = {}
+    while True:
+        named: list[NamedClaim] = []
+        for model, environment, shows in claims():
+            named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
+            if named[-1].claim.verdict:
+                decided[model] = named[-1]
+            if ends(named[-1]):
+                break
+        tests = dict.fromkeys(
+            Test(environment, first_run + run, why, without=_left_out(named, environment))
+            for ahead in range(driver.workers)
+            for claim in named
+            for environment, run in _in_order(claim.claim)
+            if run == claim.claim.runs + ahead
+        )
+        if not tests:
+            return tuple(named)
+        yield Wants(tuple(tests))
+
+
+def _in_order(claim: Claim) -> Sequence[tuple[Environment, int]]:
+    """Of each pair the larger world first: its run may imply the other one."""
+    return sorted(claim.wanted, key=lambda test: (test[1], -len(test[0])))
+
+
+def _left_out(named: Iterable[NamedClaim], environment: Environment) -> int | None:
+    return next((claim.model for claim in named if claim.environment == environment), None)
+
+
+def onward(
+    driver: Driver, leg: Leg, chain: Sequence[Environment], certified: Certified
+) -> Generator[Step, Any, Leg | None]:
+    """Where the search goes on after a certificate; None if it has come to its end."""
+    if not driver.goes_on():
+        return None
+    left, *removals = certified.claims
+    if left.claim.verdict == "lost":
+        if leg.rule.steps_back < MOST_STEPS_BACK and len(chain) > 1:
+            return (yield from _step_back(driver, chain, certified))
+        return None
+    for claim in removals:
+        if claim.model is not None and claim.claim.verdict == "not needed" and not driver.refused(claim.environment):
+            after: Leg = yield LeftOut(claim.model, claim.environment)
+            return after
+    return None
+
+
+def _step_back(driver: Driver, chain: Sequence[Environment], certified: Certified) -> Generator[Step, Any, Leg]:
+    """Back to the last environment that keeps the rate, by bisection and by all runs of the whole world."""
+    first, terms, lost = certified.certificate.first_run, certified.certificate.terms, certified.claims[0]
+    rate = driver.rate()
+
+    def fresh(environment: Environment, run: int) -> Shown:
+        return driver.shown(environment, first + run, full=True)
+
+    runs = range(lost.claim.runs)
+    sound = [shown for run in runs if isinstance(shown := fresh(lost.environment, run), bool)]
+    lost_rate = sum(sound) / max(1, len(sound))
+    claims: dict[Environment, Claim] = {}
+
+    def judged(environment: Environment) -> Claim:
+        shows = good_enough(environment, rate, terms.keep_rate, lost_rate)
+        claims[environment] = settle(shows, fresh, driver.workers)
+        return claims[environment]
+
+    while not isinstance(place := last_good(chain, judged), int):
+        yield Wants(tuple(Test(environment, first + run, "certify") for environment, run in place))
+    again = tuple(groups_again(chain[place], chain[place + 1], chain[-1]))
+    tests = tuple((environment, first + run) for claim in claims.values() for environment, run in claim.rests_on)
+    leg: Leg = yield SteppedBack(place, again, tests)
+    return leg

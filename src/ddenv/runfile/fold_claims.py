@@ -1,0 +1,225 @@
+"""Folds what runs show: certificates, isolation, and slices with their audits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ddenv.runfile import events as e
+from ddenv.runfile.fold_decisions import arrived, listed, origin, searched_anew, without_open
+from ddenv.runfile.fold_tests import Changes, counts, with_node, with_removal
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.progress import Certificate, Check, Claim, Isolation, Node, Point, Returned
+from ddenv.runfile.state import OUTCOMES, RunState, Test
+
+
+def certificate_started(state: RunState, event: e.CertificateStarted, _: float) -> Changes:
+    certificate = Certificate(
+        number=event.certificate,
+        node=state.node,
+        first_run=event.run,
+        keep_rate=event.keep_rate,
+        rate=event.rate,
+        error=event.error,
+        at_least=event.at_least,
+        branch=origin(state, state.node).parent is not None,
+    )
+    if certificate.number != len(state.certificates) + 1:
+        raise ValueError(certificate.number)
+    fresh = PersistentTuple.of(test for test in state.fresh if state.tests[test - 1].run >= event.run)
+    return {"confirming": True, "certificates": (*state.certificates, certificate), "fresh": fresh}
+
+
+def certificate_finished(state: RunState, event: e.CertificateFinished, _: float) -> Changes:
+    _check_tests(state, event.tests)
+    claims = tuple(_claim(state, claim) for claim in event.claims)
+    last = replace(state.certificates[-1], claims=claims)
+    unknown = any(claim.verdict == "unknown" for claim in claims)
+    return {"certificates": (*state.certificates[:-1], last), "left_unknown": state.left_unknown or unknown}
+
+
+def _claim(state: RunState, made: e.ClaimMade) -> Claim:
+    known = made.environment < len(state.environments) and all(outcome in OUTCOMES for outcome in made.outcomes)
+    if not known or made.shown > made.runs or (made.verdict == "lost" and not made.runs):
+        raise ValueError(made)
+    return Claim(
+        without=None if made.without is None else state.elements[made.without],
+        verdict=made.verdict,
+        shown=made.shown,
+        runs=made.runs,
+        low=made.low,
+        high=made.high,
+        outcomes=tuple(made.outcomes.items()),
+        environment=made.environment,
+    )
+
+
+def _check_tests(state: RunState, tests: Sequence[int]) -> None:
+    """The tests that it rests on have to be there."""
+    if max(tests, default=0) > len(state.tests):
+        raise ValueError(tests)
+
+
+def rate_lost(state: RunState, event: e.RateLost, _: float) -> Changes:
+    """What is left shows f too rarely: the run goes back to the last environment that keeps the rate."""
+    _check_tests(state, event.tests)
+    node, lost = state.nodes[event.node], state.nodes[event.lost]
+    if any(model >= len(state.elements) for group in event.again for model in group):
+        raise ValueError(event.again)
+    return {
+        **searched_anew(state),
+        "nodes": with_node(state.nodes, replace(lost, lost_rate=True)),
+        "lost": (*state.lost, (state.failures, state.environments[lost.id])),
+        "steps_back": state.steps_back + 1,
+        "again": event.again,
+        "node": node.number,
+        "came_at": state.tests_done,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
+        "lower_bound": 0,
+        "history": (*state.history, Point(state.tests_done, len(node.environment))),
+    }
+
+
+def left_out(state: RunState, event: e.LeftOut, at: float) -> Changes:
+    without = state.elements[event.without]
+    runs = [test.id for test in state.confirm_tests if test.environment == event.environment]
+    what = f"without {listed([without])}"
+    return arrived(state, event.environment, event.evidence_test, at, "certified", what, runs)
+
+
+# Isolation.
+
+
+def isolation_started(state: RunState, event: e.IsolationStarted, _: float) -> Changes:
+    isolation = Isolation(
+        number=event.isolation,
+        first_run=event.run,
+        block=event.block,
+        wanted=event.wanted,
+        rather_than=event.rather_than,
+        keep_rate=event.keep_rate,
+        error=event.error,
+        at_least=event.at_least,
+        suspects=tuple(map(state.elements.__getitem__, event.suspects)),
+        size=event.size,
+        before=event.before,
+    )
+    sound = 0 < event.rather_than < event.wanted < 1
+    if event.isolation != len(state.isolations) + 1 or not sound or state.baseline is None:
+        raise ValueError(event.isolation)
+    return {"isolations": (*without_open(state), isolation)}
+
+
+def removal_judged(state: RunState, event: e.RemovalJudged, _: float) -> Changes:
+    _check_tests(state, event.tests)
+    removals, number = with_removal(state, event.environment)
+    after = replace(removals[number - 1], verdict=event.verdict, tests=event.tests)
+    return {"removals": removals.changed(number - 1, after)}
+
+
+def isolation_checked(state: RunState, event: e.IsolationChecked, _: float) -> Changes:
+    _check_tests(state, event.tests)
+    last = _open(state)
+    removals, number = with_removal(state, event.environment)
+    check = Check(number, tuple(_returned(state, claim) for claim in event.claims))
+    if not check.claims or check.claims[0].back is not None:
+        raise ValueError(event)
+    return {"removals": removals, "isolations": (*state.isolations[:-1], replace(last, checks=(*last.checks, check)))}
+
+
+def isolation_finished(state: RunState, event: e.IsolationFinished) -> Changes:
+    last = _open(state)
+    removal = None if event.environment is None else with_removal(state, event.environment)[1]
+    if removal is not None and (not last.checks or last.checks[-1].removal != removal):
+        raise ValueError(removal)
+    return {"isolations": (*state.isolations[:-1], replace(last, ended=True, found=removal))}
+
+
+def _returned(state: RunState, made: e.ReturnedMade) -> Returned:
+    if made.reached > made.runs or made.verdict in (
+        ("needed", "not needed") if made.back is None else ("passes", "fails")
+    ):
+        raise ValueError(made)
+    back = None if made.back is None else state.elements[made.back]
+    return Returned(back, made.verdict, made.reached, made.runs, made.low, made.high)
+
+
+def _open(state: RunState) -> Isolation:
+    """The isolation that is under way. Raises ValueError if there is none."""
+    last = state.isolating
+    if last is None:
+        raise ValueError("no isolation")
+    return last
+
+
+# Slices.
+
+
+def sliced(state: RunState, event: e.Sliced, at: float) -> Changes:
+    """The environment is cut down to what took part in the runs known there."""
+    _check_tests(state, event.tests)
+    if not event.tests or any(state.tests[test - 1].took_part is None for test in event.tests):
+        raise ValueError(event.tests)
+    changes = arrived(state, event.environment, event.evidence_test, at, "sliced", "the slice", ())
+    *others, last = changes["nodes"]
+    return changes | {"nodes": (*others, replace(last, sliced_by=event.tests, to_audit=event.audit))}
+
+
+def slices_refuted(state: RunState, event: e.SlicesRefuted, _: float) -> Changes:
+    """An implied test, simulated after all, does not have the bits of the run that implies it.
+
+    The results of all implied tests are void. The run goes back to the last environment that rests on none.
+    """
+    audit, node = state.tests[event.test - 1], state.nodes[event.node]
+    path = state.changed(node=node.number).path
+    if audit.audits != event.by or any(rests_on_slices(state, earlier) for earlier in path):
+        raise ValueError(event.by)
+    for test in state.tests:
+        if test.implied_by is not None and test.is_finished:
+            after = replace(test, outcome="lost")
+            state = state.changed(tests=state.tests.changed(test.id - 1, after), **counts(state, test, after))
+    state = state.changed(
+        nodes=tuple(_without_void(reached, state) for reached in state.nodes),
+        trials=tuple(
+            replace(trial, verdict="", tests=(), known=0) if _any_implied(state, trial.tests) else trial
+            for trial in state.trials
+        ),
+    )
+    done = state.tests_done
+    return {
+        "tests": state.tests,
+        "tally": state.tally,
+        "deflake_runs": state.deflake_runs,
+        "trials": state.trials,
+        **searched_anew(state),
+        "implied": 0,
+        "refuted": (audit.id, event.by),
+        "node": node.number,
+        "environment": node.environment,
+        "evidence_test": node.evidence_test,
+        "came_at": done,
+        "lower_bound": 0,
+        # Void tests are no longer counted.
+        "history": (
+            *(replace(point, tests=min(point.tests, done)) for point in state.history),
+            Point(done, len(node.environment)),
+        ),
+    }
+
+
+def rests_on_slices(state: RunState, node: Node) -> bool:
+    """Whether a node was reached by implied tests, or by a slice."""
+    return node.how == "sliced" or _any_implied(state, (*node.runs, node.evidence_test or 0))
+
+
+def _any_implied(state: RunState, tests: Sequence[int]) -> bool:
+    return any(state.tests[test - 1].implied_by is not None for test in tests if test > 0)
+
+
+def _without_void(node: Node, state: RunState) -> Node:
+    """A node without the runs whose results are void."""
+    if not _any_implied(state, node.runs):
+        return node
+    runs: list[Test] = [state.tests[test - 1] for test in node.runs if state.tests[test - 1].implied_by is None]
+    return replace(node, runs=tuple(test.id for test in runs), shown=sum(test.outcome == "similar" for test in runs))

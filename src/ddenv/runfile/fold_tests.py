@@ -1,0 +1,296 @@
+"""Folds tests: what each ran and how it ended, how often f showed in each environment, and the baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+from ddenv.runfile import events as e
+from ddenv.runfile.failures import Baseline, SeenFailure
+from ddenv.runfile.persistent import PersistentTuple
+from ddenv.runfile.progress import Node, Point, Removal
+from ddenv.runfile.state import BROKEN, CERTIFY, ISOLATE, Candidate, Round, RunState, Test, Trial
+
+# The fields of the state that an event changes, with their new values.
+Changes = dict[str, Any]
+# The phases of tests that idle workers may make ahead of time.
+MAY_BE_AHEAD = ("round", CERTIFY)
+
+
+def test_started(state: RunState, event: e.TestStarted | e.Implied, _: float) -> Changes:
+    removals, removal = state.removals, None
+    if event.phase == ISOLATE:
+        removals, removal = with_removal(state, event.environment)
+    test = Test(
+        id=event.test,
+        environment=event.environment,
+        phase=event.phase,
+        round=event.round,
+        candidate=event.candidate,
+        run=event.run,
+        seed=event.seed,
+        without=None if event.without is None else state.elements[event.without],
+        trial=event.trial,
+        removal=removal,
+        audits=event.audits if isinstance(event, e.TestStarted) else None,
+        node=_node_of(state, event),
+        engine=state.engines,
+    )
+    if test.id != len(state.tests) + 1 or test.environment >= len(state.environments):
+        raise ValueError(test.id)
+    changes = {
+        "tests": state.tests.added(test),
+        "removals": removals,
+        "audits": state.audits + (test.audits is not None),
+        **counts(state, None, test),
+    }
+    if test.phase == CERTIFY and (not state.certificates or test.run >= state.certificates[-1].first_run):
+        changes["fresh"] = state.fresh.added(test.id)
+    if event.trial is not None:
+        trial = state.trials[event.trial - 1]
+        return changes | with_trial(state, replace(trial, tests=(*trial.tests, test.id)))
+    if event.round is None or event.candidate is None:
+        return changes
+    candidate = tried(state, event)
+    return changes | with_candidate(state, replace(candidate, tests=(*candidate.tests, test.id)))
+
+
+def _node_of(state: RunState, event: e.TestStarted | e.Implied) -> int:
+    """The node of a test: of a fresh run, that with its environment on the way to the current one."""
+    if event.phase == ISOLATE:
+        return 0
+    if event.phase == CERTIFY and event.without is None:
+        return next((node.number for node in reversed(state.path) if node.id == event.environment), state.node)
+    return state.node
+
+
+def with_removal(state: RunState, environment: int) -> tuple[PersistentTuple[Removal], int]:
+    """The removals, with the one that left an environment, and its number, from 1."""
+    numbered = zip(range(len(state.removals), 0, -1), reversed(state.removals), strict=True)
+    for number, removal in numbered:
+        if removal.environment == environment:
+            return state.removals, number
+    gone = (state.environments[0] - state.environments[environment]).names(state.elements)
+    return state.removals.added(Removal(gone, environment)), len(state.removals) + 1
+
+
+def test_finished(state: RunState, event: e.TestFinished, _: float) -> Changes:
+    if event.took_part is not None and not event.took_part <= state.environments[0]:
+        raise ValueError("took_part")
+    values = {
+        "outcome": event.outcome,
+        "failure": event.failure,
+        "distance": event.distance,
+        "end_pose": event.end_pose,
+        "simulated_seconds": event.simulated_seconds,
+        "wall_seconds": event.wall_seconds,
+        "first_sensed": tuple((state.elements[model], at) for model, at in event.first_sensed),
+        "first_touched": tuple((state.elements[model], at) for model, at in event.first_touched),
+        "cut": event.cut,
+        "took_part": event.took_part,
+        "taken": bool(event.taken),
+    }
+    return _ended_as(state, event.test, values)
+
+
+def _ended_as(state: RunState, test: int, values: dict[str, Any]) -> Changes:
+    changes = with_test(state, test, values)
+    return changes | _noted(state, changes["tests"][test - 1])
+
+
+def implied(state: RunState, event: e.Implied, at: float) -> Changes:
+    """A test that starts and ends at once: it has the result of another one."""
+    started = test_started(state, event, at)
+    now = state.changed(**started)
+    test, made = now.tests[-1], now.tests[event.by - 1]
+    if not made.is_finished or made.outcome in BROKEN or made.implied_by is not None or made.run != test.run:
+        raise ValueError(event.by)
+    there = frozenset(now.models_of(test))
+    values = {
+        "outcome": made.outcome,
+        "failure": made.failure,
+        "distance": made.distance,
+        "end_pose": made.end_pose,
+        "simulated_seconds": made.simulated_seconds,
+        # The robot may have had others in view.
+        "first_sensed": tuple(sensed for sensed in made.first_sensed if sensed[0] in there),
+        "first_touched": made.first_touched,
+        "cut": made.cut,
+        "took_part": made.took_part,
+        "implied_by": event.by,
+    }
+    return {**started, **_ended_as(now, test.id, values), "implied": state.implied + 1}
+
+
+def test_lost(state: RunState, event: e.TestLost, _: float) -> Changes:
+    lost = state.tests[event.test - 1]
+    return with_test(state, event.test, {"outcome": "lost"}) | {"audits": state.audits - (lost.audits is not None)}
+
+
+def baseline_finished(state: RunState, event: e.BaselineFinished, _: float) -> Changes:
+    seen_failures = tuple(SeenFailure(one.test, one.runs, one.kinds, one.position) for one in event.seen)
+    baseline = Baseline(
+        runs=event.runs,
+        failures=event.failures,
+        rate=event.rate,
+        low=event.low,
+        high=event.high,
+        failure_test=event.failure_test,
+        position=event.position,
+        miss_chance=event.miss_chance,
+        iterations_95=event.iterations_95,
+        broken=event.broken,
+        wall_limit=event.wall_limit,
+        seen=seen_failures,
+    )
+    judged, first = with_outcomes(state, event.judged), event.failure_test
+    runs, shown = seen(judged.tests, (test.id for test in judged.tests if test.phase == "baseline"))
+    return {
+        "tests": judged.tests,
+        "tally": judged.tally,
+        "deflake_runs": judged.deflake_runs,
+        "baseline": baseline,
+        "evidence_test": first,
+        "failures": (first,),
+        "nodes": with_node(state.nodes, replace(state.nodes[0], evidence_test=first, runs=runs, shown=shown)),
+        "history": (*state.history, Point(judged.tests_done, len(state.environment))),
+        "status": state.status if state.paused else "running",
+    }
+
+
+# Their outcomes.
+
+
+def with_outcomes(state: RunState, judged: e.Outcomes) -> RunState:
+    """The state with the outcomes of tests updated, after f was fixed or another failure began to count as f."""
+    for test, outcome in judged.outcomes.items():
+        values = {"outcome": outcome, "distance": judged.distances.get(test)}
+        state = state.changed(**with_test(state, test, values))
+    return state
+
+
+def with_test(state: RunState, id: int, values: dict[str, Any]) -> Changes:
+    if id < 1:
+        raise IndexError(id)
+    before = state.tests[id - 1]
+    after = replace(before, **values)
+    return {"tests": state.tests.changed(id - 1, after), **counts(state, before, after)}
+
+
+def counts(state: RunState, before: Test | None, after: Test) -> Changes:
+    tally, reruns = dict(state.tally), state.deflake_runs + after.is_deflake_run
+    tally[after.outcome] += 1
+    if before is not None:
+        tally[before.outcome] -= 1
+        reruns -= before.is_deflake_run
+    return {"tally": tally, "deflake_runs": reruns}
+
+
+def counted_ahead(before: RunState, event: e.Event, changes: Changes) -> Changes:
+    """`changes` of an event, with the count of the tests that ran ahead, and with those that decisions rest on."""
+    if isinstance(event, e.TestFinished):
+        may_be = before.tests[event.test - 1].phase in MAY_BE_AHEAD
+        return {**changes, "ahead": before.ahead + 1} if may_be else changes
+    # After these, decisions rest on their tests, whatever the number of workers.
+    if not isinstance(event, e.CandidateJudged | e.TrialJudged | e.CertificateFinished | e.RateLost):
+        return changes
+    rests_on, ahead, judged = before.rests_on, before.ahead, before.judged
+    for number in event.tests:
+        test = before.tests[number - 1]
+        if not rests_on >> number & 1:
+            rests_on |= 1 << number
+            ahead -= test.phase in MAY_BE_AHEAD and test.implied_by is None
+            if isinstance(event, e.CandidateJudged | e.TrialJudged):
+                judged = judged.added(number)
+    return {**changes, "rests_on": rests_on, "ahead": ahead, "judged": judged}
+
+
+# How often f showed in each environment that the run reached.
+
+
+def _noted(state: RunState, test: Test) -> Changes:
+    """The nodes, with a finished test entered where it ran the whole environment of one."""
+    number = _run_of(state, test)
+    if number is None or not _is_sound(test):
+        return {}
+    node = state.nodes[number]
+    after = replace(node, runs=(*node.runs, test.id), shown=node.shown + (test.outcome == "similar"))
+    return {"nodes": with_node(state.nodes, after)}
+
+
+def _run_of(state: RunState, test: Test) -> int | None:
+    if test.phase == CERTIFY:
+        return test.node if test.without is None else None
+    round, here = state.round, state.here
+    if round is None or here is None or test.candidate is None or test.round != round.number:
+        return None
+    # It ran ahead of the verdict that made its candidate the environment.
+    return here.number if round.winner == test.candidate and here.round == round.number else None
+
+
+def same_runs(state: RunState, test: Test) -> tuple[int, ...]:
+    """The tests that were made for the same candidate, try or environment as `test`."""
+    made_for = _made_for(test)
+    return tuple(other.id for other in state.tests if _made_for(other) == made_for)
+
+
+def _made_for(test: Test) -> tuple[object, ...]:
+    return test.phase, test.round, test.candidate, test.trial, test.removal, test.node, test.without
+
+
+def seen(tests: Sequence[Test], ids: Iterable[int]) -> tuple[tuple[int, ...], int]:
+    """Those of some tests that ended and did not break, each once, and how many of them showed f."""
+    sound = tuple(id for id in dict.fromkeys(ids) if 0 < id <= len(tests) and _is_sound(tests[id - 1]))
+    return sound, sum(tests[id - 1].outcome == "similar" for id in sound)
+
+
+def counted_again(nodes: Sequence[Node], tests: Sequence[Test]) -> tuple[Node, ...]:
+    """The nodes after the outcomes of tests changed."""
+    return tuple(replace(node, shown=seen(tests, node.runs)[1]) for node in nodes)
+
+
+def _is_sound(test: Test) -> bool:
+    return test.is_finished and test.outcome not in BROKEN
+
+
+# What other files of the fold change, too.
+
+
+def with_node(nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:
+    """The nodes with this one in place of that with its number."""
+    return (*nodes[: node.number], node, *nodes[node.number + 1 :])
+
+
+def with_trial(state: RunState, trial: Trial) -> Changes:
+    return {"trials": (*state.trials[: trial.number - 1], trial, *state.trials[trial.number :])}
+
+
+class OfCandidate(Protocol):
+    """An event of a candidate of the current round."""
+
+    @property
+    def round(self) -> int | None: ...
+    @property
+    def candidate(self) -> int | None: ...
+
+
+def tried(state: RunState, event: OfCandidate) -> Candidate:
+    """The candidate that an event is about. Raises IndexError or ValueError if it is none of the current round."""
+    round = current(state)
+    if event.round != round.number or event.candidate is None:
+        raise ValueError(event.round)
+    return round.candidates[event.candidate]
+
+
+def with_candidate(state: RunState, candidate: Candidate) -> Changes:
+    """The current round with `candidate` in place of the one with the same index."""
+    round = current(state)
+    return {"round": replace(round, candidates=round.candidates.changed(candidate.index, candidate))}
+
+
+def current(state: RunState) -> Round:
+    """The current round. Raises ValueError if none was started."""
+    if state.round is None:
+        raise ValueError("no round")
+    return state.round

@@ -1,0 +1,267 @@
+"""What a user names, and what stands behind it: scenario, world and robot of a run, of a scenario file or of an SDF world."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from ddenv.errors import UserError
+from ddenv.runfile.fold import fold
+from ddenv.runfile.position import Position, position_in
+from ddenv.runfile.state import RunState
+from ddenv.runfile.store import RunFile
+from ddenv.runs.folder import SUFFIX, find_run
+from ddenv.schemas import nearest
+from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
+from ddenv.world.command import command_words
+from ddenv.world.files.access import read_bytes, write_file
+from ddenv.world.files.resources import Stored
+from ddenv.world.load import SCENARIOS, SDF, bundled_names, find_scenario, load_scenario, validate
+from ddenv.world.model import Model, World
+from ddenv.world.placement import check_spawn
+from ddenv.world.read import disk_of, parse_model, parse_world, read_world
+from ddenv.world.scenario import PLAIN, Reading, Scenario
+from ddenv.world.sdf.standin import parse_option
+
+Announce = Callable[[str], None]
+SCENARIO_FILES, WORLD_FILES = (".yaml", ".yml"), (".sdf", ".world")
+# Prefix of the names of documents in a run file that hold other files.
+RESOURCE = "resource "
+# The options on how a world is read.
+READING = ("model_path", "stand_in", "ignore")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What the robot is run in. Of a run, `run` is its file, and `position` finds its earlier states."""
+
+    scenario: Scenario
+    world: World
+    robot: Model
+    run: Path | None = None
+    position: Position | None = None
+
+    @property
+    def state(self) -> RunState | None:
+        """The last state of a run."""
+        return None if self.position is None else self.position.end
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        return self.world.elements(frozenset(self.scenario.protected))
+
+
+def open_subject(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Subject:
+    """What `name` stands for: a run if there is one of that name, else a scenario or a world with the options `given`.
+
+    Calls `announce` with a line before slow steps. Raises UserError.
+    """
+    kind, path = named(name) or ("scenario", Path(name))
+    if kind != "run":
+        scenario = scenario_named(name, given, announce)
+        return Subject(scenario, *load_parts(scenario, announce))
+    if any(value is not None and value != () for value in given.values()):
+        raise UserError(
+            "--spawn, --goal, --world, --timeout, --model-path, --stand-in and --ignore are only for scenarios; "
+            "a run keeps its own"
+        )
+    with RunFile(path) as file:
+        return read_subject(file)
+
+
+def named(name: str) -> tuple[Literal["run", "scenario", "world"], Path] | None:
+    """What `name` stands for, with its file, which need not exist if its suffix says what it is; None for any other name.
+
+    A run comes before a bundled scenario, and every file before both.
+    """
+    run = find_run(name)
+    if (run.is_file() and run.suffix.lower() not in (*SCENARIO_FILES, *WORLD_FILES)) or name.endswith(SUFFIX):
+        return "run", run
+    return named_file(name)
+
+
+def named_file(name: str) -> tuple[Literal["scenario", "world"], Path] | None:
+    """The same where no run is meant."""
+    path = Path(name)
+    if path.suffix.lower() in WORLD_FILES:
+        return "world", path
+    if path.suffix.lower() in SCENARIO_FILES:
+        return "scenario", path
+    if name in bundled_names() and not path.exists():
+        return "scenario", SCENARIOS / f"{name}.yaml"
+    return None
+
+
+# From files and options.
+
+
+def scenario_named(name: str, given: Mapping[str, Any], announce: Announce | None = None) -> Scenario:
+    """The scenario of a name or a file, with the options `given`: places, those on how its world is read, and settings.
+
+    Raises UserError.
+    """
+    reading = {option: given[option] for option in READING}
+    others = {option: value for option, value in given.items() if option not in READING}
+    spawn, goal = given["spawn"], given["goal"]
+    if Path(name).suffix.lower() not in WORLD_FILES:
+        scenario = load_scenario(find_scenario(name))
+    elif spawn is None or goal is None:
+        # A file that is no world needs no places either.
+        read_world(Path(name), reading_of(**reading), announce)
+        example = "--spawn 0,0,0.2,0 --goal 9,0 (x,y,z,yaw and x,y, m and rad)"
+        raise UserError(f"{name}: an SDF world needs a start and a goal, such as {example}")
+    elif given["world"] is not None:
+        raise UserError(f"--world: only for a scenario; {name} is a world")
+    else:
+        scenario = scenario_for_world(Path(name), (*spawn, 0.0)[:4], goal)
+    return with_options(scenario, reading=reading_of(scenario.reading, **reading), **others)
+
+
+def reading_of(
+    reading: Reading = PLAIN,
+    *,
+    model_path: Sequence[Path] = (),
+    stand_in: Sequence[str] = (),
+    ignore: Sequence[Ignorable] = (),
+) -> Reading:
+    """`reading` with more folders (searched first), stand-ins (`URI=SHAPE`) and ignored kinds of elements. Raises UserError."""
+    for folder in model_path:
+        if not folder.is_dir():
+            raise UserError(f"--model-path: there is no folder {folder}")
+    folders = (*(folder.resolve() for folder in model_path), *reading.model_path)
+    stand_ins = reading.stand_ins | dict(parse_option(option) for option in stand_in)
+    ignored = dict.fromkeys((*reading.ignore, *ignore))
+    return Reading(model_path=folders, stand_ins=stand_ins, ignore=tuple(ignored))
+
+
+def scenario_for_world(world: Path, spawn: tuple[float, float, float, float], goal: tuple[float, float]) -> Scenario:
+    """A scenario for the bundled robot in any SDF world: `spawn` x, y, z m and yaw rad, `goal` x, y m. Raises UserError."""
+    data = {
+        "name": world.stem[:80] or "world",
+        "world": str(world.resolve()),
+        "robot": {
+            "model": str(SDF / "robots" / "husky.sdf"),
+            "spawn": dict(zip(("x", "y", "z", "yaw"), spawn, strict=True)),
+        },
+        "goal": dict(zip(("x", "y"), goal, strict=True)),
+    }
+    return validate(data, str(world))
+
+
+def with_options(
+    scenario: Scenario,
+    *,
+    spawn: Sequence[float] | None = None,
+    goal: Sequence[float] | None = None,
+    world: Path | None = None,
+    reading: Reading | None = None,
+    **values: Value,
+) -> Scenario:
+    """`scenario` with some of its settings replaced; those that are None stay. Raises UserError.
+
+    `spawn` is x, y, z m and yaw rad (0 if left out), `goal` x, y m. `values` are settings by name; 0 takes back a limit.
+    """
+    given = {name: value for name, value in values.items() if value is not None}
+    for name, value in given.items():
+        one = SETTINGS.get(name)
+        # 0 takes back a limit; words are checked with the scenario.
+        if one and not isinstance(value, bool | str) and (value or not one.none) and not one.allows(value):
+            raise UserError(f"{one.option or one.key}: expected {one.range}, found {number_text(value)}")
+    chosen = with_values(scenario.model_dump(mode="json"), given)
+    if spawn is not None:
+        chosen["robot"]["spawn"] = dict(zip(("x", "y", "z", "yaw"), spawn, strict=False))
+    if goal is not None:
+        chosen["goal"].update(zip(("x", "y"), goal, strict=True))
+    if world is not None:
+        chosen["world"] = str(world.resolve())
+    if reading is not None:
+        chosen["reading"] = reading.model_dump(mode="json")
+    named = {SETTINGS[name].key: SETTINGS[name].option for name in given if SETTINGS[name].option}
+    places = (("--spawn", "robot.spawn", spawn), ("--goal", "goal", goal))
+    named |= {f"{key}.{axis}": option for option, key, place in places if place for axis in ("x", "y", "z", "yaw")}
+    return validate(chosen, "options", named)
+
+
+def with_values(data: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+    """A scenario as plain data, with settings replaced by name; None or 0 takes back a limit. Raises UserError."""
+    for name in values:
+        if name not in SETTINGS:
+            raise UserError(f"options: no setting '{name}'{nearest(name, list(SETTINGS))}")
+    # A setting that sets several others comes first, so that each of these may be given, too.
+    for name in sorted(values, key=lambda each: SETTINGS[each].stored):
+        put(data, SETTINGS[name], (values[name] or None) if SETTINGS[name].none else values[name])
+    return data
+
+
+def load_parts(scenario: Scenario, announce: Announce | None = None) -> tuple[World, Model]:
+    """The world and the robot of a scenario, checked against each other; the world's `resources` are those of both.
+
+    Calls `announce` with a line before slow steps. Raises UserError.
+    """
+    if scenario.oracle is not None:
+        command_words(scenario)
+    reading, robot_file = scenario.reading, scenario.robot.model
+    world = read_world(scenario.world, reading, announce)
+    around_robot = disk_of(robot_file, reading, announce)
+    robot = parse_model(read_bytes(robot_file), robot_file, reading, around_robot)
+    world = replace(world, resources={**world.resources, **around_robot.taken})
+    check_parts(scenario, world, robot)
+    return world, robot
+
+
+def check_parts(scenario: Scenario, world: World, robot: Model) -> None:
+    """Whether a scenario fits its world and its robot. Raises UserError."""
+    known = {model.name for model in world.models}
+    for name in scenario.protected:
+        if name not in known:
+            raise UserError(f"protected: the world {scenario.world} has no model '{name}'")
+    if not world.elements(frozenset(scenario.protected)):
+        raise UserError(f"{scenario.world}: has no model that can be removed")
+    check_spawn(world, robot, scenario.robot.spawn)
+
+
+# From a run file.
+
+
+def read_subject(file: RunFile) -> Subject:
+    """The scenario, world and robot of a run, and its states. Raises UserError."""
+    return Subject(*read_parts(file), file.path, position_in(file.events()))
+
+
+def read_parts(run: RunFile) -> tuple[Scenario, World, Model]:
+    """The scenario, world and robot of a run file. Raises UserError."""
+    scenario = read_scenario(run)
+    # Never opens another file, whatever the run file says.
+    stored = Stored(run.documents(RESOURCE))
+    world = parse_world(run.document("world"), scenario.world, scenario.reading, stored)
+    robot = parse_model(run.document("robot"), scenario.robot.model, scenario.reading, stored)
+    if fold(run.events(most=1)).elements != world.elements(frozenset(scenario.protected)):
+        raise UserError(f"{run.path}: damaged run file: its elements are not those of its world")
+    return scenario, world, robot
+
+
+def read_scenario(run: RunFile) -> Scenario:
+    """The scenario of a run file. Raises UserError."""
+    try:
+        return Scenario.model_validate(json.loads(run.document("scenario")))
+    except ValueError:
+        raise UserError(f"{run.path}: damaged run file: its scenario is not valid") from None
+
+
+@contextmanager
+def robot_file(subject: Subject) -> Iterator[Path]:
+    """The robot's file; one with the run's own text, as long as this lasts, where the original is not on this machine."""
+    original = subject.scenario.robot.model
+    if subject.run is None or original.is_file():
+        yield original
+        return
+    with tempfile.TemporaryDirectory(prefix="ddenv-robot-") as folder:
+        file = Path(folder) / original.name
+        with RunFile(subject.run) as run:
+            write_file(file, run.document("robot"))
+        yield file

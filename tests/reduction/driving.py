@@ -1,0 +1,245 @@
+"""A driver of the procedure for tests: workers that end in any order, over an oracle that draws each run from its seed."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import partial
+
+from ddenv.environment import NOTHING, Environment
+from ddenv.evidence.certificate import Terms, error_of
+from ddenv.evidence.rates import estimated_rate
+from ddenv.reduction import procedure as steps
+from ddenv.reduction.guide import make_guide, search
+from ddenv.reduction.procedure import Certificate, Leg, Past
+from ddenv.reduction.stacks import Stacks
+from ddenv.reduction.stepping_back import tried_again
+from ddenv.reduction.verdict import Acceptance
+from tests.reduction.worlds import evidence
+
+FIRST_FRESH, EACH_CERTIFICATE = 10_000, 2_000
+
+
+@dataclass(frozen=True)
+class World:
+    """Models of which f needs some. Without each `useful` one it is rarer; a share of all runs breaks.
+
+    Models with the same label in `labels` are a stack; those with the label `pinned` always stay. With `keeps_rate` the search
+    keeps the rate of f, else the first run with f decides.
+    """
+
+    labels: tuple[int, ...]
+    needed: Environment
+    useful: Environment
+    algorithm: str
+    seed: int
+    rate: float = 0.95
+    factor: float = 0.4
+    breaks: float = 0.0
+    iterations: int = 1
+    keeps_rate: bool = True
+    pinned: int | None = None
+    baseline_runs: int = 5
+
+    @property
+    def whole(self) -> Environment:
+        return Environment.whole(len(self.labels))
+
+    def stack(self, label: int) -> Environment:
+        return Environment.of(model for model, each in enumerate(self.labels) if each == label)
+
+    def rate_in(self, environment: Environment) -> float:
+        """The true rate of f."""
+        return self.rate * self.factor ** len(self.useful - environment) if self.needed <= environment else 0.0
+
+    def outcome(self, environment: Environment, run: int) -> bool | str:
+        """Of a run, the same whenever it is made."""
+        draw = random.Random(f"{self.seed} {environment.bits} {run}")
+        return "broken" if draw.random() < self.breaks else draw.random() < self.rate_in(environment)
+
+
+@dataclass
+class Known:
+    """What a run file would hold: the outcomes of tests, and what was decided."""
+
+    outcomes: dict[tuple[Environment, int], bool | str] = field(default_factory=dict)
+    # The winner's place of each round that is over, and candidates that tests which broke left open, as (round, environment).
+    past: dict[int, int | None] = field(default_factory=dict)
+    unknown: set[tuple[int, Environment]] = field(default_factory=set)
+
+
+@dataclass
+class Now:
+    """Where the search stands."""
+
+    chain: tuple[Environment, ...]
+    round: int = 0
+    certificates: int = 0
+    n_partitions: dict[Environment, int] = field(default_factory=dict)
+    lost: list[Environment] = field(default_factory=list)
+    # The runs of the whole world that decisions rest on.
+    of_whole: set[int] = field(default_factory=set)
+    again: tuple[tuple[int, ...], ...] = ()
+
+
+class Driver:
+    """Makes the tests of `outcome` with so many workers; `order` says which of them end first.
+
+    `facts` are all steps but `Wants`; `steps` counts all.
+    """
+
+    def __init__(self, world: World, workers: int = 1, order: int = 0, known: Known | None = None) -> None:
+        self.world, self.workers, self.refusals = world, workers, 0
+        self.outcome: Callable[[Environment, int], bool | str] = world.outcome
+        self.known, self.now = known or Known(), Now((world.whole,))
+        self.facts: list[object] = []
+        self.steps = 0
+        self.made: list[steps.Test] = []
+        self.vetoed: set[Environment] = set()
+        # Each search, with where it began and how many facts were before.
+        self.legs: list[tuple[Leg, Now, int]] = []
+        self._order, self._running = random.Random(order), []
+        self._round = None
+
+    def shown(self, environment, run, full=False):
+        return self.known.outcomes.get((environment, run))
+
+    def refused_by_user(self, environment):
+        return environment in self.vetoed
+
+    def refused(self, environment):
+        return environment in self.vetoed or any(environment <= lost for lost in self.now.lost)
+
+    def rate(self):
+        shown = [self.known.outcomes[self.world.whole, run] for run in self.now.of_whole]
+        sound = [one for one in shown if one != "broken"]
+        return estimated_rate(sum(sound), len(sound))
+
+    def goes_on(self):
+        return True
+
+    def algorithm(self, leg):
+        facts = evidence(len(self.world.labels), self.world.seed)
+        stacks = Stacks(leg.free)
+
+        def broke(candidate):
+            environment = leg.pinned | Environment.of(stacks.expanded(candidate.models))
+            return (self.now.round, environment) in self.known.unknown
+
+        guide = make_guide(
+            "timeseg",
+            "failure-proximal",
+            lambda: facts,
+            n_partitions=leg.n_partitions or 2,
+            growth="steady",
+            skip="implied",
+            rate=lambda: leg.rule.rate or 1.0,
+            runs=lambda: leg.rule.misses,
+            broke=broke,
+        )
+        inside = stacks.inside(leg.chain[-1])
+        return stacks.expand(tried_again(inside, leg.again, lambda left: search(self.world.algorithm, left, guide)))
+
+    def leg(self, again=()):
+        """The next search, from what is left."""
+        pinned = NOTHING if self.world.pinned is None else self.world.stack(self.world.pinned)
+        labels = dict.fromkeys(self.world.labels)
+        groups = Stacks.of(stack for label in labels if not (stack := self.world.stack(label)) <= pinned)
+        free = {model: stack for model, stack in groups.by_first.items() if stack <= self.now.chain[-1]}
+        rate = self.rate() if self.world.keeps_rate else 0.0
+        rule = Acceptance(1 + self.world.iterations, rate, 0.8, len(self.now.lost))
+        n_partitions = self.now.n_partitions.get(self.now.chain[-1])
+        leg = Leg(self.now.round + 1, self.world.whole, self.now.chain, pinned, free, rule, n_partitions, tuple(again))
+        self.legs.append((leg, deepcopy(self.now), len(self.facts)))
+        return leg
+
+    def drive(self, procedure, most=None, thrown=None):
+        """Carries it to its end, and returns what it returns; or through `most` steps. First `thrown` is thrown into it."""
+        go = partial(procedure.throw, thrown) if thrown else partial(procedure.send, None)
+        while most is None or self.steps < most:
+            try:
+                step = go()
+            except StopIteration as end:
+                return end.value
+            self.steps += 1
+            answer = None
+            if isinstance(step, steps.Wants):
+                self._work(step.tests)
+            else:
+                self.facts.append(step)
+                self._note(step)
+                answer = self._answer(step)
+            go = partial(procedure.send, answer)
+        return None
+
+    def _work(self, wanted):
+        """Makes tests until some have ended."""
+        assert wanted
+        assert len(set(wanted)) == len(wanted)
+        for test in wanted:
+            assert self.shown(test.environment, test.run) is None, "it is known"
+            if test.why == "round":
+                candidate = self._round.candidates[test.candidate]
+                assert test.environment == candidate.models | self.legs[-1][0].pinned
+        self._running += [test for test in wanted if test not in self._running][: self.workers - len(self._running)]
+        for _ in range(self._order.randint(1, len(self._running))):
+            test = self._running.pop(self._order.randrange(len(self._running)))
+            self.made.append(test)
+            self.known.outcomes[test.environment, test.run] = self.outcome(test.environment, test.run)
+
+    def _note(self, step):
+        now = self.now
+        match step:
+            case steps.BaselineRan():
+                now.of_whole |= set(range(step.runs))
+            case steps.Judged(verdict="unknown"):
+                self.known.unknown.add((now.round, step.environment))
+            case steps.Similar() | steps.LeftOut():
+                self._reach(step.environment)
+            case steps.RoundEnded():
+                self.known.past[step.number] = step.winner
+            case steps.Certified():
+                first = step.certificate.first_run
+                tests = {test for claim in step.claims for test in claim.claim.rests_on}
+                now.of_whole |= {first + run for environment, run in tests if environment == self.world.whole}
+            case steps.SteppedBack():
+                now.lost.append(now.chain[step.place + 1])
+                now.chain = now.chain[: step.place + 1]
+
+    def _answer(self, step):
+        match step:
+            case steps.BaselineRan():
+                return sum(self.shown(self.world.whole, run) is True for run in range(step.runs)) or None
+            case steps.FailureFixed() | steps.LeftOut():
+                return self.leg()
+            case steps.SteppedBack():
+                return self.leg(step.again)
+            case steps.RoundBegan():
+                return self._begin(step.number, step.round)
+            case steps.Similar():
+                return True
+            case steps.CertificateDue():
+                self.now.certificates += 1
+                number = self.now.certificates
+                terms = Terms(0.8, self.rate(), error_of(number), self.world.baseline_runs)
+                return Certificate(number, FIRST_FRESH + EACH_CERTIFICATE * number, terms)
+        return None
+
+    def _begin(self, number, round):
+        """What is known of a round, if it is over."""
+        self.now.round, self._round = number, round
+        self.now.n_partitions[self.now.chain[-1]] = round.n_partitions
+        if number not in self.known.past:
+            return None
+        winner = self.known.past[number]
+        if winner is not None:
+            self._reach(round.candidates[winner].models | self.legs[-1][0].pinned)
+        return Past(winner)
+
+    def _reach(self, environment):
+        now = self.now
+        assert environment < now.chain[-1]
+        now.n_partitions[environment] = now.n_partitions.get(now.chain[-1], 2)
+        now.chain = (*now.chain, environment)

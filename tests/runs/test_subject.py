@@ -1,0 +1,69 @@
+"""What a name stands for, and what stands behind it."""
+
+import shutil
+
+import pytest
+
+from ddenv.errors import UserError
+from ddenv.runs.creation import create_run
+from ddenv.runs.folder import runs_folder
+from ddenv.runs.subject import named, open_subject, robot_file
+from ddenv.world.load import SCENARIOS, load_scenario
+from tests.conftest import DATA
+
+NOTHING = dict.fromkeys(("spawn", "goal", "world")) | {"model_path": (), "stand_in": (), "ignore": ()}
+
+
+@pytest.fixture
+def here(home, tmp_path, monkeypatch):
+    """A folder to work in, and the folder of runs."""
+    monkeypatch.chdir(tmp_path)
+    runs_folder().mkdir(parents=True)
+    return tmp_path
+
+
+def test_a_run_comes_before_a_bundled_scenario_and_a_file_before_both(here):
+    assert named("ditch") == ("scenario", SCENARIOS / "ditch.yaml")
+    run = runs_folder() / "ditch.ddenv"
+    run.touch()
+    assert named("ditch") == named(str(run)) == ("run", run)
+    for name, kind in (
+        ("ditch.yaml", "scenario"),
+        ("ditch.YML", "scenario"),
+        ("ditch.sdf", "world"),
+        ("a.world", "world"),
+    ):
+        assert named(name)[0] == kind
+        (here / name).touch()
+        assert named(name)[0] == kind
+    run.unlink()
+    (here / "ditch").mkdir()
+    assert named("ditch") is named("no such thing") is None
+    assert named("missing.ddenv")[0] == "run"
+
+
+def test_a_run_is_opened_with_its_own_scenario_world_and_robot(here):
+    scenario = load_scenario(DATA / "wall.yaml")
+    create_run(scenario, runs_folder() / "wall-1.ddenv")
+    file, run = open_subject(str(DATA / "wall.yaml"), NOTHING), open_subject("wall-1", NOTHING)
+    assert file.scenario == run.scenario == scenario
+    assert file.elements == run.elements == run.state.elements
+    assert file.run is file.state is None
+    with pytest.raises(UserError, match="a run keeps its own"):
+        open_subject("wall-1", NOTHING | {"goal": (1.0, 2.0)})
+
+
+def test_the_robot_of_a_run_needs_no_file_of_its_own(here):
+    scenario = load_scenario(DATA / "wall.yaml")
+    own = here / "robot.sdf"
+    shutil.copy(scenario.robot.model, own)
+    create_run(
+        scenario.model_copy(update={"robot": scenario.robot.model_copy(update={"model": own})}), here / "a.ddenv"
+    )
+    subject, text = open_subject("a.ddenv", NOTHING), own.read_bytes()
+    with robot_file(subject) as file:
+        assert file == own
+    own.unlink()
+    with robot_file(subject) as file:
+        assert file != own and file.read_bytes() == text
+    assert not file.exists()
