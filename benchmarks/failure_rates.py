@@ -16,13 +16,13 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from ddenv.evidence.rates import wilson_interval
-from ddenv.robot.drake.template import Template
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation.template import Template
 from ddenv.runfile.failures import alike
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import World
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 SCRIPTS = SDF / "worlds"
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.runfile.store import ROBOT, RunFile, create
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 PARTS = 50
 RUNS = 4

@@ -15,9 +15,9 @@ from pathlib import Path
 from early_stop import fixed
 
 from ddenv.reduction.verdict import Acceptance, standing
-from ddenv.robot.drake.template import Variants
 from ddenv.robot.oracle import judge
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation.template import Variants
 from ddenv.runs.subject import load_parts
 from ddenv.world.scenario import Scenario
 

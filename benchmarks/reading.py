@@ -45,7 +45,7 @@ def crates(count: int) -> str:
 
 def measure(path: Path) -> tuple[int, int, float, float, float]:
     """Models, collisions, s to read, s to parse only the XML, and the process's maximum memory in MB before that."""
-    from ddenv.world.read import read_world
+    from ddenv.world.sdf.read import read_world
 
     times = []
     for _ in range(REPEATS):

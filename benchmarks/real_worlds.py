@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ddenv.robot.drake.region import WIDTH, Region
-from ddenv.robot.drake.template import Variants
+from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.programs import start_engine

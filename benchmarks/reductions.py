@@ -25,7 +25,7 @@ from large_worlds import among_things
 from real_worlds import largest
 
 from ddenv.evidence.took_part import simulated
-from ddenv.robot.drake.template import Variants
+from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile

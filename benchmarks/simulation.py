@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from ddenv.robot.drake.template import Template, Variants
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
 

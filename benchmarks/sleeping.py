@@ -23,13 +23,13 @@ from pathlib import Path
 from small_worlds import small_scenario, small_world
 
 from ddenv.evidence.rates import wilson_interval
-from ddenv.robot.drake.template import Template
+from ddenv.robot.simulation.template import Template
 from ddenv.runs.subject import load_parts, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import World
 from ddenv.world.pose import Vector
-from ddenv.world.read import parse_world, read_model
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_world, read_model
 
 SIZE = (0.9, 0.09, 0.04)  # m
 MASS = 2.0  # kg

@@ -25,17 +25,17 @@ from small_worlds import KINDS, small_scenario, small_world
 
 from ddenv.environment import Environment
 from ddenv.evidence.slices import Ties
-from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.reached import Reached
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.simulation.taking_part import Reached
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts, reading_of, scenario_for_world, with_options
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Model, World
-from ddenv.world.read import read_model
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import read_model
 
 FORGOTTEN = {
     "robot": lambda: setattr(Reached, "_look_around_robot", lambda *_: None),

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ddenv.world.load import validate
 from ddenv.world.model import World
-from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_world
 
 # How many things a world has, and how long its robot drives, s.
 THINGS = 7

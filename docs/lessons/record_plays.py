@@ -25,8 +25,8 @@ from ddenv.runfile.position import position_in
 from ddenv.runfile.state import partition_letter
 from ddenv.runfile.store import COLUMNS, RunFile
 from ddenv.runs.subject import read_parts
+from ddenv.world.access import write_file
 from ddenv.world.extent import center
-from ddenv.world.files.access import write_file
 
 
 def record_plays(file: Path) -> tuple[Path, tuple[str, ...]]:

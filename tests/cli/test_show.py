@@ -7,7 +7,7 @@ import pytest
 from ddenv.cli.world_show import terminal_map
 from ddenv.text import width
 from ddenv.world.load import SDF
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.map.worlds import GROUND, box, world_of
 
 ESCAPE = re.compile("\x1b\\[[0-9;]*m")

@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.cli.world_check import lines, report
 from ddenv.text import width
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 from tests.command import ddenv, in_process
 from tests.conftest import DATA
 

@@ -26,8 +26,8 @@ from ddenv.world.model import (
     World,
 )
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_model, read_world
 from ddenv.world.scenario import Oracle
+from ddenv.world.sdf.read import read_model, read_world
 from ddenv.world.write import without
 from tests.conftest import ROOT
 

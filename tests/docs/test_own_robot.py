@@ -7,9 +7,7 @@ import os
 
 import pytest
 
-from ddenv.robot.protocol import Reading, Setup
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup
 from tests.command import ddenv
 from tests.conftest import ROOT
 

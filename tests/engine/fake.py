@@ -25,7 +25,7 @@ from ddenv.runfile.store import Live, RunFile
 from ddenv.runs.creation import create_run
 from ddenv.settings import PRINTED
 from ddenv.world.load import load_scenario
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 
 # What every run notices, in s; the ground is no element.

@@ -15,7 +15,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.store import COLUMNS
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import load_scenario
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.waiting import wait_until
 

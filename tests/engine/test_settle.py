@@ -21,7 +21,7 @@ from ddenv.runs.subject import read_parts
 from ddenv.words import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA
 from tests.engine.fake import ELEMENTS, FakePool, drive, new_run
 from tests.engine.guided import Guided, numbers, until

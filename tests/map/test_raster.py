@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from ddenv.map.footprints import footprints
-from ddenv.map.raster import EMPTY, View, arrow, braille, fit, heading, masks, owners
+from ddenv.map.raster import EMPTY, View, arrow, braille, fit, masks, owners
 from ddenv.world.extent import convex_hull
+from ddenv.world.pose import heading
 from tests.map.worlds import GROUND, box, world_of
 
 VIEW = View(0.0, 0.0, 0.5, 20, 8)

@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from ddenv.world.model import World
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 GROUND = (
     '<model name="ground_plane"><static>true</static><link name="link"><collision name="plane"><geometry>'

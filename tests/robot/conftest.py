@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
+from ddenv.robot.simulation.template import Template
 from ddenv.world.load import SCENARIOS, SDF, load_scenario, validate
 from ddenv.world.model import Collision, Inertia, Joint, Link, Mesh, Model, Shape, World
 from ddenv.world.pose import Pose, Vector
-from ddenv.world.read import parse_world, read_model, read_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_world, read_model, read_world
 
 GROUND = (
     '<model name="ground"><static>true</static><link name="link"><collision name="c"><geometry><plane>'

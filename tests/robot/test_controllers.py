@@ -14,8 +14,7 @@ import pytest
 import ddenv
 from ddenv.errors import UserError
 from ddenv.robot.controllers import ControllerFailed, Guarded, controllers, load
-from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
-from ddenv.robot.sensing.estimate import Estimate
+from ddenv.robot.protocol import Estimate, Reading, Setup, Twist, WheelSpeeds
 from ddenv.world.scenario import Controller
 
 SETUP = Setup((5, 0), 0.5, (0, 0, 0), ("left", "right"), (True, False), 0.1, 0.5, (0, 0, 0, 0), 0.05, 1, 1, 1)

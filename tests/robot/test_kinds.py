@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.robot.oracle import kind_of
-from ddenv.robot.run import ANGLE, RADIUS, SECONDS, Stuck
+from ddenv.robot.simulation.run import ANGLE, RADIUS, SECONDS, Stuck
 
 
 def way(seconds: float, place, turn=lambda t: (1.0, 0.0, 0.0, 0.0)) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Who listens to a controller hears all of it, and changes nothing."""
 
-from ddenv.engine.mcap_file import Streams
-from ddenv.robot.drake.template import Template
+from ddenv.engine.streams import Streams
+
+from ddenv.robot.simulation.template import Template
 
 
 def test_a_listener_hears_every_step_and_changes_no_bit(world_of, husky, scenario_of):

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation.template import Template
 from ddenv.runfile.failures import alike
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, SDF, load_scenario
 from ddenv.world.model import Box, Model, World
-from ddenv.world.read import parse_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_world
 
 # What is left of each, with other models for a part of the world that is more than that.
 MINIMAL = {

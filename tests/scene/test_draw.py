@@ -22,7 +22,7 @@ from ddenv.scene.wheels import Wheels
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Collision, Link, Model, Sphere, Visual, World
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_model, read_world
+from ddenv.world.sdf.read import read_model, read_world
 from tests.conftest import ROOT
 
 ROBOT = read_model(SDF / "robots" / "husky.sdf")

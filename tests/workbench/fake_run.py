@@ -17,7 +17,7 @@ from ddenv.runfile.state import FIRST_FRESH_RUN, RunState
 from ddenv.runfile.store import ROBOT, Live, Motions, RunFile, create
 from ddenv.settings import PRINTED
 from ddenv.version import __version__
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 from tests.shorthand import Writing
 
 ROBOT_SDF = b"""<sdf version="1.9"><model name="robot"><link name="base">

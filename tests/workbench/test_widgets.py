@@ -18,7 +18,7 @@ from ddenv.workbench.runs.recent_runs import recent_runs
 from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.shared.processes import last_line
 from ddenv.workbench.shared.wording import about, brief, duration, metres, percent
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 
 
 def snapshot(run, engine="alive") -> Snapshot:

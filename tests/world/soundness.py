@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.robot.drake.articulation import spatial_inertia
+from ddenv.robot.drake.plant import spatial_inertia
 from ddenv.world.model import Joint, Link, Mesh, Model, Plane, Shape, World
-from ddenv.world.read import parse_world
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_world
 from ddenv.world.write import without
 from tests.conftest import DATA
 

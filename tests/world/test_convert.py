@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from ddenv.errors import UserError
 from ddenv.world.load import SDF
-from ddenv.world.read import parse_world, read_world
+from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import convert, write_converted
 from tests.conftest import DATA
 from tests.tiers import slow

@@ -2,9 +2,9 @@
 
 import pytest
 
-from ddenv.world.inside import DROP, INSIDE, Inside, drop, inside, note_inside, notes_on_start
-from ddenv.world.read import parse_world
+from ddenv.world.placement import DROP, INSIDE, Inside, drop, inside, note_inside, notes_on_start
 from ddenv.world.scenario import Spawn
+from ddenv.world.sdf.read import parse_world
 from tests.conftest import DATA
 from tests.robot.conftest import GROUND, box_model
 from tests.world.test_placement import HUSKY, WALL

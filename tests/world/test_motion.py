@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.world.motion import pose_at
+from ddenv.world.pose import pose_at
 
 
 def turn(yaw: float) -> list[float]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ddenv.errors import UserError
 from ddenv.world.model import World
-from ddenv.world.read import parse_world
+from ddenv.world.sdf.read import parse_world
 from ddenv.world.write import without
 from tests.conftest import DATA, ROOT
 from tests.tiers import examples, slow

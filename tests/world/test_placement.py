@@ -10,8 +10,8 @@ from ddenv.world.load import SDF
 from ddenv.world.model import Capsule, Collision, Ellipsoid, Link, Model, Plane, Shape, World
 from ddenv.world.placement import check_spawn
 from ddenv.world.pose import Pose
-from ddenv.world.read import read_model, read_world
 from ddenv.world.scenario import Spawn
+from ddenv.world.sdf.read import read_model, read_world
 from tests.conftest import DATA
 from tests.world.test_overlap import stone
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.model import Box
-from ddenv.world.read import parse_world, read_world
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import without, write_converted
 from tests.conftest import ROOT
 from tests.tiers import examples

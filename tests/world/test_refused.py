@@ -5,7 +5,7 @@ from itertools import takewhile
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.read import parse_world, read_world
+from ddenv.world.sdf.read import parse_world, read_world
 from tests.conftest import ROOT
 
 GUIDE = (ROOT / "docs" / "user-guide.md").read_text()

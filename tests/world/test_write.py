@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.world.load import SDF
-from ddenv.world.read import parse_world, read_world
+from ddenv.world.sdf.read import parse_world, read_world
 from ddenv.world.write import without
 from tests.conftest import DATA
 

@@ -15,17 +15,18 @@ import numpy as np
 from mjcf import Unsupported, mjcf, named
 
 from ddenv.errors import UserError
-from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
 from ddenv.robot.controllers import ControllerFailed, controllers
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.robot.simulation.autonomy import Autonomy, setup_of
 from ddenv.world.drive import find_drive
 from ddenv.world.extent import model_bounds
 from ddenv.world.load import load_scenario
 from ddenv.world.placement import spawn_pose
-from ddenv.world.read import read_model, read_world
+from ddenv.world.pose import Pose
+from ddenv.world.sdf.read import read_model, read_world
 
 STEP = 0.002  # MuJoCo's time step at most, s: its contacts need shorter ones than Drake's
 FALL = 2.0  # so far below everything the robot has fallen out of the world, m
@@ -86,12 +87,13 @@ class Simulation:
 
     def truth(self) -> Truth:
         """What ideal sensors of the robot measure."""
-        *_, w, x, y, z = self.pose()
+        x, y, z, *quaternion = self.pose()
+        roll, pitch, heading = Pose((x, y, z), tuple(quaternion)).rpy()
         wheels = self._data.qvel[self._wheels] * self._signs
         return Truth(
-            heading=math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-            roll=math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-            pitch=math.asin(min(1.0, max(-1.0, 2 * (w * y - x * z)))),
+            heading=heading,
+            roll=roll,
+            pitch=pitch,
             # MuJoCo gives the turn rate of a free body in the body's own axes.
             yaw_rate=float(self._data.qvel[self._spin + 2]),
             wheels=tuple(wheels.tolist()),

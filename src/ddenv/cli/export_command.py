@@ -86,7 +86,7 @@ def export_command(
 def _write_mcap(run: Path, file: Path, trust: bool) -> None:
     from ddenv.cli.trusting import allow_run
     from ddenv.engine.mcap_file import write_mcap
-    from ddenv.robot.drake_installed import check_drake
+    from ddenv.robot import check_drake
     from ddenv.runfile.store import RunFile
 
     check_drake()

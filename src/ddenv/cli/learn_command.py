@@ -102,7 +102,7 @@ def _page(name: str | None, file: Path) -> int:
     from ddenv.learn.handout import handout
     from ddenv.learn.shelf import open_lesson
     from ddenv.page.html import html
-    from ddenv.world.files.access import write_file
+    from ddenv.world.access import write_file
 
     if name is None:
         raise UserError(f"--page: expected a lesson, as in 'ddenv learn 1 --page {file}'")

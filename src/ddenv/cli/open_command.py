@@ -25,7 +25,7 @@ def open_command(run: str, watch: bool, lines: bool, **reading: Any) -> int:
     """
     from ddenv.runs.folder import find_run
     from ddenv.runs.subject import named
-    from ddenv.world.files.access import is_folder
+    from ddenv.world.access import is_folder
 
     kind, path = named(run) or ("run", find_run(run))
     if kind == "run" and path.is_file():

@@ -10,7 +10,6 @@ from ddenv.errors import printable
 from ddenv.text import padded, shortened, width
 from ddenv.words import count, first_of
 from ddenv.world.extent import center, model_bounds
-from ddenv.world.inside import inside, note_inside
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -25,6 +24,7 @@ from ddenv.world.model import (
     World,
     is_ground,
 )
+from ddenv.world.placement import inside, note_inside
 
 NAMES: dict[type, str] = {
     Box: "box",

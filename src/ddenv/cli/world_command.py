@@ -63,7 +63,7 @@ def show(
 ) -> int:
     """Draws the map of FILE, from above."""
     from ddenv.map.svg import svg_map
-    from ddenv.world.files.access import write_file
+    from ddenv.world.access import write_file
 
     if took_part or passes:
         option, drawn = ("--took-part", _took_part) if took_part else ("--passes", _passing)
@@ -160,17 +160,17 @@ def settle(file: Path, output: Path, **reading: Any) -> int:
 
 def _settle(world: World, reading: Reading, output: Path) -> list[str]:
     """Writes the settled `world`, which was read as `reading` says; returns what to say of it. Raises UserError."""
-    from ddenv.robot.drake_installed import check_drake
+    from ddenv.robot import check_drake
 
     check_drake()
-    from ddenv.robot.drake.template import Variants
     from ddenv.robot.settled import moved, notes_on
+    from ddenv.robot.simulation.template import Variants
     from ddenv.runs.subject import scenario_for_world
     from ddenv.words import count, first_of
-    from ddenv.world.files.access import write_file
-    from ddenv.world.inside import note_inside
-    from ddenv.world.moved import with_places
-    from ddenv.world.read import read_model
+    from ddenv.world.access import write_file
+    from ddenv.world.placement import note_inside
+    from ddenv.world.sdf.moved import with_places
+    from ddenv.world.sdf.read import read_model
 
     if output.resolve() == world.path.resolve():
         raise UserError(f"{output}: is the world itself; choose another file")
@@ -205,8 +205,8 @@ def _read_as(file: Path, reading: dict[str, Any]) -> tuple[World, Reading]:
     """The same, and how it was read."""
     from ddenv.runs.subject import named_file, reading_of
     from ddenv.world.load import load_scenario
-    from ddenv.world.read import read_world
     from ddenv.world.scenario import PLAIN
+    from ddenv.world.sdf.read import read_world
 
     kind, path = named_file(str(file)) or ("world", file)
     scenario = load_scenario(path) if kind == "scenario" else None

@@ -39,18 +39,16 @@ from ddenv.engine.ros_messages import (
 from ddenv.engine.single_test import plan
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
-from ddenv.robot.drake.template import Variants
-from ddenv.robot.protocol import Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.result import Progress, RunResult
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.simulation.template import Variants
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import nearest
 from ddenv.runs.reasons import GOAL, F, reasons
 from ddenv.runs.subject import Subject, read_subject
 from ddenv.world import scenario
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 from ddenv.world.model import Link, Model, Shape
 from ddenv.world.pose import Pose
 

@@ -19,8 +19,8 @@ from ddenv.engine.limits import GENEROUS, memory_limit, too_large
 from ddenv.engine.worker import POSE, Broke, Make, Ready, Refused, Run, Settle, Shared, Start, Task, simulator_of
 from ddenv.engine.worker_process import WorkerProcess
 from ddenv.errors import UserError
+from ddenv.robot import check_drake
 from ddenv.robot.deadline import Stopwatch
-from ddenv.robot.drake_installed import check_drake
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.world.model import Model, World

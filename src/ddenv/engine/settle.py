@@ -9,8 +9,8 @@ from ddenv.engine.pool import Broken
 from ddenv.errors import UserError
 from ddenv.robot.settled import notes_on
 from ddenv.runfile.events import Still, Supports, SupportsStarted
-from ddenv.world.inside import notes_on_start
 from ddenv.world.model import Model, World
+from ddenv.world.placement import notes_on_start
 from ddenv.world.scenario import Scenario
 
 

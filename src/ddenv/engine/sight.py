@@ -12,13 +12,12 @@ from ddenv.reduction.evidence import Evidence, Traits, Trial
 from ddenv.runfile.state import RunState, Test
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import Model, World
+from ddenv.world.pose import headings
 
 
 def trajectory_of(rows: np.ndarray) -> np.ndarray:
     """Rows of t (s), x, y, z (m), qw, qx, qy, qz as rows of t, x, y, z, yaw (rad): shape (N, 8) to (N, 5)."""
-    qw, qx, qy, qz = rows[:, 4:].T
-    yaw = np.arctan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-    return np.column_stack([rows[:, :4], yaw])
+    return np.column_stack([rows[:, :4], headings(rows[:, 4:])])
 
 
 def traits_of(model: Model) -> Traits:

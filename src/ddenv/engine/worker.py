@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Protocol, cast, runtime_checkable
 
 from ddenv.errors import UserError, printable
-from ddenv.robot.result import PoseRow, Progress, RunResult
+from ddenv.robot.result import PoseRow, Progress, RunResult, Simulator
 from ddenv.robot.settled import Settled
 from ddenv.runfile.store import COLUMNS
 from ddenv.world.model import Model, World
@@ -28,18 +28,6 @@ POSE = COLUMNS - 1
 MODELS_PERIOD = 0.1
 # The maximum length of the reason why a simulator broke, in characters.
 REASON = 400
-
-
-class Simulator(Protocol):
-    """Runs the robot in parts of one world."""
-
-    def run(
-        self,
-        keep: frozenset[str],
-        seed: int,
-        progress: Progress | None = None,
-        full: bool = True,
-    ) -> RunResult: ...
 
 
 @runtime_checkable
@@ -153,7 +141,7 @@ def simulator_of(scenario: Scenario, world: World, robot: Model) -> Simulator:
 
         return ExternalSimulator(world, scenario)
     # Drake takes a second to load, and users of another simulator may not have it.
-    from ddenv.robot.drake.template import Variants
+    from ddenv.robot.simulation.template import Variants
 
     return Variants(world, robot, scenario)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
-from ddenv.world.files.access import read_bytes, write_file
+from ddenv.world.access import read_bytes, write_file
 
 TEXT = """\
 # A lesson. 'ddenv learn --check {file}' says what is wrong with it; docs/teaching.md explains every key.

@@ -14,7 +14,7 @@ from ddenv.learn import lesson_figures
 from ddenv.learn.lesson import MISCONCEPTIONS, Answer, Foretold, Lesson, Question, Step
 from ddenv.learn.race import RACERS
 from ddenv.schemas import names, nearest, pairs
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 
 LONGEST = 1_000_000  # bytes of a lesson's file
 ANSWERS = (2, 6)

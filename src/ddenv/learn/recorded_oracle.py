@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 
 OUTCOMES = ("similar", "other", "pass")
 # More models than this have too many parts.

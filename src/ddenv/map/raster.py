@@ -375,9 +375,3 @@ def _floored(dots: np.ndarray) -> np.ndarray:
 def arrow(yaw: float, signs: str = ARROWS) -> str:
     """The arrow nearest to a heading, rad, 0 along x."""
     return signs[round(yaw / (math.pi / 4)) % 8]
-
-
-def heading(quaternion: Sequence[float]) -> float:
-    """The yaw of a quaternion w, x, y, z, rad."""
-    w, x, y, z = quaternion
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

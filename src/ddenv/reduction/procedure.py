@@ -397,7 +397,8 @@ def settled(
             named.append(decided.get(model) or NamedClaim(model, environment, settle(shows, fresh, driver.workers)))
             if named[-1].claim.verdict:
                 decided[model] = named[-1]
-            if ends(named[-1]):
+            # Each open claim has work for a worker.
+            if ends(named[-1]) or sum(not one.claim.verdict for one in named) == driver.workers:
                 break
         tests = dict.fromkeys(
             Test(environment, first_run + run, why, without=_left_out(named, environment))

@@ -22,7 +22,7 @@ from ddenv.runs.reasons import sentence
 from ddenv.text import printable
 from ddenv.version import __version__, how_to_install
 from ddenv.words import count
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 RUN, WORLD, SCENARIO, REPORT, ISSUE, AGAIN = (
     BUNDLED_RUN,

@@ -39,7 +39,7 @@ from ddenv.runfile.state import RunState
 from ddenv.text import plain
 from ddenv.version import __version__
 from ddenv.words import count
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 KINDS = (".html", ".htm", ".md")
 PICTURES = ("map", "near", "chart", "interval")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -20,76 +21,51 @@ class Tick(NamedTuple):
     compass: bool
     imu: bool
     odometry: bool
-    lidar: bool
+    lidar: bool = False
 
 
 @dataclass(frozen=True)
 class Clock:
     """Time counted in steps of the plant, so that everything happens at the same instants in every run, to the last bit.
 
-    `step` is in s; `last` is the step at which time is up. Each of the others is the number of steps between two rows of the
-    recording, two commands, or two readings of a sensor.
+    `step` is in s; `last` is the step at which time is up. `every` has the number of steps between two rows of the recording, two
+    commands, or two readings of a sensor, by the names of `Tick`.
     """
 
     step: float
     last: int
-    record: int
-    command: int
-    compass: int
-    imu: int
-    odometry: int
-    lidar: int | None
+    every: Mapping[str, int]
 
     @classmethod
     def of(cls, scenario: Scenario) -> Clock:
         sensors, step = scenario.sensors, scenario.simulation.time_step
-
-        def steps(period: float) -> int:
-            return max(1, round(period / step))
-
-        return cls(
-            step=step,
-            last=steps(scenario.failure.timeout),
-            record=steps(RECORD_PERIOD),
-            command=steps(scenario.controller.period),
-            compass=steps(1 / sensors.compass_rate),
-            imu=steps(1 / sensors.imu_rate),
-            odometry=steps(1 / sensors.odometry_rate),
-            lidar=steps(1 / sensors.lidar.rate) if sensors.lidar else None,
-        )
+        periods = {
+            "record": RECORD_PERIOD,
+            "command": scenario.controller.period,
+            "compass": 1 / sensors.compass_rate,
+            "imu": 1 / sensors.imu_rate,
+            "odometry": 1 / sensors.odometry_rate,
+        }
+        if sensors.lidar:
+            periods["lidar"] = 1 / sensors.lidar.rate
+        every = {name: max(1, round(period / step)) for name, period in periods.items()}
+        return cls(step, max(1, round(scenario.failure.timeout / step)), every)
 
     @property
     def command_period(self) -> float:
         """The time between two commands, s."""
-        return self.command * self.step
+        return self.every["command"] * self.step
 
     @property
     def period(self) -> float:
         """The longest time between two ticks, s."""
-        return min(self._every) * self.step
-
-    @property
-    def _every(self) -> tuple[int, ...]:
-        both = self.record, self.command, self.compass, self.imu, self.odometry, self.lidar
-        return tuple(steps for steps in both if steps)
+        return min(self.every.values()) * self.step
 
     @cached_property
     def ticks(self) -> tuple[Tick, ...]:
         """All steps at which something is due, from 0 to the last."""
-        due = {step for steps in self._every for step in range(0, self.last, steps)}
-        return tuple(self._tick(step) for step in sorted(due | {self.last}))
-
-    def _tick(self, step: int) -> Tick:
-        def due(steps: int | None) -> bool:
-            return steps is not None and step % steps == 0
-
-        return Tick(
-            step=step,
-            time=step * self.step,
-            record=due(self.record),
-            command=due(self.command),
-            compass=due(self.compass),
-            imu=due(self.imu),
-            odometry=due(self.odometry),
-            lidar=due(self.lidar),
+        steps = {step for every in self.every.values() for step in range(0, self.last, every)} | {self.last}
+        return tuple(
+            Tick(step, step * self.step, **{name: step % every == 0 for name, every in self.every.items()})
+            for step in sorted(steps)
         )

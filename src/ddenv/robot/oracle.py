@@ -38,29 +38,19 @@ def kind_of(trajectory: Floats, fell: bool, arrived: float | None) -> str:
     stuck        in the last 6 s (or the second half of a shorter run) never more than 0.5 m from its end
     out of time  still moving
     """
-    if fell or _dropped(trajectory):
+    times, heights = trajectory[:, 0], trajectory[:, 3]
+    before = np.searchsorted(times, times - DROP_SECONDS - 1e-9)
+    fallen = (heights[before] - heights > DROP) & (times[before] >= SETTLING) & (heights[before] - heights[-1] > DROP)
+    if fell or fallen.any():
         return "fell"
-    if _lean(trajectory) > LEAN:
+    (w, x, y, z), (ew, ex, ey, ez) = (trajectory[row, 4:].tolist() for row in (0, -1))
+    start, end = Pose(quaternion=(w, x, y, z)), Pose(quaternion=(ew, ex, ey, ez))
+    up = end.rotate(start.inverse().rotate((0.0, 0.0, 1.0)))
+    if math.acos(max(-1.0, min(1.0, up[2]))) > LEAN:
         return "tipped over"
     if arrived is not None and not _is_still(trajectory[trajectory[:, 0] <= max(arrived, trajectory[0, 0])]):
         return "lost"
     return "stuck" if _is_still(trajectory) else "out of time"
-
-
-def _dropped(trajectory: Floats) -> bool:
-    """Whether the robot fell somewhere, and ended at least about as far down."""
-    times, heights = trajectory[:, 0], trajectory[:, 3]
-    before = np.searchsorted(times, times - DROP_SECONDS - 1e-9)
-    fallen = (heights[before] - heights > DROP) & (times[before] >= SETTLING) & (heights[before] - heights[-1] > DROP)
-    return bool(fallen.any())
-
-
-def _lean(trajectory: Floats) -> float:
-    """The angle between the vertical and the axis of the robot that was vertical at the start, rad."""
-    (w, x, y, z), (ew, ex, ey, ez) = (trajectory[row, 4:].tolist() for row in (0, -1))
-    start, end = Pose(quaternion=(w, x, y, z)), Pose(quaternion=(ew, ex, ey, ez))
-    up = end.rotate(start.inverse().rotate((0.0, 0.0, 1.0)))
-    return math.acos(max(-1.0, min(1.0, up[2])))
 
 
 def _is_still(trajectory: Floats) -> bool:

@@ -15,12 +15,63 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+import numpy as np
+
+from ddenv.arrays import Floats
 from ddenv.world.drive import Twist as Twist
 from ddenv.world.drive import WheelSpeeds as WheelSpeeds
+from ddenv.world.pose import Vector
 
 STOP = Twist(0.0, 0.0)
+
+
+class Estimate(NamedTuple):
+    """A pose estimate: position (m) and heading (rad in [-pi, pi]) in the world frame, speed forward (m/s), turn rate (rad/s).
+
+    `spread` are the standard deviations of x, y (m) and of the heading (rad), as the filter estimates them.
+    """
+
+    x: float
+    y: float
+    heading: float
+    speed: float = 0.0
+    turn_rate: float = 0.0
+    spread: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Imu(NamedTuple):
+    """The turn rate about the robot's own vertical axis (rad/s), roll and pitch (rad)."""
+
+    yaw_rate: float
+    roll: float
+    pitch: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One scan of the lidar, taken at one instant (`time`, s).
+
+    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x axis. `ranges` (N,) m are the
+    measured distances, infinite where a beam hit nothing. `origin` (m) is the lidar's position in the frame of the robot's first
+    link.
+    """
+
+    time: float
+    angles: Floats
+    ranges: Floats
+    origin: Vector
+
+    def within(self, limits: Floats) -> Floats:
+        """The ranges, infinite where they exceed `limits` (N,) m: then what lies beyond takes no part in the run."""
+        ranges: Floats = np.where(self.ranges <= limits, self.ranges, np.inf)
+        return ranges
+
+    def points(self) -> Floats:
+        """Where beams hit something, shape (M, 3) m, in the frame of the robot's first link."""
+        met = np.isfinite(self.ranges)
+        ranges, angles = self.ranges[met], self.angles[met]
+        x, y, z = self.origin
+        return np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)])
 
 
 class Reading(NamedTuple):

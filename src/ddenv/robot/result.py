@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -56,6 +57,19 @@ class RunResult:
     def end_position(self) -> Vector:
         """x, y, z (m) of the robot at the end."""
         return self.end_pose[:3]
+
+
+class Simulator(Protocol):
+    """Runs the robot in parts of one world."""
+
+    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
+        """Runs the robot in the world with the models `keep`, and with those that always stay.
+
+        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
+        by name, of the models that can move, at each recorded sample. A run that is not `full` may be cut short as soon as the
+        robot is stuck for good. Raises ValueError for unknown names.
+        """
+        ...
 
 
 RECORD_PERIOD = 0.1  # s

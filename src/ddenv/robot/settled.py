@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from ddenv.amounts import count, first_of
@@ -37,11 +37,11 @@ def moved(world: World, settled: Settled) -> dict[str, float]:
     """How far each model has moved that is still in the world, m."""
     starts = {model.name: [link.pose for link in model.links] for model in world.models}
     gone = frozenset(settled.fallen)
-    return {name: _way(starts[name], places) for name, places in settled.places.items() if name not in gone}
-
-
-def _way(before: Sequence[Pose], after: Sequence[Pose]) -> float:
-    return max(math.dist(one.position, other.position) for one, other in zip(before, after, strict=True))
+    return {
+        name: max(math.dist(one.position, there.position) for one, there in zip(starts[name], places, strict=True))
+        for name, places in settled.places.items()
+        if name not in gone
+    }
 
 
 def notes_on(world: World, settled: Settled) -> Iterator[tuple[str, str]]:

@@ -8,7 +8,7 @@ from ddenv.runfile.events import Created
 from ddenv.runfile.store import RunFile, create
 from ddenv.runs.clusters import check_cluster
 from ddenv.runs.subject import RESOURCE, Announce, check_parts, load_parts, read_parts
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 from ddenv.world.model import World
 from ddenv.world.scenario import Scenario
 

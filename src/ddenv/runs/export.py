@@ -12,12 +12,12 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.nearest import removed_in_passing
 from ddenv.runs.subject import RESOURCE, read_parts
 from ddenv.runs.trust import scenario_text
-from ddenv.world.files.access import Missing, Unusable, write_file
+from ddenv.world.access import Missing, Unusable, write_file
 from ddenv.world.files.resolve import find
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Mesh, World
-from ddenv.world.read import parse_model, parse_world
 from ddenv.world.scenario import Scenario
+from ddenv.world.sdf.read import parse_model, parse_world
 from ddenv.world.write import without
 
 

@@ -14,8 +14,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, ROBOT, RunFile
 from ddenv.runfile.tested import purpose
-from ddenv.world.motion import pose_at
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, pose_at
 
 # Time between two frames: a run file has a row of each motion so often, s.
 FRAME = 0.1

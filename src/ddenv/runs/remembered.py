@@ -21,7 +21,7 @@ def state_file(name: str) -> Path:
 
 def write_state(name: str, content: object) -> None:
     """Remembers `content` as JSON, for this user alone, if it can be written."""
-    from ddenv.world.files.access import write_file
+    from ddenv.world.access import write_file
 
     place = state_file(name)
     try:

@@ -18,14 +18,14 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.folder import SUFFIX, find_run
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS, Ignorable, Value, number_text, put
+from ddenv.world.access import read_bytes, write_file
 from ddenv.world.command import command_words
-from ddenv.world.files.access import read_bytes, write_file
 from ddenv.world.files.resources import Stored
 from ddenv.world.load import SCENARIOS, SDF, bundled_names, find_scenario, load_scenario, validate
 from ddenv.world.model import Model, World
 from ddenv.world.placement import check_spawn
-from ddenv.world.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.scenario import PLAIN, Reading, Scenario
+from ddenv.world.sdf.read import disk_of, parse_model, parse_world, read_world
 from ddenv.world.sdf.standin import parse_option
 
 Announce = Callable[[str], None]

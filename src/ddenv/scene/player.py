@@ -27,9 +27,8 @@ from ddenv.scene.draw import PARTING, Scenery, circle, flag, mark
 from ddenv.scene.shot import Shot, live_pose, shot, shot_of, shot_of_test
 from ddenv.scene.stage import Stage
 from ddenv.scene.wheels import Wheels
-from ddenv.world.motion import pose_of
 from ddenv.world.placement import spawn_pose
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, pose_of
 from ddenv.world.scenario import Goal, Spawn
 
 # Digits after the point: a hundredth of a millimetre.

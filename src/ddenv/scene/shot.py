@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.store import Live
 from ddenv.runfile.tested import purpose
-from ddenv.world.motion import pose_of
-from ddenv.world.pose import Pose
+from ddenv.world.pose import Pose, pose_of
 
 HOLD = 3.0  # how long a finished test stays on screen until the next one starts, s
 

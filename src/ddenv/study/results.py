@@ -27,7 +27,7 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded, RunFile
 from ddenv.study.plan import Cell
 from ddenv.study.study_folder import run_path
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 
 
 def difference(file: RunFile, cell: Cell) -> str:

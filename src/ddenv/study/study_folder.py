@@ -19,7 +19,7 @@ from ddenv.runs.folder import SUFFIX
 from ddenv.study.plan import Cell
 from ddenv.version import __version__
 from ddenv.words import count
-from ddenv.world.files.access import read_bytes, write_file
+from ddenv.world.access import read_bytes, write_file
 
 RUNS, ABOUT, LOCK = "runs", "study.json", "study.lock"
 # The numbers of a run come from these: another version may give another result.

@@ -34,7 +34,7 @@ from ddenv.study.tables import best, section
 from ddenv.text import plain
 from ddenv.version import __version__
 from ddenv.words import count
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 from ddenv.world.scenario import Scenario
 
 STEM = "study"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
-from ddenv.world.files.access import Unusable, size_of
+from ddenv.world.access import Unusable, size_of
 from ddenv.world.scenario import Scenario
 
 PLACEHOLDERS = ("world", "scenario", "seed", "log")

@@ -12,8 +12,20 @@ import numpy as np
 from ddenv.arrays import Floats
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Capsule, Collision, Cylinder, Ellipsoid, Joint, Link, Mesh, Model, Sphere, is_fixed
+from ddenv.world.extent import bounds
+from ddenv.world.model import (
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Joint,
+    Link,
+    Mesh,
+    Model,
+    Sphere,
+    held_with,
+    is_fixed,
+)
 from ddenv.world.pose import Pose, Vector
 from ddenv.world.scenario import Wheels
 
@@ -56,18 +68,14 @@ class Drive:
         `skid` is the ratio of the robot's turn rate to the one its wheels command. Raises ValueError for an unknown wheel.
         """
         if isinstance(command, WheelSpeeds):
-            return self._by_name(command)
+            unknown = set(command.speeds) - set(self.joints)
+            if unknown:
+                raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
+            return np.asarray(np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs)
         difference = command.turn_rate / skid * self.track / 2
         left, right = (command.speed - difference) / self.radius, (command.speed + difference) / self.radius
         sides = zip(self.left, self.signs, strict=True)
         return np.array([sign * (left if is_left else right) for is_left, sign in sides])
-
-    def _by_name(self, command: WheelSpeeds) -> Floats:
-        unknown = set(command.speeds) - set(self.joints)
-        if unknown:
-            raise ValueError(f"'{min(unknown)}' is no wheel; wheels are {', '.join(self.joints)}")
-        speeds: Floats = np.array([command.speeds.get(joint, 0.0) for joint in self.joints]) * self.signs
-        return speeds
 
 
 def find_drive(robot: Model, wheels: Wheels | None = None) -> Drive:
@@ -111,10 +119,7 @@ def turned_links(robot: Model, joints: tuple[str, ...]) -> frozenset[str]:
 
 def wheel_links(robot: Model, joint: Joint) -> list[Link]:
     """The links that a wheel's `joint` turns: its child, and all links that are fixed to it."""
-    names = {joint.child}
-    fixed = [each for each in robot.joints if is_fixed(each)]
-    while new := {each.child for each in fixed if each.parent in names} - names:
-        names |= new
+    names = held_with(robot, joint.child)
     return [link for link in robot.links if link.name in names]
 
 
@@ -141,12 +146,10 @@ def rolled(robot: Model, drive: Drive, skid: float, rows: Floats) -> Floats:
 
 def footprint(robot: Model) -> tuple[float, float, float, float]:
     """How far the collision shapes of `robot` extend from its origin, m: ahead, behind, to its left, to its right."""
-    frame = robot.pose.inverse()
-    boxes = [shape_bounds(one.shape, frame @ one.pose) for one in robot.collisions]
-    if not boxes:
+    box = bounds(robot.collisions, robot.pose.inverse())
+    if box is None:
         return 0.0, 0.0, 0.0, 0.0
-    low = np.min([box[0] for box in boxes], axis=0).tolist()
-    high = np.max([box[1] for box in boxes], axis=0).tolist()
+    low, high = (side.tolist() for side in box)
     return high[0], -low[0], high[1], -low[1]
 
 

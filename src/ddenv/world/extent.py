@@ -1,11 +1,28 @@
-"""The extent of shapes and models: axis-aligned boxes in the world frame, m; and convex hulls in the plane."""
+"""The extent of shapes and models: boxes in the world frame, m, also in place of endless planes; and convex hulls in the plane."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 
-from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.model import (
+    ENDLESS,
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Model,
+    Plane,
+    Shape,
+    Sphere,
+    World,
+)
+from ddenv.world.pose import HERE, Pose, Vector
 
 Bounds = tuple[np.ndarray, np.ndarray]
 
@@ -42,13 +59,34 @@ def _half(shape: Shape, rotation: np.ndarray) -> np.ndarray:
     return half
 
 
-def bounds(collisions: tuple[Collision, ...]) -> Bounds | None:
-    """The box around all `collisions` except planes; None if there are none."""
-    boxes = [shape_bounds(one.shape, one.pose) for one in collisions if not isinstance(one.shape, Plane)]
-    if not boxes:
-        return None
-    lows, highs = zip(*boxes, strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+def filled_bounds(collision: Collision) -> Bounds:
+    """The box around what a shape fills: all that is below a plane, everything if that leans."""
+    if not isinstance(collision.shape, Plane):
+        return shape_bounds(collision.shape, collision.pose)
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    if collision.pose.rotation()[2, 2] > 1 - 1e-9:
+        high[2] = collision.pose.position[2]
+    return low, high
+
+
+def stacked(boxes: Iterable[Bounds]) -> Bounds:
+    """The lowest and the highest corners, (N, 3) m each, of N boxes."""
+    pairs = list(boxes)
+    return np.array([low for low, _ in pairs]).reshape(-1, 3), np.array([high for _, high in pairs]).reshape(-1, 3)
+
+
+def around(boxes: Iterable[Bounds]) -> Bounds | None:
+    """The box around all `boxes`; None if there are none."""
+    low, high = stacked(boxes)
+    return (low.min(axis=0), high.max(axis=0)) if len(low) else None
+
+
+def bounds(collisions: Iterable[Collision], frame: Pose = HERE) -> Bounds | None:
+    """The box around all `collisions` except planes, along the axes of a frame in which the world is at `frame`.
+
+    None if there are none.
+    """
+    return around(shape_bounds(one.shape, frame @ one.pose) for one in collisions if not isinstance(one.shape, Plane))
 
 
 def center(model: Model) -> Vector:
@@ -93,3 +131,40 @@ def _chain(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+DEPTH = 1.0  # of a box in place of a plane, m
+BEYOND = 20.0  # minimum width of ground beyond all models, m
+
+
+def with_ground_boxes(world: World, places: Iterable[Vector] = ()) -> World:
+    """`world` with a box for each plane, wide enough for all models and `places` (m, world frame).
+
+    Drake crashes with half spaces among hundreds of boxes, and on the bodies that its parser makes of static models (drake#19263).
+    """
+    if not any(isinstance(one.shape, Plane) for model in world.models for one in model.collisions):
+        return world
+    boxes = [box for box in map(model_bounds, world.models) if box is not None]
+    corners = [corner for low, high in boxes for corner in product(*zip(low, high, strict=True))]
+    points = np.array([*corners, *places], dtype=float).reshape(-1, 3)
+    return replace(world, models=tuple(_boxed(model, points) for model in world.models))
+
+
+def _boxed(model: Model, points: np.ndarray) -> Model:
+    links = (replace(link, collisions=tuple(_box(one, points) for one in link.collisions)) for link in model.links)
+    return replace(model, links=tuple(links))
+
+
+def _box(collision: Collision, points: np.ndarray) -> Collision:
+    if not isinstance(collision.shape, Plane):
+        return collision
+    back = collision.pose.inverse()
+    flat = (points @ back.rotation().T + back.position)[:, :2]
+    if not len(flat) or np.abs(flat).max() <= ENDLESS / 2 - BEYOND:
+        size, middle = (ENDLESS, ENDLESS), (0.0, 0.0)
+    else:
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        size = tuple((np.maximum(high - low, 0.0) + ENDLESS).tolist())
+        middle = tuple(((low + high) / 2).tolist())
+    place = Pose((middle[0], middle[1], -DEPTH / 2))
+    return replace(collision, shape=Box((size[0], size[1], DEPTH)), pose=collision.pose @ place)

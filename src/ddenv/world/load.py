@@ -16,7 +16,7 @@ from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.schemas import nearest
 from ddenv.settings import SETTINGS
-from ddenv.world.files.access import is_folder, read_bytes
+from ddenv.world.access import is_folder, read_bytes
 from ddenv.world.scenario import Oracle, Scenario
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -134,7 +134,8 @@ def complaint(error: Any, model: type[BaseModel]) -> tuple[str, str]:
     location = [str(part) for part in error["loc"]]
     key = ".".join(location)
     if error["type"] == "extra_forbidden":
-        known = sorted([*_section(model, location[:-1]).model_fields, *_shorthands(location[:-1])])
+        shorthands = [one.name for one in SETTINGS.values() if not one.stored and [one.section] == location[:-1]]
+        known = sorted([*_section(model, location[:-1]).model_fields, *shorthands])
         return key, f"unknown key{nearest(location[-1], known)}; allowed are {', '.join(known)}"
     if error["type"] == "as_printed":
         return f"{key}.as_printed", str(error["msg"])
@@ -159,10 +160,6 @@ def _section(model: type[BaseModel], location: list[str]) -> type[BaseModel]:
         # A section that may be missing is a union with None.
         model = next(each for each in (hint, *get_args(hint)) if isinstance(each, type) and issubclass(each, BaseModel))
     return model
-
-
-def _shorthands(location: list[str]) -> list[str]:
-    return [each.name for each in SETTINGS.values() if not each.stored and [each.section] == location]
 
 
 def _shown(value: Any) -> str:

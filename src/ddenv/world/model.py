@@ -5,6 +5,7 @@ Poses are absolute (in the world frame), lengths in m, masses in kg, angles in r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -128,12 +129,12 @@ class Joint:
     parent: str
     child: str
     pose: Pose
-    axis: Vector
-    lower: float
-    upper: float
-    effort: float
-    velocity: float
-    damping: float
+    axis: Vector = (0.0, 0.0, 1.0)
+    lower: float = -math.inf
+    upper: float = math.inf
+    effort: float = math.inf
+    velocity: float = math.inf
+    damping: float = 0.0
     axis2: Vector | None = None
 
 
@@ -168,6 +169,21 @@ class Model:
     @property
     def collisions(self) -> tuple[Collision, ...]:
         return tuple(collision for link in self.links for collision in link.collisions)
+
+
+def held_with(model: Model, name: str) -> frozenset[str]:
+    """The link `name` (or "world") and all that fixed joints hold together with it, directly or through others."""
+    held = {name}
+    pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
+    while new := {end for pair in pairs if pair & held for end in pair} - held:
+        held |= new
+    return frozenset(held)
+
+
+def still_links(model: Model) -> tuple[Link, ...]:
+    """The links of `model` that never move: all if it is static, else those that fixed joints hold to the world."""
+    held = held_with(model, "world")
+    return tuple(link for link in model.links if model.static or link.name in held)
 
 
 @dataclass(frozen=True, slots=True)

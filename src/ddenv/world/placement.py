@@ -1,11 +1,16 @@
-"""Checks that the robot can start where a scenario says: no part of it may overlap a model."""
+"""How a world starts, without simulating it: whether the robot has room, how far it drops, which models are inside others."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
 import numpy as np
 
+from ddenv.amounts import count
 from ddenv.errors import UserError
-from ddenv.world.extent import Bounds, shape_bounds
+from ddenv.world.extent import Bounds, bounds, filled_bounds, shape_bounds, stacked
 from ddenv.world.model import Collision, Mesh, Model, Plane, World
 from ddenv.world.overlap import Hull, hull, overlap
 from ddenv.world.pose import Pose
@@ -23,14 +28,14 @@ def spawn_pose(spawn: Spawn) -> Pose:
 def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
     """Raises UserError if the robot, placed at `spawn`, stands inside a model or below the ground."""
     place = spawn_pose(spawn) @ robot.pose.inverse()
-    solid = [collision for collision in robot.collisions if not isinstance(collision.shape, Plane)]
-    if not solid:
+    box = bounds(robot.collisions, place)
+    if box is None:
         raise UserError(f"robot.model: '{robot.name}' has no collision shapes")
-    bodies = [hull(collision, place) for collision in solid]
-    boxes = [shape_bounds(collision.shape, place @ collision.pose) for collision in solid]
+    bodies = [hull(one, place) for one in robot.collisions if not isinstance(one.shape, Plane)]
     where = f"spawn ({spawn.x:g}, {spawn.y:g}, {spawn.z:g})"
     for model in world.models:
-        depths = [(_depth_inside(bodies, boxes, collision), collision.shape) for collision in model.collisions]
+        near = [one for one in model.collisions if _meet(box, filled_bounds(one))]
+        depths = [(_depth(body, one), one.shape) for one in near for body in bodies]
         depth, shape = max(depths, key=lambda each: each[0], default=(0.0, None))
         if depth > TOLERANCE:
             # The hull of a hollow mesh fills space that looks free.
@@ -40,17 +45,101 @@ def check_spawn(world: World, robot: Model, spawn: Spawn) -> None:
             )
 
 
-def _depth_inside(bodies: list[Hull], boxes: list[Bounds], collision: Collision) -> float:
-    """How deep the robot's `bodies`, with `boxes` around them, overlap an obstacle, m."""
-    if isinstance(collision.shape, Plane):
-        up = np.array([collision.pose.rotate((0.0, 0.0, 1.0))])
-        height = float(up[0] @ collision.pose.position)
-        return max(height - float(body.span(up)[0][0]) for body in bodies)
-    low, high = shape_bounds(collision.shape, collision.pose)
-    near = [
-        body for body, (bottom, top) in zip(bodies, boxes, strict=True) if (bottom <= high).all() and (top >= low).all()
-    ]
-    if not near:
-        return 0.0
-    obstacle = hull(collision)
-    return max(overlap(body, obstacle) for body in near)
+def _meet(one: Bounds, other: Bounds) -> bool:
+    """Whether two boxes overlap."""
+    return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())
+
+
+def _depth(body: Hull, obstacle: Collision) -> float:
+    """How deep a body is inside an obstacle, m."""
+    if not isinstance(obstacle.shape, Plane):
+        return overlap(body, hull(obstacle))
+    up = np.array([obstacle.pose.rotate((0.0, 0.0, 1.0))])
+    return float(up[0] @ obstacle.pose.position) - float(body.span(up)[0][0])
+
+
+# Models at rest in a saved world overlap by millimetres; this is more, m.
+INSIDE = 0.03
+# A robot that starts higher than this above the surface below it drops, m.
+DROP = 0.15
+# The maximum number of pairs of shapes that are compared: two fine meshes take a tenth of a second.
+MOST_PAIRS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """The model `name` starts `depth` (m) deep inside `other`."""
+
+    name: str
+    other: str
+    depth: float
+
+
+def notes_on_start(world: World, robot: Model, spawn: Spawn) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the robot in `world`: a word and a sentence for each."""
+    height = drop(world, robot, spawn)
+    if height > DROP:
+        yield "drop", f"the robot starts {height:.2f} m above the surface below it and drops; lower the spawn's z"
+    yield from note_inside(world)
+
+
+def note_inside(world: World) -> Iterator[tuple[str, str]]:
+    """What is wrong with the start of the models alone."""
+    pairs = inside(world)
+    if pairs:
+        deepest = max(pairs, key=lambda pair: pair.depth)
+        more = f", and {count(len(pairs) - 1, 'more pair')}" if len(pairs) > 1 else ""
+        yield (
+            "inside",
+            f"{deepest.name} starts {deepest.depth:.2f} m inside {deepest.other}{more}: they push each other apart",
+        )
+
+
+def inside(world: World) -> list[Inside]:
+    """Models of which one can move, and one starts deeper than `INSIDE` in the other."""
+    shapes = [(model, one) for model in world.models for one in model.collisions]
+    deepest: dict[tuple[str, str], float] = {}
+    for first, second in islice(_near(shapes), MOST_PAIRS):
+        (model, shape), (other, obstacle) = shapes[first], shapes[second]
+        # What cannot move, or has no end, is the obstacle.
+        if model.static or isinstance(shape.shape, Plane):
+            (model, shape), (other, obstacle) = (other, obstacle), (model, shape)
+        depth = _depth(hull(shape), obstacle)
+        if depth > INSIDE:
+            pair = model.name, other.name
+            deepest[pair] = max(depth, deepest.get(pair, 0.0))
+    return [Inside(*pair, depth) for pair, depth in deepest.items()]
+
+
+def _near(shapes: Sequence[tuple[Model, Collision]]) -> Iterator[tuple[int, int]]:
+    """The shapes of two models that may overlap, one of which can move: by the boxes around them, swept along x."""
+    low, high = stacked(filled_bounds(one) for _, one in shapes)
+    free = np.array([not model.static for model, _ in shapes], dtype=bool)
+    names = {id(model): number for number, (model, _) in enumerate(shapes)}
+    owners = np.array([names[id(model)] for model, _ in shapes], dtype=int)
+    if not free.any():
+        return
+    order = np.argsort(low[:, 0], kind="stable")
+    ends = np.searchsorted(low[order, 0], high[:, 0])
+    for place, number in enumerate(order.tolist()):
+        others = order[place + 1 : ends[number]]
+        deep = (np.minimum(high[number], high[others]) - np.maximum(low[number], low[others]) > INSIDE).all(axis=1)
+        able = (free[number] | free[others]) & (owners[number] != owners[others])
+        yield from ((min(number, other), max(number, other)) for other in others[deep & able].tolist())
+
+
+def drop(world: World, robot: Model, spawn: Spawn) -> float:
+    """How far the robot falls at least when it starts, m; 0 where nothing is below it: then the test says that it fell.
+
+    Everything is taken as large as the box around it.
+    """
+    place = spawn_pose(spawn) @ robot.pose.inverse()
+    boxes = [shape_bounds(one.shape, place @ one.pose) for one in robot.collisions if not isinstance(one.shape, Plane)]
+    heights = []
+    for collision in (one for model in world.models for one in model.collisions):
+        low, high = shape_bounds(collision.shape, collision.pose)
+        endless = isinstance(collision.shape, Plane)
+        below = (bottom for bottom, top in boxes if endless or ((bottom < high)[:2].all() and (low < top)[:2].all()))
+        # What is above the robot does not stop its fall.
+        heights += [float(bottom[2] - high[2]) for bottom in below if low[2] <= bottom[2]]
+    return max(0.0, min(heights, default=0.0))

@@ -1,12 +1,14 @@
-"""Rigid poses and vectors as plain data, in SDF's convention."""
+"""Rigid poses and vectors as plain data, in SDF's convention; and the pose at any instant of a recorded motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 Vector = tuple[float, float, float]
 
@@ -37,6 +39,9 @@ class Pose:
 
     def rotation(self) -> np.ndarray:
         """Rotation matrix, shape (3, 3)."""
+        # Loaded late: the first paint of the workbench does without it.
+        import numpy as np
+
         w, x, y, z = self.quaternion
         return np.array(
             [
@@ -59,8 +64,7 @@ class Pose:
 
     def yaw(self) -> float:
         """Heading about the vertical axis, rad in (-pi, pi]."""
-        w, x, y, z = self.quaternion
-        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return heading(self.quaternion)
 
     def rpy(self) -> Vector:
         """SDF's roll, pitch and yaw, rad. Where x points straight up or down, only yaw turns."""
@@ -91,6 +95,31 @@ class Pose:
         return Pose((x + px, y + py, z + pz), quaternion)
 
 
+def heading(quaternion: Sequence[float]) -> float:
+    """The yaw of a quaternion w, x, y, z: its turn about the vertical axis, rad in (-pi, pi]."""
+    w, x, y, z = quaternion
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def headings(quaternions: np.ndarray) -> np.ndarray:
+    """The yaws (N,) of quaternions (N, 4), as `heading`."""
+    import numpy as np
+
+    w, x, y, z = quaternions.T
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+def angle_between(one: Sequence[float], other: Sequence[float]) -> float:
+    """The angle of the rotation between two unit quaternions, rad; q and -q are the same rotation."""
+    likeness = abs(sum([a * b for a, b in zip(one, other, strict=True)]))
+    return 2.0 * math.acos(min(1.0, likeness))
+
+
+def wrap(angle: float) -> float:
+    """`angle` (rad), wrapped into [-pi, pi]."""
+    return math.remainder(angle, math.tau)
+
+
 def vector(values: Iterable[float]) -> Vector:
     """Three numbers, such as a row of an array, as a plain vector."""
     x, y, z = values
@@ -99,3 +128,27 @@ def vector(values: Iterable[float]) -> Vector:
 
 HERE = Pose()
 ONE: Vector = (1.0, 1.0, 1.0)
+
+
+def pose_at(samples: np.ndarray, time: float) -> Pose:
+    """The pose at simulated `time`, s, interpolated between rows (t, x, y, z, qw, qx, qy, qz) of `samples`."""
+    import numpy as np
+
+    after = int(np.clip(np.searchsorted(samples[:, 0], time), 1, max(1, len(samples) - 1)))
+    if len(samples) == 1:
+        return pose_of(samples[0, 1:])
+    first, second = samples[after - 1], samples[after]
+    span = second[0] - first[0]
+    part = float(np.clip((time - first[0]) / span, 0.0, 1.0)) if span > 0 else 1.0
+    # Of the two quaternions of a rotation, the one on the same side gives the shorter path.
+    sign = -1.0 if first[4:] @ second[4:] < 0 else 1.0
+    quaternion = (1 - part) * first[4:] + part * sign * second[4:]
+    return pose_of(np.concatenate([(1 - part) * first[1:4] + part * second[1:4], quaternion]))
+
+
+def pose_of(values: Iterable[float]) -> Pose:
+    """The pose of x, y, z, m, and a quaternion w, x, y, z of any length."""
+    x, y, z, *quaternion = map(float, values)
+    length = math.hypot(*quaternion) or 1.0
+    w, i, j, k = (part / length for part in quaternion)
+    return Pose((x, y, z), (w, i, j, k))

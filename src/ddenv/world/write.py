@@ -18,8 +18,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import write_file
-from ddenv.world.ground import with_ground_boxes
+from ddenv.world.access import write_file
+from ddenv.world.extent import with_ground_boxes
 from ddenv.world.model import (
     Box,
     Capsule,
@@ -52,14 +52,11 @@ def without(world: World, removed: frozenset[str]) -> bytes:
     spans = sorted(span for model in world.models if model.name in removed for span in model.spans)
     kept, at = [], 0
     for start, end in spans:
-        kept.append(_LINE_START.sub(b"", world.text[at:start]) if _ends_line(world.text, end) else world.text[at:start])
+        before, ends_line = world.text[at:start], world.text[end : end + 1] in (b"\n", b"\r", b"")
+        kept.append(_LINE_START.sub(b"", before) if ends_line else before)
         at = end
     kept.append(world.text[at:])
     return b"".join(kept)
-
-
-def _ends_line(text: bytes, end: int) -> bool:
-    return text[end : end + 1] in (b"\n", b"\r", b"")
 
 
 @dataclass
@@ -140,26 +137,21 @@ def _link(parent: Element, name: str, link: Link, model: Model, files: _MeshFile
     if link.inertia is not None:
         _inertia(element, link.inertia, link.pose)
     back = link.pose.inverse()
-    for collision, own in zip(link.collisions, _unique(one.name for one in link.collisions), strict=True):
-        _collision(element, own, collision, back, files)
-    for visual, own in zip(link.visuals, _unique(one.name for one in link.visuals), strict=True):
-        _visual(element, own, visual, back, files)
+    shapes: list[Collision | Visual] = [*link.collisions, *link.visuals]
+    names = [*_unique(one.name for one in link.collisions), *_unique(one.name for one in link.visuals)]
+    for one, own in zip(shapes, names, strict=True):
+        _shown(element, own, one, back, files)
 
 
-def _collision(parent: Element, name: str, one: Collision, back: Pose, files: _MeshFiles) -> None:
-    element = SubElement(parent, "collision", name=name)
+def _shown(parent: Element, name: str, one: Collision | Visual, back: Pose, files: _MeshFiles) -> None:
+    element = SubElement(parent, "collision" if isinstance(one, Collision) else "visual", name=name)
     _pose(element, back @ one.pose)
     _geometry(element, one.shape, files)
-    friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
-    for tag in ("mu", "mu2"):
-        SubElement(friction, tag).text = repr(one.mu)
-
-
-def _visual(parent: Element, name: str, one: Visual, back: Pose, files: _MeshFiles) -> None:
-    element = SubElement(parent, "visual", name=name)
-    _pose(element, back @ one.pose)
-    _geometry(element, one.shape, files)
-    if one.color is not None:
+    if isinstance(one, Collision):
+        friction = SubElement(SubElement(SubElement(element, "surface"), "friction"), "ode")
+        for tag in ("mu", "mu2"):
+            SubElement(friction, tag).text = repr(one.mu)
+    elif one.color is not None:
         material = SubElement(element, "material")
         for tag in ("ambient", "diffuse"):
             SubElement(material, tag).text = _numbers(one.color)
@@ -168,7 +160,7 @@ def _visual(parent: Element, name: str, one: Visual, back: Pose, files: _MeshFil
 def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
     geometry = SubElement(parent, "geometry")
     if not isinstance(shape, Mesh):
-        kind, sizes = _primitive(shape)
+        kind, sizes = primitive(shape)
         element = SubElement(geometry, kind)
         for name, values in sizes.items():
             SubElement(element, name).text = _numbers(values)
@@ -179,7 +171,7 @@ def _geometry(parent: Element, shape: Shape, files: _MeshFiles) -> None:
         SubElement(element, f"{{{DRAKE}}}declare_convex")
 
 
-def _primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
+def primitive(shape: Shape) -> tuple[str, dict[str, tuple[float, ...]]]:
     """The tag of a shape other than a mesh, with its sizes by tag."""
     match shape:
         case Box(size):

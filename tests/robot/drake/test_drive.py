@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.drake.template import Template
 from ddenv.robot.navigation.navigate import Straight
-from ddenv.robot.protocol import STOP, Reading, Setup, Twist, WheelSpeeds
-from ddenv.robot.sensing.estimate import Estimate
+from ddenv.robot.protocol import STOP, Estimate, Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.simulation.template import Template
 from ddenv.world.drive import find_drive, footprint, rolled
 from ddenv.world.model import Box, Capsule, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose

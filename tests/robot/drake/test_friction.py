@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydrake.multibody.plant import CalcContactFrictionFromSurfaceProperties, CoulombFriction
 
 from ddenv.robot.drake.shapes import wheel_friction, world_friction
-from ddenv.robot.drake.template import Template
+from ddenv.robot.simulation.template import Template
 from ddenv.world.drive import find_drive
 
 coefficients = st.floats(0, 1e6) | st.sampled_from([0.0, 1e-300, 1.0, 1000.0])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
+from ddenv.robot.simulation.template import Template
 from ddenv.world.drive import find_drive
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose

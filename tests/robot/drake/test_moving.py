@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
+from ddenv.robot.simulation.template import Template
 from ddenv.world.model import World
 
 BOARD = "0.9 0.09 0.04"

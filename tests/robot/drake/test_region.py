@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from ddenv.robot.drake import region
-from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.result import RunResult
 from ddenv.robot.sensing import lidar
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, World
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Scenario

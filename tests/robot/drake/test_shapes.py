@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.drake.shapes import CORNER_RADIUS, corners_of, resting_corners
-from ddenv.robot.drake.template import Template, lowest
+from ddenv.robot.simulation.template import Template, lowest
 from ddenv.world.extent import shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Sphere
 from ddenv.world.pose import Pose

@@ -13,7 +13,7 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.robot.external import pose_log, process
 from ddenv.world.load import load_scenario
-from ddenv.world.read import read_world
+from ddenv.world.sdf.read import read_world
 from tests.conftest import DATA, ROOT
 from tests.robot.external.own import FAMILY, SLEEP, STUBBORN
 

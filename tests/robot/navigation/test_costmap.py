@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.protocol import Estimate, Imu, Scan
 from tests.robot.navigation.toy import ANGLES, LIDAR, Ground, setup
 
 BARREL = Ground(circles=((3.0, 1.0, 0.3),))

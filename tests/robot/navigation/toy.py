@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from ddenv.robot.navigation.navigate import Navigator
-from ddenv.robot.protocol import Reading, Setup, Twist
-from ddenv.robot.sensing.estimate import Estimate, wrap
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.protocol import Estimate, Imu, Reading, Scan, Setup, Twist
+from ddenv.world.pose import wrap
 from ddenv.world.scenario import Controller, Planner
 
 HUSKY = (0.49, 0.49, 0.34, 0.34)

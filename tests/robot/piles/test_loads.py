@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
-from ddenv.robot.piles.loads import BEARS, BORE, GRAVITY, Loads
+from ddenv.robot.piles.sleep import BEARS, BORE, GRAVITY, Loads
+from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box
 from ddenv.world.pose import Pose
 from tests.robot.conftest import link_of, model_of

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
 from ddenv.robot.piles import rehearsal
-from ddenv.robot.piles.moving_links import Motion
+from ddenv.robot.piles.motion import Motion
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire, Script
+from ddenv.robot.simulation.template import Template
 from tests.robot.piles.test_sleep import SECTIONS, bits, cube, run
 
 ROWS = 10

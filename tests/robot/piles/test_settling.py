@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ddenv.robot.drake.template import Template
 from ddenv.robot.piles import settling
-from ddenv.robot.piles.moving_links import Motion
+from ddenv.robot.piles.motion import Motion
 from ddenv.robot.piles.rehearsal import Rehearsals, Script
 from ddenv.robot.settled import Settled, moved, notes_on
+from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, World
 from ddenv.world.pose import Pose
 from tests.robot.conftest import box_model, link_of, model_of

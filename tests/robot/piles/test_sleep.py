@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ddenv.robot.drake.plant import MANY
-from ddenv.robot.drake.template import FALL, Template
 from ddenv.robot.piles import rehearsal
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation.template import FALL, Template
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import box_model, joint_of, link_of, model_of, wedge

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from ddenv.robot.drake.template import Template
 from ddenv.robot.piles import rehearsal
+from ddenv.robot.simulation.template import Template
 from ddenv.world.model import Box, Model, Sphere, World
 from ddenv.world.pose import Pose
 from tests.conftest import ROOT
@@ -93,6 +93,6 @@ def test_a_pile_that_cannot_be_simulated_is_taken_as_it_starts(template, world_o
 
 @pytest.mark.skipif(not REAL.exists(), reason="the real worlds are not here")
 def test_a_block_of_a_real_world_lies_on_its_asphalt(template):
-    from ddenv.world.read import read_world
+    from ddenv.world.sdf.read import read_world
 
     assert pairs(template, read_world(Path(REAL))) == [("cinder_block", "asphalt_plane_clone")]

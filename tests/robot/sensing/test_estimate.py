@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.robot.sensing import estimate as filter_module
-from ddenv.robot.sensing.estimate import Filter, wrap
+from ddenv.robot.sensing.estimate import Filter
 from ddenv.robot.sensing.sensors import SensorSuite, Truth
+from ddenv.world.pose import wrap
 from ddenv.world.scenario import Sensors
 
 NOISELESS = Sensors(compass=0, gyro=0, odometry=0, tilt=0)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ddenv.world.files.access import Unusable
+from ddenv.world.access import Unusable
 from ddenv.world.files.meshes import read_parts
 from tests.world.files.mesh_files import bounds, dae, mesh_of, solid
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ddenv.world.files.access import Unusable
+from ddenv.world.access import Unusable
 from tests.world.files.mesh_files import BOX, bounds, gltf, mesh_of, solid
 
 

@@ -8,8 +8,8 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ddenv.world.access import Unusable
 from ddenv.world.files import hull, meshes
-from ddenv.world.files.access import Unusable
 from ddenv.world.files.meshes import SUFFIXES, read_parts
 from tests.world.files.mesh_files import BOX, bounds, dae, gltf, mesh_of, solid
 

@@ -4,8 +4,8 @@ import shutil
 import numpy as np
 import pytest
 
+from ddenv.world.access import Missing, Unusable
 from ddenv.world.files import resources
-from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.files.meshes import pack
 from ddenv.world.files.resources import Disk, Stored
 

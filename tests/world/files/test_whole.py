@@ -5,7 +5,7 @@ import os
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import write_file
+from ddenv.world.access import write_file
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from ddenv.world.model import World
-from ddenv.world.read import parse_world
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_world
 
 BOX = "<collision name='c'><geometry><box><size>1 2 3</size></box></geometry></collision>"
 

@@ -5,8 +5,8 @@ import pytest
 from ddenv.errors import UserError
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Cylinder
-from ddenv.world.read import parse_world, unique_names
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_world, unique_names
 from tests.world.sdf.conftest import BOX, world_text
 
 TOP = f"<pose>0 0 5 0 0 0</pose><static>1</static><link name='top'>{BOX}</link>"

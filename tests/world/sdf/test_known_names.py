@@ -7,8 +7,8 @@ from ddenv.world.extent import model_bounds
 from ddenv.world.files.resolve import ENVIRONMENT, PACKAGES, PREFIXES
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Box, Cylinder, Plane
-from ddenv.world.read import parse_world
-from ddenv.world.sdf.known_sizes import SIZES
+from ddenv.world.sdf.read import parse_world
+from ddenv.world.sdf.standin import KNOWN_SIZES
 from tests.world.sdf.conftest import world_text
 
 
@@ -66,15 +66,15 @@ def guessed(world):
     return collision, note
 
 
-@pytest.mark.parametrize("name", SIZES)
+@pytest.mark.parametrize("name", KNOWN_SIZES)
 def test_every_known_model_and_its_mesh_have_its_size(read, name):
-    known = SIZES[name]
-    scale = f"<scale>{' '.join(map(str, known.scale))}</scale>"
+    text, factors = KNOWN_SIZES[name]
+    scale = f"<scale>{' '.join(map(str, factors))}</scale>"
     whole = read(included(f"model://{name}"), stand_ins={"*": "auto"}).models[0]
     mesh, note = guessed(read(lost(f"model://{name}/meshes/x.dae", scale=scale), stand_ins={f"model://{name}": "auto"}))
     assert mesh.shape == whole.collisions[0].shape
     assert mesh.pose == whole.collisions[0].pose
-    assert f"by a guess, {known.text}: the size of Gazebo's model" in note
+    assert f"by a guess, {text}: the size of Gazebo's model" in note
     low, high = model_bounds(whole)
     assert all(0.03 < high[axis] - low[axis] <= 20 for axis in range(3))
 

@@ -6,6 +6,7 @@ There is no visual geometry: nobody looks at a worker.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -13,30 +14,38 @@ from typing import cast
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraph, Shape
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import (
+    BallRpyJoint,
     FixedOffsetFrame,
+    Frame,
     ModelInstanceIndex,
     PdControllerGains,
+    PrismaticJoint,
+    RevoluteJoint,
     RigidBody,
+    RotationalInertia,
     SpatialInertia,
+    UniversalJoint,
     WeldJoint,
 )
+from pydrake.multibody.tree import Joint as DrakeJoint
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from ddenv.robot.drake.articulation import add_joint, anchored, spatial_inertia, to_drake, transform
+from ddenv.arrays import Floats
 from ddenv.robot.drake.shapes import (
     drake_shapes,
     resting_corners,
-    solid_bounds,
     surface,
+    to_drake,
+    transform,
     wheel_friction,
     world_friction,
 )
 from ddenv.world.drive import Drive
-from ddenv.world.extent import Bounds
-from ddenv.world.model import Link, Model, World, is_fixed
+from ddenv.world.extent import Bounds, bounds
+from ddenv.world.model import Inertia, Joint, Link, Model, World, held_with, is_fixed, still_links
 from ddenv.world.pose import Pose
 from ddenv.world.scenario import Simulation
 
@@ -139,11 +148,16 @@ def build(world: World, robot: Model, drive: Drive, simulation: Simulation, moto
     plant, scene_graph = AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector(np.array(world.gravity))
     wheels = wheel_friction(robot, drive)
-    static = {model.name: _add_static(plant, model, wheels) for model in world.models}
+    static = {
+        model.name: tuple(_register(plant, plant.world_body(), Pose(), still_links(model), wheels, corners=False))
+        for model in world.models
+    }
     # The order in which moving models are added is the order of the solver's unknowns, which decides the last bits of every
     # result. It is always the file's order, with the robot first.
     driver = _add_moving(plant, scene_graph, robot, "robot", None)
-    _add_motors(plant, robot, drive, driver, motor_gain)
+    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
+        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, driver.instance), joint.effort)
+        actuator.set_controller_gains(PdControllerGains(p=0.0, d=motor_gain))
     moving = {
         model.name: _add_moving(plant, scene_graph, model, f"model/{model.name}", wheels)
         for model in world.models
@@ -210,58 +224,38 @@ def _own_pairs(
     return tuple(pair for pair in combinations(links, 2) if not filtered(pair[0][0], pair[1][0]))
 
 
-def _add_static(plant: MultibodyPlant, model: Model, wheels: float) -> tuple[GeometryId, ...]:
-    held = anchored(model)
-    links = [link for link in model.links if model.static or link.name in held]
-    return tuple(_register(plant, plant.world_body(), Pose(), links, wheels, corners=False))
-
-
 def _add_moving(
     plant: MultibodyPlant, scene_graph: SceneGraph, model: Model, instance_name: str, wheels: float | None
 ) -> Body:
     """Adds a model of the world, or (`wheels` is None) the robot."""
     instance = plant.AddModelInstance(instance_name)
     bodies = [plant.AddRigidBody(link.name, instance, _inertia(model, link)) for link in model.links]
-    held = anchored(model)
+    still = {link.name for link in still_links(model)}
     geometry: list[GeometryId] = []
-    bounds: list[Bounds | None] = []
+    boxes: list[Bounds | None] = []
     for link, body in zip(model.links, bodies, strict=True):
-        free: tuple[Link, ...] = () if link.name in held else (link,)
+        free: tuple[Link, ...] = () if link.name in still else (link,)
         geometry += _register(plant, body, link.pose.inverse(), free, wheels, corners=wheels is not None)
-        bounds.append(solid_bounds(link.collisions, link.pose.inverse()) if free else None)
+        boxes.append(bounds(link.collisions, link.pose.inverse()) if free else None)
     if not model.self_collide:
         scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(geometry)))
     by_name = {link.name: (link, body) for link, body in zip(model.links, bodies, strict=True)}
     for joint in model.joints:
-        add_joint(plant, joint, by_name, instance_name)
+        _add_joint(plant, joint, by_name, instance_name)
     if not model.gravity:
         plant.set_gravity_enabled(instance, False)
     poses = tuple(link.pose for link in model.links)
-    return Body(model.name, instance, tuple(bodies), poses, tuple(geometry), tuple(bounds))
+    return Body(model.name, instance, tuple(bodies), poses, tuple(geometry), tuple(boxes))
 
 
 def _inertia(model: Model, link: Link) -> SpatialInertia:
     if link.inertia is not None:
         return spatial_inertia(link.inertia, link.pose)
-    if not _weighs(model, link):
+    together = held_with(model, link.name)
+    if not any(one.inertia is not None for one in model.links if one.name in together):
         why = "has no <inertial>, nor has any that is fixed to it"
         raise ValueError(f"link '{link.name}' of the moving model '{model.name}' {why}")
     return SpatialInertia.Zero()
-
-
-def _weighs(model: Model, link: Link) -> bool:
-    """Whether `link`, or anything that fixed joints attach to it, has a mass."""
-    together = {link.name}
-    pairs = [{joint.parent, joint.child} for joint in model.joints if is_fixed(joint)]
-    while new := {name for pair in pairs if pair & together for name in pair} - together:
-        together |= new
-    return any(each.inertia is not None for each in model.links if each.name in together)
-
-
-def _add_motors(plant: MultibodyPlant, robot: Model, drive: Drive, body: Body, gain: float) -> None:
-    for joint in (joint for joint in robot.joints if joint.name in drive.joints):
-        actuator = plant.AddJointActuator(joint.name, plant.GetJointByName(joint.name, body.instance), joint.effort)
-        actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))
 
 
 def _register(
@@ -280,3 +274,58 @@ def _register(
                     plant.RegisterCollisionGeometry(body, transform(frame @ pose), shape, name, surface(mu))
                 )
     return identities
+
+
+def spatial_inertia(inertia: Inertia, link: Pose) -> SpatialInertia:
+    """`inertia` about the origin of the frame `link`, in its axes. Raises RuntimeError for an impossible inertia."""
+    place = transform(link.inverse() @ inertia.pose)
+    central = RotationalInertia(*inertia.moments, *inertia.products).ReExpress(place.rotation())
+    return SpatialInertia.MakeFromCentralInertia(inertia.mass, place.translation(), central)
+
+
+# Drake's ball joint has roll, pitch and yaw, and locks (gimbal lock) where the child's x axis is parallel to the parent's z axis.
+# These joint axes, the same on both sides, are oblique to every axis of the world, so that no swing about one of those, like that
+# of something that hangs straight down, reaches the lock.
+BALL_AXES = np.array([[0.8, 0.0, -0.6], [0.36, 0.8, 0.48], [0.48, -0.6, 0.64]])
+
+
+def _add_joint(
+    plant: MultibodyPlant, joint: Joint, links: dict[str, tuple[Link, RigidBody]], instance_name: str
+) -> None:
+    """Adds `joint` between two of `links`, or between one of them and the world. Raises ValueError for an unknown kind."""
+    # Both frames have the same axes in the start pose, so that every joint position is 0 there.
+    at = RigidTransform(RotationMatrix(to_drake(_axes(joint))), to_drake(np.array(joint.pose.position)))
+    frames: list[Frame] = []
+    for end, name in (("parent", joint.parent), ("child", joint.child)):
+        pose, body = (Pose(), plant.world_body()) if name == "world" else (links[name][0].pose, links[name][1])
+        place = transform(pose).inverse() @ at
+        frames.append(plant.AddFrame(FixedOffsetFrame(f"{instance_name}/{joint.name}/{end}", body.body_frame(), place)))
+    parent, child = frames
+    plant.AddJoint(_joint(joint, parent, child))
+
+
+def _axes(joint: Joint) -> Floats:
+    """The axes (columns of a 3 x 3 matrix) of a joint's frames in the world frame; the world's own for most kinds."""
+    if joint.kind == "universal":
+        first, second = np.array(joint.axis), np.array(joint.axis2)
+        # Exactly orthogonal: the axes of a file are so only to a few digits.
+        second = second - first * (first @ second)
+        second /= math.sqrt(second @ second)
+        return np.column_stack([first, second, np.cross(first, second)])
+    return BALL_AXES if joint.kind == "ball" else np.eye(3)
+
+
+def _joint(joint: Joint, parent: Frame, child: Frame) -> DrakeJoint:
+    if is_fixed(joint):
+        return WeldJoint(joint.name, parent, child, RigidTransform())
+    axis = to_drake(np.array(joint.axis))
+    match joint.kind:
+        case "revolute" | "continuous":
+            return RevoluteJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
+        case "prismatic":
+            return PrismaticJoint(joint.name, parent, child, axis, joint.lower, joint.upper, joint.damping)
+        case "ball":
+            return BallRpyJoint(joint.name, parent, child, joint.damping)
+        case "universal":
+            return UniversalJoint(joint.name, parent, child, joint.damping)
+    raise ValueError(f"joint '{joint.name}': {joint.kind} joints cannot be simulated")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats
-from ddenv.world.extent import Bounds, model_bounds
+from ddenv.world.extent import Bounds, model_bounds, stacked
 from ddenv.world.model import Model
 
 # How far a region extends to each side of the straight way to the goal, m.
@@ -66,8 +66,7 @@ class Region:
         if sum(len(model.collisions) for model in static) <= FEW:
             return frozenset()
         found = [(model.name, box) for model in static if (box := model_bounds(model)) is not None]
-        low = np.array([box[0] for _, box in found]).reshape(-1, 3)
-        high = np.array([box[1] for _, box in found]).reshape(-1, 3)
+        low, high = stacked(box for _, box in found)
         outside = self._depths((low + high)[:, :2] / 2) + _radii(low, high) < 0
         return frozenset(name for (name, _), out in zip(found, outside, strict=True) if out)
 

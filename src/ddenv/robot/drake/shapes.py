@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import count
+from typing import Any
 
 import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import AddContactMaterial, Convex, ProximityProperties
 from pydrake.geometry import Box as DrakeBox
 from pydrake.geometry import Capsule as DrakeCapsule
@@ -14,13 +16,12 @@ from pydrake.geometry import Cylinder as DrakeCylinder
 from pydrake.geometry import Ellipsoid as DrakeEllipsoid
 from pydrake.geometry import Shape as DrakeShape
 from pydrake.geometry import Sphere as DrakeSphere
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction
 from scipy.spatial import ConvexHull, QhullError
 
 from ddenv.arrays import Floats
-from ddenv.robot.drake.articulation import to_drake
 from ddenv.world.drive import Drive, turned_links
-from ddenv.world.extent import Bounds, shape_bounds
 from ddenv.world.model import Box, Capsule, Collision, Cylinder, Ellipsoid, Mesh, Model, Shape, Sphere
 from ddenv.world.pose import Pose, Vector
 
@@ -28,6 +29,16 @@ from ddenv.world.pose import Pose, Vector
 # removing a model would change the contacts of all others. Two such surfaces in series give 1e5 N/m: a Husky sinks in by 1.4 mm.
 STIFFNESS = 2e5  # N/m
 DISSIPATION = 5.0  # s/m, Hunt-Crossley
+
+
+def to_drake(array: Floats) -> Any:
+    """`array` itself: pydrake's type stubs declare arrays in a form that no NumPy array matches."""
+    return array
+
+
+def transform(pose: Pose) -> RigidTransform:
+    """`pose` as Drake's transform."""
+    return RigidTransform(Quaternion(to_drake(np.array(pose.quaternion))), to_drake(np.array(pose.position)))
 
 
 def wheel_friction(robot: Model, drive: Drive) -> float:
@@ -65,15 +76,6 @@ MOST_CORNERS = 64
 # Around a cylinder's rim, and on a convex mesh at most.
 RIM_CORNERS = 8
 MESH_CORNERS = 32
-
-
-def solid_bounds(collisions: tuple[Collision, ...], frame: Pose) -> Bounds | None:
-    """The box around `collisions` along the axes of a frame; `frame` is the world's pose in it. None if there are none."""
-    boxes = [shape_bounds(one.shape, frame @ one.pose) for one in collisions]
-    if not boxes:
-        return None
-    lows, highs = zip(*boxes, strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
 
 
 def drake_shapes(collision: Collision, corners: Sequence[Vector] = ()) -> list[tuple[DrakeShape, Pose]]:

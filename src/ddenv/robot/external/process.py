@@ -158,7 +158,11 @@ def watch(command: Running, seconds: float, take: Callable[[bytes], None], too_m
                 # The supervisor itself was stopped, and will be killed.
                 said = ""
     for stream, taker in takers:
-        _drain(stream, taker)
+        # What was written before the command ended, without waiting for more.
+        os.set_blocking(stream.fileno(), False)
+        with contextlib.suppress(BlockingIOError):
+            for _ in range(MOST_LEFT // PIECE):
+                taker(os.read(stream.fileno(), PIECE))
     code, reason = _read(said)
     return Ended(None if why else code, why or reason, complaints.last_line(), complaints.is_exception())
 
@@ -175,14 +179,6 @@ def _look(selector: selectors.BaseSelector, command: Running) -> str | None:
         else:
             selector.unregister(key.fileobj)
     return None
-
-
-def _drain(stream: IO[bytes], take: Callable[[bytes], None]) -> None:
-    """Takes what was written before the command ended, without waiting for more."""
-    os.set_blocking(stream.fileno(), False)
-    with contextlib.suppress(BlockingIOError):
-        for _ in range(MOST_LEFT // PIECE):
-            take(os.read(stream.fileno(), PIECE))
 
 
 def _read(said: str) -> tuple[int | None, str]:

@@ -45,18 +45,11 @@ class ExternalSimulator:
         self.limit = scenario.simulation.wall_timeout or math.inf
         self._removable = frozenset(world.elements(frozenset(scenario.protected)))
 
-    def run(
-        self,
-        keep: frozenset[str],
-        seed: int,
-        progress: Progress | None = None,
-        full: bool = True,
-    ) -> RunResult:
-        """Runs the robot in the world with the models `keep`, and with those that cannot be removed.
+    def run(self, keep: frozenset[str], seed: int, progress: Progress | None = None, full: bool = True) -> RunResult:
+        """As `Simulator.run`, with the robot's pose alone for `progress`, of each row that the command prints.
 
-        `progress(time, pose, {})` gets the simulated time (s) and the robot's pose (x, y, z in m, qw, qx, qy, qz) of each row that
-        the command prints. `full` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises
-        ValueError for unknown names, and UserError if no temporary file can be written.
+        `full` has no effect: a command ends its runs itself. Whatever the command does becomes a result. Raises UserError if no
+        temporary file can be written.
         """
         unknown = keep - self._names
         if unknown:

@@ -7,10 +7,8 @@ import math
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
-from ddenv.robot.navigation.footprint import Footprint
-from ddenv.robot.protocol import Setup
-from ddenv.robot.sensing.estimate import Estimate
-from ddenv.robot.sensing.sensors import Imu, Scan
+from ddenv.robot.navigation.footprint import Footprint, seen_from
+from ddenv.robot.protocol import Estimate, Imu, Scan, Setup
 
 # A beam clears a cell if it goes farther than the cell by this many cells.
 PASSED = 1.5
@@ -123,13 +121,11 @@ class Costmap:
         """Clears what is off the map, under the robot or, if the beams are `level`, where they have passed through."""
         (slots,) = self._hit.nonzero()
         spots = self._places.take(slots, axis=1)
-        cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-        x, y = estimate.x, estimate.y
-        seen = np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y]]) @ spots
+        seen = seen_from(estimate)[:2] @ spots
         seen[0] -= self._middle
         beyond = np.abs(seen)
         gone = (beyond[0] < self._half) & (beyond[1] < self._side)
-        cell = math.floor(x / self.resolution), math.floor(y / self.resolution)
+        cell = math.floor(estimate.x / self.resolution), math.floor(estimate.y / self.resolution)
         if cell != self._cell:
             self._cell = cell
             middle = [[(part + 0.5) * self.resolution] for part in cell]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats
-from ddenv.robot.protocol import Setup
+from ddenv.robot.protocol import Estimate, Setup
 
 # Points nearer to the robot than this part of its padding count as touched.
 TOUCHED = 0.6
@@ -56,6 +57,13 @@ class Footprint:
         beyond[:count] -= (self.ahead + self.behind) / 2 + self.margin
         beyond[count:] -= self.side + self.margin
         return np.maximum(beyond[:count], beyond[count:])
+
+
+def seen_from(estimate: Estimate) -> Floats:
+    """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and 1."""
+    x, y = estimate.x, estimate.y
+    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
+    return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
 
 
 def legs_beside(

@@ -3,16 +3,104 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from ddenv.robot.navigation.costmap import Costmap
-from ddenv.robot.navigation.pursuit import Follower
-from ddenv.robot.navigation.recover import Attempt, Recovery
+from ddenv.robot.navigation.footprint import Footprint
+from ddenv.robot.navigation.pursuit import BACK_SPEED, Follower, may_back_up, may_turn
 from ddenv.robot.navigation.route import Path, Planner
-from ddenv.robot.protocol import STOP, Reading, Setup, Twist
-from ddenv.robot.sensing.estimate import Estimate, wrap
-from ddenv.robot.sensing.sensors import Imu
+from ddenv.robot.protocol import STOP, Estimate, Imu, Reading, Setup, Twist
+from ddenv.world.pose import wrap
+
+# Clearing the costmap keeps what is within this distance of the robot, m.
+NEAR = 1.5
+# After clearing, the lidar gets this time to see obstacles again, s.
+LOOK = 0.5
+BACK = 0.4  # m
+# The maximum duration of a behaviour, s.
+LONGEST_BACK = 4.0
+LONGEST_TURN = 15.0
+
+
+class Attempt(Protocol):
+    """A recovery behaviour: commands until it is over, then None."""
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None: ...
+
+
+class Forget:
+    """Clears the costmap beyond `beyond` (m) and looks again. It keeps what is near and outside the lidar's field of view."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate, beyond: float) -> None:
+        self._until = time + LOOK
+        self._beyond: float | None = beyond
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        if self._beyond is not None:
+            map_.forget(estimate, self._beyond, NEAR)
+            self._beyond = None
+        return STOP if time < self._until else None
+
+
+class BackUp:
+    """Backs up a little, as long as nothing is there."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
+        self._body = Footprint.of(setup)
+        self._speed = min(BACK_SPEED, setup.speed)
+        self._from = estimate
+        self._until = time + LONGEST_BACK
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        gone = math.hypot(estimate.x - self._from.x, estimate.y - self._from.y)
+        if gone >= BACK or time >= self._until:
+            return None
+        return Twist(-self._speed, 0.0) if may_back_up(self._body, map_.spots, estimate) else None
+
+
+class LookAround:
+    """Turns around once on the spot, as long as nothing is in the way."""
+
+    def __init__(self, setup: Setup, time: float, estimate: Estimate) -> None:
+        self._body = Footprint.of(setup)
+        self._rate = setup.turn_rate
+        self._heading = estimate.heading
+        self._turned = 0.0
+        self._until = time + LONGEST_TURN
+
+    def step(self, time: float, estimate: Estimate, map_: Costmap) -> Twist | None:
+        self._turned += wrap(estimate.heading - self._heading)
+        self._heading = estimate.heading
+        if self._turned >= math.tau or time >= self._until:
+            return None
+        return Twist(0.0, self._rate) if may_turn(self._body, map_.spots, estimate, 1.0) else None
+
+
+@dataclass(slots=True)
+class Recovery:
+    """Chooses recovery behaviours in turn. `made` counts those since the robot last made progress."""
+
+    setup: Setup
+    made: int = 0
+
+    def next(self, time: float, estimate: Estimate) -> Attempt | None:
+        """The next behaviour; None once the scenario's maximum number of recoveries is reached."""
+        if self.made >= self.setup.settings.planner.recoveries:
+            return None
+        self.made += 1
+        match (self.made - 1) % 4:
+            case 0:
+                return Forget(self.setup, time, estimate, NEAR)
+            case 1:
+                return BackUp(self.setup, time, estimate)
+            case 2:
+                return LookAround(self.setup, time, estimate)
+            case _:
+                return Forget(self.setup, time, estimate, 0.0)
+
 
 # A controller stops when the estimated distance to the goal is within this fraction of its tolerance.
 ARRIVED = 0.2
@@ -146,18 +234,15 @@ class Navigator:
         return twist
 
     def _look(self, reading: Reading) -> None:
+        """Takes in a scan that is due, collects the points near the robot, and checks whether the path is blocked."""
         self._imu = reading.imu or self._imu
         every = LOOK_WAITING if self._waits else LOOK_EVERY
         if reading.scan is None or reading.time < self._looked + every - TICK:
             return
         self._looked = reading.time
         self._map.see(reading.scan, reading.estimate, self._imu)
-        self._see(reading.estimate)
-
-    def _see(self, estimate: Estimate) -> None:
-        """Collects the points near the robot, and checks whether the path is blocked."""
         spots, reach = self._map.spots, self._follower.reach
-        near = (np.abs(spots[0] - estimate.x) < reach) & (np.abs(spots[1] - estimate.y) < reach)
+        near = (np.abs(spots[0] - reading.estimate.x) < reach) & (np.abs(spots[1] - reading.estimate.y) < reach)
         self._near = spots[:, near]
         self._blocked = self._path is not None and self._planner.room(self._path, self._map.points) is None
 
@@ -178,7 +263,8 @@ class Navigator:
         twist = self._follower.step(self._path, estimate, self._near)
         if self._progress.is_stalled(time, estimate):
             return self._try_to_recover(reading)
-        self._note_progress(estimate)
+        if self._recovered and math.dist((estimate.x, estimate.y), self._recovered) >= BETTER:
+            self._recovery.made, self._recovered = 0, None
         return twist
 
     def _think(self, time: float, estimate: Estimate) -> None:
@@ -186,7 +272,10 @@ class Navigator:
         since = time - self._planned + TICK
         is_due = since >= self._replan and self._map.version != self._planned_on
         if self._path is None or self._is_spoilt(self._path):
-            if since >= THINK_EVERY and (is_due or not self._is_no_use(estimate)):
+            here = math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
+            # A new plan would not help: the last one was made here, and the robot cannot follow it.
+            no_use = self._follower.stuck and not self._blocked and here
+            if since >= THINK_EVERY and (is_due or not no_use):
                 self._plan(time, estimate)
             return
         if not is_due:
@@ -194,12 +283,6 @@ class Navigator:
         self._planned, self._planned_on = time, self._map.version
         if not self._planner.is_best(self._path, self._map.points):
             self._plan(time, estimate)
-
-    def _is_no_use(self, estimate: Estimate) -> bool:
-        """Whether a new plan would not help: the last one was made here, and the robot cannot follow it."""
-        if not self._follower.stuck or self._blocked:
-            return False
-        return math.dist(self._planned_at, (estimate.x, estimate.y)) < ELSEWHERE
 
     def _is_spoilt(self, path: Path) -> bool:
         """Whether the path is blocked, the robot cannot follow it or has left it, or it soon ends at the map's border."""
@@ -224,12 +307,6 @@ class Navigator:
             return False
         room, others = self._planner.room(path, points), self._planner.room(other, points)
         return room is not None and room >= (others or 0.0) - CLOSER and path.left <= LONGER * other.left
-
-    def _note_progress(self, estimate: Estimate) -> None:
-        was = self._recovered
-        if was and math.hypot(estimate.x - was[0], estimate.y - was[1]) >= BETTER:
-            self._recovery.made = 0
-            self._recovered = None
 
     def _try_to_recover(self, reading: Reading) -> Twist:
         self._attempt = self._recovery.next(reading.time, reading.estimate)

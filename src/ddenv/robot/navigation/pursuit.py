@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from ddenv.arrays import Floats
-from ddenv.robot.navigation.footprint import Footprint
+from ddenv.robot.navigation.footprint import Footprint, seen_from
 from ddenv.robot.navigation.route import Path
-from ddenv.robot.protocol import STOP, Setup, Twist
-from ddenv.robot.sensing.estimate import Estimate, wrap
+from ddenv.robot.protocol import STOP, Estimate, Setup, Twist
+from ddenv.world.pose import wrap
 
 # Parts of the lookahead distance at which the robot aims; the first one whose arc is free counts.
 PARTS = (1.0, 0.6)
@@ -137,7 +137,7 @@ def room(body: Footprint, points: Floats, estimate: Estimate, places: Floats) ->
     `places` are relative to the robot at `estimate`; the first one is where it is now. A point within the margin may come a little
     nearer, so that the robot can turn away from it, but must not be touched, or touched harder.
     """
-    apart = body.apart(points, places @ _seen_from(estimate))
+    apart = body.apart(points, places @ seen_from(estimate))
     least = float(apart.min())
     if least >= 0:
         return least
@@ -156,15 +156,8 @@ def may_back_up(body: Footprint, points: Floats, estimate: Estimate) -> bool:
     return not points.shape[1] or room(body, points, estimate, BACK) is not None
 
 
-def _seen_from(estimate: Estimate) -> Floats:
-    """The matrix (3, 3) from the estimates' frame to the robot's frame, for points x, y (m) and 1."""
-    x, y = estimate.x, estimate.y
-    cosine, sine = math.cos(estimate.heading), math.sin(estimate.heading)
-    return np.array([[cosine, sine, -cosine * x - sine * y], [-sine, cosine, sine * x - cosine * y], [0.0, 0.0, 1.0]])
-
-
 def _turned(angle: float) -> Floats:
-    return _seen_from(Estimate(0.0, 0.0, angle))[:2]
+    return seen_from(Estimate(0.0, 0.0, angle))[:2]
 
 
 def _arc(distance: float, bearing: float) -> Floats:
@@ -185,4 +178,4 @@ def _arc(distance: float, bearing: float) -> Floats:
 # Small turns on the spot, and a little way back.
 LEFT = np.stack([_turned(angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
 RIGHT = np.stack([_turned(-angle) for angle in (0.0, 0.1, 0.2, 0.35)], axis=1)
-BACK = np.stack([_seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)
+BACK = np.stack([seen_from(Estimate(-way, 0.0, 0.0))[:2] for way in (0.0, 0.1, 0.2)], axis=1)

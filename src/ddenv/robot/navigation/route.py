@@ -230,12 +230,10 @@ class Planner:
         places[0] = start
         corners = self._cut_short(places, near[route], points)
         # A place at the map's border only leads to a goal beyond it, however near it is to the goal.
-        final = left <= self._tolerance and self._is_on_map(corner)
-        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
-
-    def _is_on_map(self, corner: Floats) -> bool:
         ahead = np.array(self._goal) - corner
-        return bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
+        on_map = bool((ahead > -self._step).all() and (ahead < self._grid.count * self._step).all())
+        final = left <= self._tolerance and on_map
+        return Path(corners, final=final, back=self._body.inscribed, on=self._body.inscribed)
 
     def _target(self, lengths: Floats, corner: Floats, goal_is_free: bool) -> int | None:
         """The cell to go to, None if none can be reached."""
@@ -312,15 +310,11 @@ class Planner:
             free, _ = legs_beside(
                 points, np.tile(tries, (2, 1)), ends, self._reach, np.repeat(on, len(tries)), self._side
             )
-            good = free.reshape(2, -1).all(axis=0) & (_cosines(sides[narrow], tries, sides[1 - narrow]) >= SHARPEST)
+            # The cosines of the angles by which the path then turns there.
+            come, go = tries - sides[narrow], sides[1 - narrow] - tries
+            lengths = np.hypot(*come.T) * np.hypot(*go.T)
+            cosines = (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)
+            good = free.reshape(2, -1).all(axis=0) & (cosines >= SHARPEST)
             if good.any():
                 corners[number] = tries[good.argmax()]
         return corners
-
-
-def _cosines(start: Floats, corners: Floats, end: Floats) -> Floats:
-    """The cosines (K,) of the angles by which paths from `start` to `end` (2,) turn at `corners` (K, 2)."""
-    come, go = corners - start, end - corners
-    lengths = np.hypot(*come.T) * np.hypot(*go.T)
-    cosines: Floats = (come * go).sum(axis=1) / np.maximum(lengths, 1e-9)
-    return cosines

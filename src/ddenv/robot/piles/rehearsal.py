@@ -14,14 +14,12 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from ddenv.arrays import Booleans, Floats
-from ddenv.robot.drake.articulation import anchored
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.moving_links import NEAR, Links, Motion, gaps, spread
-from ddenv.robot.piles.script import ARRAY, Script
+from ddenv.robot.piles.motion import ARRAY, NEAR, Links, Motion, Script, gaps, spread
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.world.extent import model_bounds
-from ddenv.world.model import Model, World
+from ddenv.world.model import World, still_links
 
 # The simulated time of all rehearsals of a world whose models never come to rest, and the minimum for each of them, s.
 BUDGET = 200.0
@@ -61,7 +59,11 @@ class Repertoire:
         # With their sizes; the one that was used last comes last.
         self._by_use: dict[Known, int] = {}
         self._size = 0
-        self._static = {model.name: model_bounds(model) for model in world.models if _has_static(model)}
+        self._static = {
+            model.name: model_bounds(model)
+            for model in world.models
+            if any(link.collisions for link in still_links(model))
+        }
         # The static models near each pile of the whole world.
         self._usual: dict[tuple[str, ...], frozenset[str]] | None = None
 
@@ -129,13 +131,6 @@ class Repertoire:
         low = np.min([motion.low.min(axis=0) for motion in motions], axis=0) - margin
         high = np.max([motion.high.max(axis=0) for motion in motions], axis=0) + margin
         return (name for name, box in self._static.items() if box and (box[0] < high).all() and (low < box[1]).all())
-
-
-def _has_static(model: Model) -> bool:
-    """Whether `model` has a collision shape that never moves."""
-    held = anchored(model)
-    links = (link for link in model.links if model.static or link.name in held)
-    return any(link.collisions for link in links)
 
 
 class Rehearsals:

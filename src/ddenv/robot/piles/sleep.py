@@ -9,17 +9,15 @@ that goes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+from pydrake.multibody.plant import ContactResults
 
 from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.piles.loads import Loads
-from ddenv.robot.piles.moving_links import NEAR, Links, Motion, gaps, spread, tight_gaps
-from ddenv.robot.piles.script import Script
-from ddenv.robot.piles.stillness import SLOW, Stillness
+from ddenv.robot.piles.motion import NEAR, SLOW, Links, Motion, Script, Stillness, gaps, spread, tight_gaps
 from ddenv.world.extent import Bounds
 
 NO_BOXES = np.empty((0, 3)), np.empty((0, 3))
@@ -28,23 +26,6 @@ TOUCH = 0.02  # m; models this near to each other may touch
 CLOSE = 0.01
 FAST = 0.1  # m/s, the mean speed of what wakes all that it reaches
 PASSED = 0.02  # m; a robot that has moved less since a model fell asleep beside it does not wake it
-
-
-@dataclass(frozen=True)
-class Situation:
-    """What the rules look at: for each of M models (M,), or for each pair of them (M, M).
-
-    `close` to a robot that moves; `met` by something that moves, so that both must be simulated together; `stirred` by something
-    near that is not slow; `touching`, near enough to carry each other; `reached`: perhaps touched, before the tick after next, by
-    something that is simulated; `together`, moved by the same script.
-    """
-
-    close: Booleans
-    met: Booleans
-    stirred: Booleans
-    touching: Booleans
-    reached: Booleans
-    together: Booleans
 
 
 class Sleep:
@@ -119,7 +100,9 @@ class Sleep:
             seconds = (step - self._now) * self._step
             self._play()
             self._look(np.flatnonzero(self._awake), seconds)
-            self._drop()
+            # What has fallen out of the world is not worth simulating.
+            self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
+            self._lay(self._awake & self._gone)
             self._decide(seconds)
         # Also when no moving model is kept: removed ones are held, too.
         self._hold.apply()
@@ -220,33 +203,41 @@ class Sleep:
         if seconds:
             self._pace[links] = self._links.pace(links, before, now, seconds)
 
-    def _drop(self) -> None:
-        """Holds what has fallen out of the world: it is not worth simulating."""
-        self._gone |= np.logical_and.reduceat(self._motion.below(self._floor), self._links.first)
-        self._lay(self._awake & self._gone)
-
     def _decide(self, seconds: float) -> None:
         """Wakes models and lays others to sleep, `seconds` after the last time."""
         slow = np.maximum.reduceat(self._pace, self._links.first) < SLOW
         speed = np.maximum.reduceat(self._motion.speed, self._links.first)
         near, close = self._near(speed)
-        moves = self._awake | (self._played >= 0) | self._due
-        if not (near | close | moves).any():
+        played = self._played >= 0
+        moving = self._awake | played
+        if not (near | close | moving | self._due).any():
             return
-        now = self._situation(speed, slow, close)
-        self._took_part |= near | now.reached
+        apart = gaps(self._links, self._motion, self._links, self._motion)
+        apart[self._gone] = apart[:, self._gone] = np.inf
+        np.fill_diagonal(apart, np.inf)
+        # Pairs (M, M): moved by the same script; near enough to carry each other; near, and one of them is not slow.
+        together = played[:, None] & (self._played[:, None] == self._played)
+        touching: Booleans = apart < TOUCH
+        lively: Booleans = moving & ~slow
+        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
+        meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
+        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
+        met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
+        # Something that is simulated may touch it before the tick after next.
+        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
+        self._took_part |= near | beside.any(axis=1)
         self._stillness.look(self._motion, seconds)
-        within = self._settled & (near | now.touching[:, self._awake].any(axis=1))
+        within = self._settled & (near | touching[:, self._awake].any(axis=1))
         pressed = self._loads.changed(seconds) if within.any() else np.zeros_like(within)
-        start: Booleans = ~self._awake & (now.close | now.met | self._due | (pressed & self._settled))
+        start: Booleans = ~self._awake & (close | met | self._due | (pressed & self._settled))
         if start.any():
             self._loads.woke(start, pressed)
             # What has no twin cannot stay asleep beside what wakes.
-            joined = now.together | (now.touching & ~self._has_twin[:, None])
+            joined = together | (touching & ~self._has_twin[:, None])
             self._wake(spread(start, joined) & ~self._awake & ~self._gone)
         rests = self._stillness.at_rest
-        restless = self._awake & (~rests | (~self._has_twin & (now.close | now.stirred)))
-        joined = now.touching & self._awake[:, None] & self._awake
+        restless = self._awake & (~rests | (~self._has_twin & (close | stirring.any(axis=1))))
+        joined = touching & self._awake[:, None] & self._awake
         self._lay(self._awake & np.where(self._has_twin, rests, ~spread(restless, joined)))
         if within.any() or start.any():
             self._loads.note(self._settled, self._awake)
@@ -270,24 +261,6 @@ class Sleep:
         self._robot_was[close | self._awake] = place
         near: Booleans = (apart < TOUCH + margin) & ~self._gone
         return near, close
-
-    def _situation(self, speed: Floats, slow: Booleans, close: Booleans) -> Situation:
-        apart = gaps(self._links, self._motion, self._links, self._motion)
-        apart[self._gone] = apart[:, self._gone] = np.inf
-        np.fill_diagonal(apart, np.inf)
-        played = self._played >= 0
-        moving = self._awake | played
-        lively: Booleans = moving & ~slow
-        together = played[:, None] & (self._played[:, None] == self._played)
-        touching: Booleans = apart < TOUCH
-        stirring: Booleans = (apart < NEAR + (speed[:, None] + speed) * self._period) & (lively[:, None] | lively)
-        meeting = (stirring | (touching & (moving[:, None] | moving))) & ~together
-        # What lies as part of the ground can be touched there: only what comes fast wakes it before it does.
-        met: Booleans = meeting.any(axis=1) & ~self._settled | self._struck(apart)
-        beside = apart[:, self._awake] < TOUCH + (speed[:, None] + speed[self._awake]) * self._period
-        return Situation(
-            close, met, np.asarray(stirring.any(axis=1)), touching, np.asarray(beside.any(axis=1)), together
-        )
 
     def _struck(self, apart: Floats) -> Booleans:
         """Which models (M,) that lie as part of the ground something fast reaches before the tick after next."""
@@ -338,3 +311,83 @@ class Sleep:
 
     def _bodies(self, models: Booleans) -> list[Body]:
         return [body for body, chosen in zip(self._kept, models, strict=True) if chosen]
+
+
+# A model at rest bears a change of its load up to this many times its own weight: it also carries others.
+BEARS = 3.0
+# One that a change of its load woke, and that came to rest again where it had lain, bears this many times that change.
+BORE = 1.5
+# A support carries if it takes this part of the model's weight; the model wakes when half of that is gone.
+CARRIES = 0.1
+LOST = 0.5
+# Loads are means over this time, s: what lies on a point trembles.
+SMOOTH = 0.2
+GRAVITY = 9.81  # m/s^2; also in a world without gravity, where a model bears by its mass
+
+
+class Loads:
+    """The loads of M models in one run, from each of them and, last, from the robot."""
+
+    def __init__(self, context: RunContext, models: Sequence[Body]) -> None:
+        built, count = context.built, len(models)
+        self._context = context.plant_context
+        self._port = built.plant.get_contact_results_output_port()
+        movers = [*(body.geometry for body in models), built.robot.geometry]
+        self._mover = {shape: number for number, shapes in enumerate(movers) for shape in shapes}
+        self._twin = {
+            shape: number
+            for number, body in enumerate(models)
+            if body.name in built.twins
+            for shape in built.twins[body.name].geometry
+        }
+        self._weights = GRAVITY * np.array([sum(link.default_mass() for link in body.links) for body in models])
+        down = cast(Floats, built.plant.gravity_field().gravity_vector())
+        self._up = -down / max(float(np.linalg.norm(down)), 1e-9)
+        self._bears = BEARS * self._weights
+        # How much its load had changed when a model woke last, N; 0 if something else woke it.
+        self._change = np.zeros(count)
+        self._woken_by = np.zeros(count)
+        self._known: Booleans = np.zeros((count, count + 1), dtype=bool)
+        self._at_rest = np.zeros((count, count + 1, 3))
+        self._mean = np.zeros((count, count + 1, 3))
+
+    def note(self, asleep: Booleans, awake: Booleans) -> None:
+        """Takes the loads of now as those at rest, between each of `asleep` (M,) and of `awake` (M,) that are new to each other."""
+        pairs = asleep[:, None] & np.append(awake, True)
+        new = pairs & ~self._known
+        self._known = pairs
+        if new.any():
+            now = self._forces()
+            self._at_rest[new] = self._mean[new] = now[new]
+
+    def changed(self, seconds: float) -> Booleans:
+        """Which models (M,) bear so much more, or are carried so much less, than at rest that they wake."""
+        self._mean += min(1.0, seconds / SMOOTH) * (self._forces() - self._mean)
+        change = np.where(self._known[..., None], self._mean - self._at_rest, 0.0).sum(axis=1)
+        before, now = self._at_rest @ self._up, self._mean @ self._up
+        lost = self._known & (before > CARRIES * self._weights[:, None]) & (now < LOST * before)
+        self._change = np.linalg.norm(change, axis=1)
+        woken: Booleans = (self._change > self._bears) | lost.any(axis=1)
+        return woken
+
+    def woke(self, models: Booleans, pressed: Booleans) -> None:
+        """Takes in that `models` (M,) woke, those of them that are `pressed` (M,) by a change of their load."""
+        self._woken_by[models] = np.where(pressed, self._change, 0.0)[models]
+
+    def bore(self, models: Booleans) -> None:
+        """Takes in that `models` (M,) came to rest where they lay before they woke."""
+        self._bears[models] = np.maximum(self._bears, BORE * self._woken_by)[models]
+
+    def _forces(self) -> Floats:
+        """The force (M, M + 1, 3) on each model at rest from each moving one, N in the world frame."""
+        results = cast(ContactResults, self._port.Eval(self._context))
+        forces = np.zeros_like(self._mean)
+        for number in range(results.num_point_pair_contacts()):
+            contact = results.point_pair_contact_info(number)
+            pair = contact.point_pair()
+            # Drake gives the force on B.
+            if pair.id_B in self._twin and pair.id_A in self._mover:
+                forces[self._twin[pair.id_B], self._mover[pair.id_A]] += contact.contact_force()
+            elif pair.id_A in self._twin and pair.id_B in self._mover:
+                forces[self._twin[pair.id_A], self._mover[pair.id_B]] -= contact.contact_force()
+        return forces

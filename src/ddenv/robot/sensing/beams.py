@@ -7,23 +7,15 @@ that point towards the box around it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
-from ddenv.robot.sensing.crossing import Facets, Interval, ball, cube, pill, tube
-from ddenv.robot.sensing.obstacles import HULL, KINDS, PILL, Obstacles
+from ddenv.robot.sensing.obstacles import HULL, PILL, SPARE, Interval, Shapes, ball, cube, pill, tube
 from ddenv.world.scenario import Lidar
 
-# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
-# larger than rounding errors.
-SPARE = 1e-6
 CROSSINGS = (cube, ball, tube)
-# Where each kind begins in a sorted array of kinds, and where the last one ends.
-BOUNDS = np.arange(len(KINDS) + 1)
 # Directions that differ by a full turn are the same.
 TURNS = np.array([[-math.tau], [0.0], [math.tau]])
 
@@ -56,58 +48,6 @@ class Fan:
         ends = counts.cumsum()
         beams = (first - ends + counts).repeat(counts)
         return counts.reshape(-1, 3).sum(axis=1), beams + np.arange(len(beams))
-
-
-@dataclass(frozen=True)
-class Shapes:
-    """N shapes, sorted by kind, at some instant; see `obstacles.py`.
-
-    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
-    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
-    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
-    in units of their radius, `facets` the faces of meshes by the number of the shape.
-    """
-
-    kinds: Integers
-    centers: Floats
-    frames: Floats
-    squares: Floats
-    reaches: Floats
-    lengths: Floats
-    facets: Mapping[int, Facets]
-
-    @cached_property
-    def firsts(self) -> list[int]:
-        """Where each kind begins, and where the last one ends."""
-        firsts: list[int] = self.kinds.searchsorted(BOUNDS).tolist()
-        return firsts
-
-    @classmethod
-    def of(cls, obstacles: Obstacles, rows: Integers) -> Shapes:
-        """The shapes `rows` (N,) of `obstacles`; shapes on moving links still in their link's frame."""
-        halves = obstacles.halves[:, rows]
-        squares = halves * halves
-        return cls(
-            kinds=obstacles.kinds[rows],
-            centers=obstacles.centers[:, rows],
-            frames=obstacles.turns[:, :, rows] / halves,
-            squares=squares,
-            reaches=np.sqrt(squares.sum(axis=0)) + SPARE,
-            lengths=obstacles.lengths[rows],
-            facets={new: obstacles.facets[old] for new, old in enumerate(rows.tolist()) if old in obstacles.facets},
-        )
-
-    def take(self, rows: Integers) -> Shapes:
-        """The shapes `rows` (K,) alone, in this order."""
-        return Shapes(
-            kinds=self.kinds[rows],
-            centers=self.centers.take(rows, axis=1),
-            frames=self.frames.take(rows, axis=2),
-            squares=self.squares.take(rows, axis=1),
-            reaches=self.reaches[rows],
-            lengths=self.lengths[rows],
-            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
-        )
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
+from ddenv.robot.protocol import Estimate
+from ddenv.world.pose import wrap
 from ddenv.world.scenario import Sensors
 
 # The standard deviation of a turn rate that is computed from the wheels of a skidding robot, rad/s.
@@ -14,20 +15,6 @@ SLIPPING = 0.1
 # Process noise of the heading, rad per square root of a second; it also keeps the gain defined where sensors have no noise.
 UNSEEN = 0.005
 SMALLEST = 1e-6  # rad
-
-
-class Estimate(NamedTuple):
-    """A pose estimate: position (m) and heading (rad in [-pi, pi]) in the world frame, speed forward (m/s), turn rate (rad/s).
-
-    `spread` are the standard deviations of x, y (m) and of the heading (rad), as the filter estimates them.
-    """
-
-    x: float
-    y: float
-    heading: float
-    speed: float = 0.0
-    turn_rate: float = 0.0
-    spread: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Filter:
@@ -118,8 +105,3 @@ class Filter:
         self._hh -= kh * hh
         self._hb -= kh * hb
         self._bb -= kb * hb
-
-
-def wrap(angle: float) -> float:
-    """`angle` (rad), wrapped into [-pi, pi]."""
-    return math.remainder(angle, math.tau)

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers
+from ddenv.robot.protocol import Scan
 from ddenv.robot.result import PoseRow
-from ddenv.robot.sensing.beams import SPARE, Ends, Fan, Shapes, cast
-from ddenv.robot.sensing.obstacles import Obstacles
-from ddenv.robot.sensing.sensors import Scan
+from ddenv.robot.sensing.beams import Ends, Fan, cast
+from ddenv.robot.sensing.obstacles import SPARE, Obstacles, Shapes
 from ddenv.world import scenario
 from ddenv.world.model import Model
 from ddenv.world.pose import Pose, Vector
@@ -57,7 +57,8 @@ class Lidar:
         there = np.array([name in present for name in obstacles.names], dtype=bool)
         self._obstacles = obstacles
         (self._rows,) = there[obstacles.owners].nonzero()
-        self._first = dict(zip((model.name for model in moving), _firsts(moving), strict=True))
+        firsts = accumulate((len(model.links) for model in moving), initial=0)
+        self._first = {model.name: first for model, first in zip(moving, firsts, strict=False)}
         self._gathered: Vector = (math.inf, math.inf, math.inf)
         # The shapes that beams may hit from near the pose at which they were collected.
         self._near: Near | None = None
@@ -151,12 +152,12 @@ class Lidar:
     def _gather(self, position: Vector) -> None:
         """Takes the shapes that move, and those that beams may reach until the lidar is `AWAY` m from `position`."""
         obstacles, rows = self._obstacles, self._rows
-        away = obstacles.centers[:, rows] - np.array(position)[:, None]
-        gaps = np.sqrt((away * away).sum(axis=0)) - np.sqrt((obstacles.halves[:, rows] ** 2).sum(axis=0))
+        away = obstacles.shapes.centers[:, rows] - np.array(position)[:, None]
+        gaps = np.sqrt((away * away).sum(axis=0)) - obstacles.shapes.reaches[rows]
         rows = rows[(obstacles.links[rows] >= 0) | (gaps <= (self._settings.range + AWAY + AROUND) * (1.0 + SPARE))]
         self._gathered = position
         self._owners = obstacles.owners[rows]
-        self._shapes = Shapes.of(obstacles, rows)
+        self._shapes = obstacles.shapes.take(rows)
         (self._movers,) = (obstacles.links[rows] >= 0).nonzero()
         owners = [obstacles.names[owner] for owner in self._owners[self._movers]]
         self._links = obstacles.links[rows][self._movers] + np.array([self._first[name] for name in owners], dtype=int)
@@ -193,11 +194,6 @@ class Lidar:
             if self._unseen[owner] and ranges is not None and math.isfinite(ranges[beam % count]):
                 self._unseen[owner] = False
                 self._first_seen[self._names[owner]] = turn.time
-
-
-def _firsts(models: Sequence[Model]) -> list[int]:
-    """The index of each model's first link among the links of all `models`."""
-    return [0, *accumulate(len(model.links) for model in models)][:-1]
 
 
 @dataclass(slots=True, eq=False)

@@ -6,18 +6,24 @@ and ellipsoids the same ball.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ddenv.arrays import Floats, Integers
-from ddenv.robot.drake.articulation import anchored
-from ddenv.robot.sensing.crossing import Facets
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World
-from ddenv.world.pose import Pose, Vector
+from ddenv.world.extent import shape_bounds
+from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Model, Plane, Shape, Sphere, World, still_links
+from ddenv.world.pose import HERE, Pose, Vector, vector
 
 # The kinds of shapes that are cast in the same way, in the order in which they are sorted.
 CUBE, BALL, TUBE, PILL, HULL = KINDS = range(5)
+# Where each kind begins in a sorted array of kinds, and where the last one ends.
+BOUNDS = np.arange(len(KINDS) + 1)
+# A shape is skipped only if it is out of the way by at least this margin (m, rad, and as a part of the range), which is far
+# larger than rounding errors.
+SPARE = 1e-6
 # A plane is the top of a cube of this size, m: what lies below it is inside.
 PLANE = 2e4
 # The minimum half thickness of a shape, m.
@@ -25,55 +31,87 @@ THINNEST = 1e-9
 
 
 @dataclass(frozen=True)
+class Shapes:
+    """N shapes, sorted by kind, at some instant.
+
+    `centers` (3, N) m are in the world frame. `frames` (3, 3, N) 1/m turn a vector along the world's axes (first index) into one
+    along the shape's own axes (second index), in which the shape lies between -1 and 1. `squares` (3, N) m^2 are the squares of
+    half the sizes, `reaches` (N,) m upper bounds of the distance from the center. `lengths` (N,) are the half lengths of capsules
+    in units of their radius, `facets` the faces of meshes by the number of the shape.
+    """
+
+    kinds: Integers
+    centers: Floats
+    frames: Floats
+    squares: Floats
+    reaches: Floats
+    lengths: Floats
+    facets: Mapping[int, Facets]
+
+    @cached_property
+    def firsts(self) -> list[int]:
+        """Where each kind begins, and where the last one ends."""
+        firsts: list[int] = self.kinds.searchsorted(BOUNDS).tolist()
+        return firsts
+
+    def take(self, rows: Integers) -> Shapes:
+        """The shapes `rows` (K,) alone, in this order."""
+        return Shapes(
+            kinds=self.kinds[rows],
+            centers=self.centers.take(rows, axis=1),
+            frames=self.frames.take(rows, axis=2),
+            squares=self.squares.take(rows, axis=1),
+            reaches=self.reaches[rows],
+            lengths=self.lengths[rows],
+            facets={new: self.facets[old] for new, old in enumerate(rows.tolist()) if old in self.facets},
+        )
+
+
+@dataclass(frozen=True)
 class Obstacles:
     """All N collision shapes of a world, sorted by kind.
 
     `names` are the world's models, `owners` (N,) the index of each shape's model in `names`. `links` (N,) is the index of the
-    shape's link in its model, -1 for a shape that never moves. `centers` (3, N) m and `turns` (3, 3, N) are the poses of the
-    shapes' frames: in the link's frame, or in the world frame for a shape that never moves. `halves` (3, N) m are half the
-    sizes. `lengths` (N,) are half lengths in units of the radius, for capsules. `facets` are the faces of meshes by
-    the number of the shape.
+    shape's link in its model, -1 for a shape that never moves. `shapes` on moving links are still in their link's frame.
     """
 
     names: tuple[str, ...]
     owners: Integers
     links: Integers
-    kinds: Integers
-    centers: Floats
-    turns: Floats
-    halves: Floats
-    lengths: Floats
-    facets: dict[int, Facets]
+    shapes: Shapes
 
     @classmethod
     def of(cls, world: World) -> Obstacles:
         found = [(owner, *one) for owner, model in enumerate(world.models) for one in _shapes(model)]
         found.sort(key=lambda one: _kind(one[2]))
         owners, links, shapes, poses = zip(*found, strict=True) if found else ((), (), (), ())
-        halves = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
-        return cls(
-            names=tuple(model.name for model in world.models),
-            owners=np.array(owners, dtype=int),
-            links=np.array(links, dtype=int),
+        sizes = np.maximum(np.array([_extent(shape)[1] for shape in shapes]).reshape(-1, 3), THINNEST)
+        halves = sizes.T.copy()
+        squares = halves * halves
+        turns = np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0)
+        arrays = Shapes(
             kinds=np.array([_kind(shape) for shape in shapes], dtype=int),
             centers=np.array([pose.position for pose in poses]).reshape(-1, 3).T.copy(),
-            turns=np.array([pose.rotation() for pose in poses]).reshape(-1, 3, 3).transpose(1, 2, 0).copy(),
-            halves=halves.T.copy(),
-            lengths=halves[:, 2] / halves[:, 0],
+            frames=turns / halves,
+            squares=squares,
+            reaches=np.sqrt(squares.sum(axis=0)) + SPARE,
+            lengths=sizes[:, 2] / sizes[:, 0],
             facets={
-                number: Facets.of(shape, np.array(_extent(shape)[0]), halves[number])
+                number: Facets.of(shape, np.array(_extent(shape)[0]), sizes[number])
                 for number, shape in enumerate(shapes)
                 if isinstance(shape, Mesh)
             },
         )
+        names = tuple(model.name for model in world.models)
+        return cls(names, np.array(owners, dtype=int), np.array(links, dtype=int), arrays)
 
 
 def _shapes(model: Model) -> list[tuple[int, Shape, Pose]]:
     """A model's shapes: the index of the link (-1 if it never moves), the shape, and its pose in the link or in the world."""
-    held = {link.name for link in model.links} if model.static else anchored(model)
+    still = {link.name for link in still_links(model)}
     found = []
     for number, link in enumerate(model.links):
-        fixed = link.name in held
+        fixed = link.name in still
         frame = Pose() if fixed else link.pose.inverse()
         for one in link.collisions:
             found.append((-1 if fixed else number, one.shape, frame @ one.pose @ Pose(_extent(one.shape)[0])))
@@ -97,21 +135,100 @@ def _kind(shape: Shape) -> int:
 
 def _extent(shape: Shape) -> tuple[Vector, Vector]:
     """Of the box around `shape` along its own axes: the middle, and half the size, m."""
-    middle: Vector = (0.0, 0.0, 0.0)
-    match shape:
-        case Box((x, y, z)):
-            return middle, (x / 2, y / 2, z / 2)
-        case Plane():
-            return (0.0, 0.0, -PLANE / 2), (PLANE / 2, PLANE / 2, PLANE / 2)
-        case Sphere(radius):
-            return middle, (radius, radius, radius)
-        case Ellipsoid(radii):
-            return middle, radii
-        case Cylinder(radius, length):
-            return middle, (radius, radius, length / 2)
-        case Capsule(radius, length):
-            return middle, (radius, radius, length / 2 + radius)
-        case Mesh():
-            low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
-            return tuple(((low + high) / 2).tolist()), tuple(((high - low) / 2).tolist())
-    raise TypeError(type(shape).__name__)
+    if isinstance(shape, Plane):
+        return (0.0, 0.0, -PLANE / 2), (PLANE / 2, PLANE / 2, PLANE / 2)
+    low, high = shape_bounds(shape, HERE)
+    return vector((low + high) / 2), vector((high - low) / 2)
+
+
+# Added to divisors that may be 0: a beam along a face then crosses it, but far away. It is too small to change anything else.
+NEVER = 1e-200
+# The minimum half length of a capsule's straight part, as a part of its radius.
+SHORTEST = 1e-9
+
+Interval = tuple[Floats, Floats]
+
+
+def cube(start: Floats, way: Floats) -> Interval:
+    """The cube from -1 to 1; with fewer than three rows, what lies between -1 and 1 along these axes alone."""
+    metres = 1.0 / (way + NEVER)
+    middle, half = start * metres, np.abs(metres)
+    return -(middle + half).min(axis=0), (half - middle).min(axis=0)
+
+
+def ball(start: Floats, way: Floats) -> Interval:
+    """The ball of radius 1; with two rows, the endless cylinder about the third axis."""
+    speed = _dot(way, way) + NEVER
+    nearest = -_dot(start, way) / speed
+    # From the point of the beam nearest to the centre: seen from a far start, digits would be lost.
+    point = start + nearest * way
+    inside = 1.0 - _dot(point, point)
+    half = np.sqrt(np.maximum(inside, 0.0) / speed)
+    return nearest - half, np.where(inside < 0, -np.inf, nearest + half)
+
+
+def tube(start: Floats, way: Floats) -> Interval:
+    """The cylinder of radius 1 about the third axis, with its end faces."""
+    enter, leave = ball(start[:2], way[:2])
+    below, above = cube(start[2:], way[2:])
+    return np.maximum(enter, below), np.minimum(leave, above)
+
+
+def pill(start: Floats, way: Floats, lengths: Floats) -> Interval:
+    """The capsule about the third axis whose half length is `lengths` (P,) times its radius."""
+    start, way = start.copy(), way.copy()
+    start[2] *= lengths
+    way[2] *= lengths
+    ends = np.maximum(lengths - 1.0, SHORTEST)
+    parts = [tube(np.stack([start[0], start[1], start[2] / ends]), np.stack([way[0], way[1], way[2] / ends]))]
+    for end in (-ends, ends):
+        parts.append(ball(np.stack([start[0], start[1], start[2] - end]), way))
+    missed = [enter > leave for enter, leave in parts]
+    enters = [np.where(miss, np.inf, enter) for miss, (enter, _) in zip(missed, parts, strict=True)]
+    leaves = [np.where(miss, -np.inf, leave) for miss, (_, leave) in zip(missed, parts, strict=True)]
+    return np.min(enters, axis=0), np.max(leaves, axis=0)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    dot: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] if len(a) == 3 else a[0] * b[0] + a[1] * b[1]
+    return dot
+
+
+@dataclass(frozen=True)
+class Facets:
+    """A convex mesh as the intersection of the half spaces behind its faces, in the frame in which it lies between -1 and 1.
+
+    `corners` (3, V) are its vertices, `faces` (3, M) indices of vertices. A point p is behind face m if
+    `normals[:, m] @ p <= offsets[m]`; `normals` (3, M), `offsets` (M,).
+    """
+
+    corners: Floats
+    faces: Integers
+    normals: Floats
+    offsets: Floats
+
+    @classmethod
+    def of(cls, mesh: Mesh, middle: Floats, half: Floats) -> Facets:
+        """The facets of `mesh`, whose box has its centre at `middle` (3,) m and half the size `half` (3,) m."""
+        corners = (mesh.vertices - middle) / half
+        start, second, third = (corners[mesh.faces[:, number]] for number in range(3))
+        normals = np.cross(second - start, third - start)
+        sizes = np.sqrt((normals * normals).sum(axis=1))
+        faces, normals = mesh.faces[sizes > 0], normals[sizes > 0] / sizes[sizes > 0, None]
+        # A sliver's normal may be wrong: with this offset its face still cuts off no vertex.
+        offsets = (normals @ corners.T).max(axis=1)
+        return cls(corners.T.copy(), faces.T.copy(), normals.T.copy(), offsets)
+
+    def cast(self, start: Floats, way: Floats, normal: Floats) -> Interval:
+        """Where beams from `start` (3,) along `way` (3, P), orthogonal to `normal` (3,), enter and leave."""
+        corners = self.corners - start[:, None]
+        heights = (normal[0] * corners[0] + normal[1] * corners[1] + normal[2] * corners[2])[self.faces]
+        (cut,) = ((heights.min(axis=0) <= 0) & (heights.max(axis=0) >= 0)).nonzero()
+        if not len(cut):
+            return np.full(way.shape[1], np.inf), np.full(way.shape[1], -np.inf)
+        out = self.normals.take(cut, axis=1)[:, :, None]
+        above = out[0] * start[0] + out[1] * start[1] + out[2] * start[2] - self.offsets[cut, None]
+        rise = out[0] * way[0] + out[1] * way[1] + out[2] * way[2] + NEVER
+        crossing = -above / rise
+        enter = np.where(rise < 0, crossing, -np.inf).max(axis=0)
+        return enter, np.where(rise > 0, crossing, np.inf).min(axis=0)

@@ -3,50 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ddenv.arrays import Floats
-from ddenv.world.pose import Vector
+from ddenv.robot.protocol import Imu
 from ddenv.world.scenario import Sensors
-
-
-class Imu(NamedTuple):
-    """The turn rate about the robot's own vertical axis (rad/s), roll and pitch (rad)."""
-
-    yaw_rate: float
-    roll: float
-    pitch: float
-
-
-@dataclass(frozen=True, slots=True)
-class Scan:
-    """One scan of the lidar, taken at one instant (`time`, s).
-
-    `angles` (N,) rad are the beams' directions in the robot's frame, counterclockwise from its x axis. `ranges` (N,) m are the
-    measured distances, infinite where a beam hit nothing. `origin` (m) is the lidar's position in the frame of the robot's first
-    link.
-    """
-
-    time: float
-    angles: Floats
-    ranges: Floats
-    origin: Vector
-
-    def within(self, limits: Floats) -> Floats:
-        """The ranges, infinite where they exceed `limits` (N,) m: then what lies beyond takes no part in the run."""
-        ranges: Floats = np.where(self.ranges <= limits, self.ranges, np.inf)
-        return ranges
-
-    def points(self) -> Floats:
-        """Where beams hit something, shape (M, 3) m, in the frame of the robot's first link."""
-        met = np.isfinite(self.ranges)
-        ranges, angles = self.ranges[met], self.angles[met]
-        x, y, z = self.origin
-        return np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles), np.full(len(ranges), z)])
-
 
 # Random numbers drawn at once: drawing them one at a time would cost more than all that is done with them.
 DRAWN = 256

@@ -34,7 +34,7 @@ from ddenv.workbench.map.picture import (
 )
 from ddenv.workbench.map.place import Point, Shown
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.world.motion import pose_of
+from ddenv.world.pose import pose_of
 
 T = TypeVar("T")
 # Dots of the original path, or of the second way, and of the gaps in it.

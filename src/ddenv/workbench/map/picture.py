@@ -15,12 +15,13 @@ from textual.strip import Strip
 from ddenv.map.cells import Cell, place_signs
 from ddenv.map.colors import NUMBERED, readable
 from ddenv.map.paint import Canvas
-from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, heading, owners, spans
+from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, owners, spans
 from ddenv.runfile.store import Live
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts
 from ddenv.workbench.map.place import Point, Way
 from ddenv.workbench.shared.poll import Snapshot
+from ddenv.world.pose import heading
 
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
 

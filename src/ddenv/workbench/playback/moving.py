@@ -14,7 +14,7 @@ from ddenv.runs.playback import Played
 from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.place import Place, Way
 from ddenv.workbench.shared.poll import Snapshot
-from ddenv.world.motion import pose_at
+from ddenv.world.pose import pose_at
 
 
 class Moving:

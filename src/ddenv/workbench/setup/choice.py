@@ -46,7 +46,7 @@ class Choice:
     def robot(self) -> Model:
         """Raises UserError if its file cannot be read."""
         from ddenv.runs.subject import read_parts
-        from ddenv.world.read import read_model
+        from ddenv.world.sdf.read import read_model
 
         if not self.run:
             return read_model(self.settings.robot.model, self.reading)
@@ -155,7 +155,7 @@ def _ground(world: World, x: float, y: float) -> float | None:
 
 def _clearance(world: World, settings: Scenario, placed: bool) -> float:
     """The scenario's clearance, or else the clearance that the robot's shapes need."""
-    from ddenv.world.read import read_model
+    from ddenv.world.sdf.read import read_model
 
     above = _scenario_clearance(world, settings) if placed else None
     if above is not None:

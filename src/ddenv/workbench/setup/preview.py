@@ -83,7 +83,7 @@ class StartNotes(Static):
 
 def notes(choice: Choice, spawn: tuple[float, ...] | None) -> tuple[tuple[str, str], ...]:
     """What is wrong with the start, as the run would note it: a word and a sentence for each."""
-    from ddenv.world.inside import note_inside, notes_on_start
+    from ddenv.world.placement import note_inside, notes_on_start
     from ddenv.world.scenario import Spawn
 
     try:

@@ -48,7 +48,7 @@ def remember_remedies(chosen: Mapping[str, str]) -> None:
 
 def remedy(text: str) -> str:
     """What the user typed, as a remedy: a stand-in, or else the path of a folder. Raises UserError."""
-    from ddenv.world.files.access import is_folder, without_tilde
+    from ddenv.world.access import is_folder, without_tilde
     from ddenv.world.sdf.standin import AUTO, NONE, parse_stand_in
 
     text = text.strip()
@@ -79,8 +79,8 @@ def read_with_remedies(
     `reading` is the scenario's own, `options` are as on the command line. Raises UserError.
     """
     from ddenv.runs.subject import reading_of
-    from ddenv.world.files.access import MissingFiles
-    from ddenv.world.read import read_world
+    from ddenv.world.access import MissingFiles
+    from ddenv.world.sdf.read import read_world
     from ddenv.world.sdf.standin import AUTO
 
     known, found, vain = remembered(), dict[str, str](), dict[str, str]()

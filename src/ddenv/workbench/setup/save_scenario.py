@@ -51,7 +51,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     Files in the folder of `path` are named relative to it, so that the folder can be moved.
     """
     from ddenv.runs.trust import scenario_text
-    from ddenv.world.files.access import write_file
+    from ddenv.world.access import write_file
 
     for each in (scenario.world, scenario.robot.model):
         if not each.is_file():

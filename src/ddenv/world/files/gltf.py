@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from ddenv.world.files.access import Unusable, read
+from ddenv.world.access import Unusable, read
 from ddenv.world.files.triangles import MOST_PARTS, Part, check_count, parts_of
 
 # Accepted accessors of positions (32-bit floats) and of vertex indices (8, 16 and 32 bits).

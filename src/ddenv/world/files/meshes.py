@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ddenv.world.files.access import Unusable, read
+from ddenv.world.access import Unusable, read
 from ddenv.world.files.dae import read_dae
 from ddenv.world.files.gltf import read_gltf
 from ddenv.world.files.hull import convex_hull
@@ -47,7 +47,8 @@ def read_parts(path: Path) -> list[Part]:
     data = read(path, MESH_LIMIT)
     try:
         with _quiet():
-            return _read(suffix, data, path.parent)
+            plain = {".obj": read_obj, ".stl": read_stl, ".dae": read_dae}.get(suffix)
+            return read_gltf(data, path.parent, MESH_LIMIT) if plain is None else plain(data)
     except Unusable:
         raise
     except MemoryError:
@@ -72,16 +73,6 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _read(suffix: str, data: bytes, folder: Path) -> list[Part]:
-    if suffix == ".obj":
-        return read_obj(data)
-    if suffix == ".stl":
-        return read_stl(data)
-    if suffix == ".dae":
-        return read_dae(data)
-    return read_gltf(data, folder, MESH_LIMIT)
-
-
 def _line(text: str) -> str:
     text = " ".join(text.split())
     return text if len(text) <= 200 else text[:199] + "…"
@@ -100,16 +91,15 @@ def build(parts: list[Part], name: str, *, submesh: str = "", center: bool = Fal
         # Adding zero makes -0.0 the same as 0.0.
         vertices = vertices + 0.0
         too_fine = not convex and len(faces) > MOST_DRAWN
-        vertices, faces = convex_hull(vertices) if convex or too_fine else _merged(vertices, faces)
+        if convex or too_fine:
+            vertices, faces = convex_hull(vertices)
+        else:
+            # Without duplicate vertices.
+            vertices, places = np.unique(vertices, axis=0, return_inverse=True)
+            faces = places.reshape(-1)[faces]
     except ValueError as error:
         raise Unusable(_line(str(error))) from None
     return _mesh(name, pack(vertices, faces, simplified=too_fine))
-
-
-def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same without duplicate vertices."""
-    unique, places = np.unique(vertices, axis=0, return_inverse=True)
-    return unique, places.reshape(-1)[faces]
 
 
 def _checked(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

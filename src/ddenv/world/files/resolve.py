@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ddenv.world.files.access import Missing, Unusable, is_folder, read, reason, without_tilde
+from ddenv.world.access import Missing, Unusable, is_folder, read, reason, without_tilde
 
 HOSTS = ("fuel.gazebosim.org", "fuel.ignitionrobotics.org")
 CACHES = ("~/.gz/fuel", "~/.ignition/fuel")
@@ -223,7 +223,9 @@ def model_file(folder: Path) -> Path:
         return _first([folder / "model.sdf"], "the folder has neither model.config nor model.sdf")
     name = _configured(read(config, MODEL_CONFIG_LIMIT))
     if not name:
-        return _first([folder / "model.sdf"], f"model.config names no file for SDF {_dotted(NEWEST_SDF)} or older")
+        return _first(
+            [folder / "model.sdf"], f"model.config names no file for SDF {'.'.join(map(str, NEWEST_SDF))} or older"
+        )
     try:
         path = _inside(name)
     except Unusable as error:
@@ -262,7 +264,3 @@ def _version(text: str) -> tuple[int, ...]:
     """The version as numbers, since 1.12 is newer than 1.9; (0, 0) for anything else."""
     match = re.fullmatch(r"\s*(\d{1,4})(?:\.(\d{1,4}))?(?:\.\d{1,4})*\s*", text)
     return (0, 0) if match is None else (int(match[1]), int(match[2] or 0))
-
-
-def _dotted(version: tuple[int, ...]) -> str:
-    return ".".join(map(str, version))

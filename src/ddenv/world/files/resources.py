@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
-from ddenv.world.files.access import Missing, Unusable, is_folder, read, size_of
-from ddenv.world.files.built_in import built_in
+from ddenv.world.access import Missing, Unusable, is_folder, read, size_of
 from ddenv.world.files.meshes import MESH_LIMIT, build, origin, pack, read_parts, unpack
-from ddenv.world.files.resolve import find, model_file, search_folders
+from ddenv.world.files.resolve import find, model_file, model_named, search_folders
 from ddenv.world.files.triangles import Part
 from ddenv.world.model import Mesh
 
@@ -104,7 +103,13 @@ class Stored:
 
     def sdf(self, uri: str, base: Path) -> tuple[Path, bytes]:
         key = _key("sdf", uri, str(base))
-        return self._sdfs.get(key, lambda: _unpack_sdf(self._bytes(key)))
+        return self._sdfs.get(key, lambda: self._unpacked(key))
+
+    def _unpacked(self, key: str) -> tuple[Path, bytes]:
+        path, end, text = self._bytes(key).partition(b"\0")
+        if not end or not path:
+            raise Unusable("its stored file is damaged")
+        return Path(path.decode("utf-8", "surrogateescape")), text
 
     def mesh(self, uri: str, base: Path, *, submesh: str = "", center: bool = False, convex: bool) -> Mesh:
         key = _key("mesh", uri, str(base), submesh, center, convex)
@@ -141,8 +146,23 @@ def _key(*request: str | bool) -> str:
     return json.dumps(request)
 
 
-def _unpack_sdf(packed: bytes) -> tuple[Path, bytes]:
-    path, end, text = packed.partition(b"\0")
-    if not end or not path:
-        raise Unusable("its stored file is damaged")
-    return Path(path.decode("utf-8", "surrogateescape")), text
+# In place of a folder: messages name it.
+FOLDER = Path("built in")
+# As in Gazebo's own models: the ground has no end, and wheels grip it.
+_TEXTS = {
+    "sun": "<light name='sun' type='directional'/>",
+    "ground_plane": (
+        "<model name='ground_plane'><static>true</static><link name='link'>"
+        "<collision name='collision'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+        "<surface><friction><ode><mu>100</mu><mu2>50</mu2></ode></friction></surface></collision>"
+        "<visual name='visual'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+        "<material><script><name>Gazebo/Grey</name></script></material></visual></link></model>"
+    ),
+}
+
+
+def built_in(uri: str) -> tuple[Path, bytes] | None:
+    """A name in place of a path, and the SDF text, of the built-in model that `uri` names; None if there is none."""
+    name = model_named(uri)
+    text = _TEXTS.get(name)
+    return None if text is None else (FOLDER / f"{name}.sdf", f"<sdf version='1.5'>{text}</sdf>".encode())

@@ -1,1 +1,1 @@
-"""Reads SDF elements into plain data; the entry point is `ddenv.world.read`."""
+"""Reads SDF elements into plain data; the entry point is `ddenv.world.sdf.read`."""

@@ -111,7 +111,10 @@ class _Builder:
         if not self.static:
             self.joints += read_joints(JointSite(scope, spot.nominal, spot.prefix, self.poses), self.context)
         if spot.saved is not None:
-            self._note_unknown(scope, spot.saved)
+            known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
+            for name in (*spot.saved.links, *spot.saved.models):
+                if name not in known:
+                    self.context.note("ignored", spot.saved.element, f"the model has no '{name[:80]}'")
 
     def _add_link(self, element: Element, scope: Scope, spot: Spot) -> None:
         own = name_of(element)
@@ -137,19 +140,11 @@ class _Builder:
         prefix = f"{spot.prefix}{part.name}::"
         self.add(scope.inside(part), Spot(spot.nominal @ local, there, prefix, saved, spot.scale))
         if _is_static(part) and not self.static:
-            self._hold(self.links[before:])
-
-    def _hold(self, links: list[Link]) -> None:
-        """Welds the links of a static model nested in a moving one to the world."""
-        held = {link.name for link in links}
-        self.joints = [joint for joint in self.joints if joint.child not in held]
-        self.joints += [_weld(link) for link in links]
-
-    def _note_unknown(self, scope: Scope, saved: Saved) -> None:
-        known = {name_of(link) for link in scope.element.findall("link")} | {part.name for part in scope.parts}
-        for name in (*saved.links, *saved.models):
-            if name not in known:
-                self.context.note("ignored", saved.element, f"the model has no '{name[:80]}'")
+            # A static model nested in a moving one: its links are welded to the world.
+            links = self.links[before:]
+            held = {link.name for link in links}
+            self.joints = [joint for joint in self.joints if joint.child not in held]
+            self.joints += [Joint(f"{link.name} (static)", "fixed", WORLD, link.name, link.pose) for link in links]
 
 
 def _is_static(part: Part) -> bool:
@@ -164,22 +159,6 @@ def _nothing(element: Element, pose: Pose, static: bool, context: Context) -> Li
     return Link("link", pose, None, (), ())
 
 
-def _weld(link: Link) -> Joint:
-    return Joint(
-        name=f"{link.name} (static)",
-        kind="fixed",
-        parent=WORLD,
-        child=link.name,
-        pose=link.pose,
-        axis=(0.0, 0.0, 1.0),
-        lower=-math.inf,
-        upper=math.inf,
-        effort=math.inf,
-        velocity=math.inf,
-        damping=0.0,
-    )
-
-
 def _held(model: Model, element: Element, context: Context) -> Model:
     """`model`, a ground that the file calls dynamic, made static, as simulators do."""
     context.note("replaced", element, "static, since an infinite plane does not move")
@@ -189,7 +168,7 @@ def _held(model: Model, element: Element, context: Context) -> Model:
 
 def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
     distances = [math.dist(pose.nominal.position, pose.actual.position) for pose in poses]
-    turns = [abs(_half_turn(pose.nominal.inverse() @ pose.actual)) for pose in poses]
+    turns = [math.hypot(*(pose.nominal.inverse() @ pose.actual).quaternion[1:]) for pose in poses]
     farthest = max(distances, default=0.0)
     if farthest > MOVED:
         context.note("replaced", saved.element, "its own <pose> by the one in <state>", f"{farthest:.2f} m away")
@@ -198,11 +177,6 @@ def _note_move(poses: list[LinkPose], saved: Saved, context: Context) -> None:
     if saved.scale != ONE:
         scale = " ".join(f"{part:g}" for part in saved.scale)
         context.note("replaced", saved.element, f"its sizes by those with <scale> {scale}")
-
-
-def _half_turn(pose: Pose) -> float:
-    """The sine of half the angle of rotation of a pose."""
-    return math.hypot(*pose.quaternion[1:])
 
 
 def _note_differences(builder: _Builder, element: Element, context: Context) -> None:

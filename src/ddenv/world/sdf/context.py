@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import MissingFiles, Unusable
+from ddenv.world.access import MissingFiles, Unusable
 from ddenv.world.files.resources import Resources
 from ddenv.world.model import Note
 from ddenv.world.scenario import PLAIN, Reading
@@ -175,17 +175,10 @@ def note_unread(element: Element, context: Context) -> None:
             once.add(child.tag)
         if child.tag not in quiet:
             extension = "}" in child.tag or ":" in child.tag
-            context.note("ignored", child, REASONS.get(child.tag, _unknown(extension)))
+            unknown = f"an unknown {'extension' if extension else 'element'} of SDF"
+            context.note("ignored", child, REASONS.get(child.tag, unknown))
         elif len(child):
-            _note_inside(child, context)
+            if child.tag in INSIDE:
+                note_unread(child, context)
         elif (element.tag, child.tag) in WITHOUT and any(floats(child)):
             context.note("ignored", child, WITHOUT[element.tag, child.tag])
-
-
-def _note_inside(child: Element, context: Context) -> None:
-    if child.tag in INSIDE:
-        note_unread(child, context)
-
-
-def _unknown(extension: bool) -> str:
-    return "an unknown extension of SDF" if extension else "an unknown element of SDF"

@@ -57,7 +57,7 @@ class Scope:
         # A loop, since chains of frames may be longer than Python's stack.
         chain: dict[str, Element | Part] = {}
         at, asked_by = name, asker
-        while not self._is_known(at):
+        while not (at in OWN or at in self._poses or (at == WORLD and self.element.tag != "model")):
             if at in chain:
                 names = [*chain, at][list(chain).index(at) :]
                 raise complain(asker, f"the frames form a cycle: {shown(names)}")
@@ -84,9 +84,6 @@ class Scope:
         if element is not None and element.get("frame") and version(element) >= (1, 7):
             self._context.note("ignored", element, "the attribute 'frame' has no effect since SDF 1.7; use relative_to")
         return local if base in OWN else self.pose(base, holder if element is None else element) @ local
-
-    def _is_known(self, name: str) -> bool:
-        return name in OWN or name in self._poses or (name == WORLD and self.element.tag != "model")
 
     def _find(self, name: str, asker: Element) -> Element | Part:
         """The thing called `name`; for `a::b` inside a part, the part `a`. Raises UserError."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ddenv.world.access import Missing, Unusable
 from ddenv.world.extent import convex_hull, polygon_area
-from ddenv.world.files.access import Missing, Unusable
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, refuse
@@ -204,18 +204,11 @@ def _sizes(parent: Element, tag: str, scale: tuple[float, ...]) -> tuple[float, 
         raise complain(parent, f"has no <{tag}>")
     values = tuple(value * factor for value, factor in zip(numbers(element, len(scale)), scale, strict=True))
     if min(values) < SMALLEST or max(values) > LARGEST:
+        saved = f" times the saved scale {' '.join(f'{each:g}' for each in scale)}" if set(scale) != {1.0} else ""
         raise complain(
-            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found '{text_of(element)[:60]}'{_by(scale)}"
+            element, f"sizes must be from {SMALLEST:g} to {LARGEST:g} m, found '{text_of(element)[:60]}'{saved}"
         )
     return values
-
-
-def _by(scale: tuple[float, ...]) -> str:
-    return (
-        ""
-        if all(factor == 1.0 for factor in scale)
-        else f" times the saved scale {' '.join(f'{each:g}' for each in scale)}"
-    )
 
 
 def _checked(shape: Shape, element: Element) -> Shape:

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ddenv.world.files.access import Missing
-from ddenv.world.files.built_in import FOLDER
-from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from ddenv.world.access import Missing
+from ddenv.world.files.resources import FOLDER
 from ddenv.world.sdf.context import Context, note_unread, refuse, sdf_root
-from ddenv.world.sdf.guess import guess
-from ddenv.world.sdf.standin import NONE, SIZES, StandIn
+from ddenv.world.sdf.standin import NONE, SIZES, StandIn, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, text_of, truth
+from ddenv.world.write import primitive
 
 # Intangible things that an included file may hold in place of a model.
 UNTOUCHABLE = ("actor", "light")
@@ -146,26 +145,12 @@ def _stand_in_root(include: Element, text: str, stand_in: StandIn) -> Element:
     """A file with one static model of the stand-in's shape."""
     if stand_in.shape is None:
         raise complain(include, f"the stand-in '{text}' is for meshes; use one of {', '.join(SIZES)} for a whole model")
-    geometry = _geometry_text(stand_in.shape)
+    kind, sizes = primitive(stand_in.shape)
+    words = "".join(f"<{tag}>{' '.join(map(repr, values))}</{tag}>" for tag, values in sizes.items())
     pose = " ".join(repr(value) for value in (*stand_in.center, 0.0, 0.0, 0.0))
-    inside = f"<pose>{pose}</pose><geometry>{geometry}</geometry>"
+    inside = f"<pose>{pose}</pose><geometry><{kind}>{words}</{kind}></geometry>"
     sdf = (
         '<sdf version="1.12"><model name="stand-in"><static>true</static><link name="link">'
         f'<collision name="stand-in">{inside}</collision></link></model></sdf>'
     )
     return sdf_root(sdf.encode(), include.source.parent / f"{STAND_IN}{text}")
-
-
-def _geometry_text(shape: Shape) -> str:
-    match shape:
-        case Box(size):
-            return f"<box><size>{size[0]!r} {size[1]!r} {size[2]!r}</size></box>"
-        case Cylinder(radius, length):
-            return f"<cylinder><radius>{radius!r}</radius><length>{length!r}</length></cylinder>"
-        case Sphere(radius):
-            return f"<sphere><radius>{radius!r}</radius></sphere>"
-        case Capsule(radius, length):
-            return f"<capsule><radius>{radius!r}</radius><length>{length!r}</length></capsule>"
-        case Ellipsoid(radii):
-            return f"<ellipsoid><radii>{radii[0]!r} {radii[1]!r} {radii[2]!r}</radii></ellipsoid>"
-    raise TypeError(type(shape).__name__)

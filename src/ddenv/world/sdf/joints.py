@@ -83,11 +83,13 @@ def _joint(element: Element, kind: str, site: JointSite, context: Context) -> Jo
         upper=_limit_of(limit, "upper", math.inf),
         effort=_limit(axis, "effort"),
         velocity=_limit(axis, "velocity"),
-        damping=0.0 if dynamics is None else _damping(dynamics),
+        damping=0.0 if dynamics is None else number(dynamics, "damping", 0.0),
         axis2=None if second is None else moved.rotate(second),
     )
     if limit is not None and (joint.lower > joint.upper or joint.lower == math.inf or joint.upper == -math.inf):
         raise complain(limit, f"the lower limit {joint.lower:g} is above the upper limit {joint.upper:g}")
+    if dynamics is not None and joint.damping < 0:
+        raise complain(dynamics, f"damping must not be negative, found {joint.damping:g}")
     return _relative_to_start(joint, first, site.links)
 
 
@@ -149,14 +151,10 @@ def _relative_to_start(joint: Joint, axis: Vector, links: dict[str, LinkPose]) -
     else:
         w, *turn = (seen @ child.nominal.inverse()).quaternion
         here = 2 * math.atan2(sum(a * b for a, b in zip(turn, axis, strict=True)), w)
-        here = _nearest_turn(here, joint.lower, joint.upper)
+        # Plus the whole number of turns that brings it nearest to the limits.
+        turns = [here + 2 * math.pi * number for number in (0, 1, -1, 2, -2)]
+        here = min(turns, key=lambda turn: max(joint.lower - turn, turn - joint.upper, 0.0))
     return replace(joint, lower=joint.lower - here, upper=joint.upper - here)
-
-
-def _nearest_turn(angle: float, lower: float, upper: float) -> float:
-    """`angle` plus the whole number of turns that brings it nearest to the limits, rad."""
-    turns = (angle + 2 * math.pi * number for number in (0, 1, -1, 2, -2))
-    return min(turns, key=lambda turn: max(lower - turn, turn - upper, 0.0))
 
 
 def _note_unlimited(element: Element, kind: str, context: Context) -> None:
@@ -188,13 +186,6 @@ def _limit(axis: Element | None, tag: str) -> float:
     limit = None if axis is None else axis.find("limit")
     value = _limit_of(limit, tag, -1.0)
     return math.inf if value < 0 or value >= UNLIMITED else value
-
-
-def _damping(dynamics: Element) -> float:
-    damping = number(dynamics, "damping", 0.0)
-    if damping < 0:
-        raise complain(dynamics, f"damping must not be negative, found {damping:g}")
-    return damping
 
 
 def check_tree(joints: list[Joint], element: Element) -> None:
@@ -231,7 +222,11 @@ def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | 
         seen[name] = None
         thing = scope.named.get(name)
         if thing is None:
-            return _inside(scope, name, asker, context) if "::" in name else None
+            first, _, rest = name.partition("::")
+            model = scope.named.get(first) if "::" in name else None
+            return (
+                _joined(first, link_of(scope.inside(model), rest, asker, context)) if isinstance(model, Part) else None
+            )
         if isinstance(thing, Part):
             return _joined(name, _canonical(scope.inside(thing), asker, context))
         if thing.tag == "link":
@@ -240,35 +235,22 @@ def link_of(scope: Scope, name: str, asker: Element, context: Context) -> str | 
     return _canonical(scope, asker, context)
 
 
-def _inside(scope: Scope, name: str, asker: Element, context: Context) -> str | None:
-    first, rest = name.split("::", 1)
-    thing = scope.named.get(first)
-    if not isinstance(thing, Part):
-        return None
-    return _joined(first, link_of(scope.inside(thing), rest, asker, context))
-
-
 def _joined(model: str, link: str | None) -> str | None:
     return None if link is None else f"{model}::{link}"
 
 
 def _canonical(scope: Scope, asker: Element, context: Context) -> str | None:
     """The link that a model's own frame is attached to: its `canonical_link`, else its first link."""
-    key = id(scope.element)
-    if key not in context.canonical:
-        context.canonical[key] = _find_canonical(scope, asker, context)
-    return context.canonical[key]
-
-
-def _find_canonical(scope: Scope, asker: Element, context: Context) -> str | None:
-    named = scope.element.get("canonical_link")
+    key, found = id(scope.element), None
+    if key in context.canonical:
+        return context.canonical[key]
+    named, first = scope.element.get("canonical_link"), scope.element.find("link")
     if named:
-        return None if named in OWN else link_of(scope, named, asker, context)
-    first = scope.element.find("link")
-    if first is not None:
-        return name_of(first)
-    for part in scope.parts:
-        link = _joined(part.name, _canonical(scope.inside(part), asker, context))
-        if link is not None:
-            return link
-    return None
+        found = None if named in OWN else link_of(scope, named, asker, context)
+    elif first is not None:
+        found = name_of(first)
+    else:
+        links = (_joined(part.name, _canonical(scope.inside(part), asker, context)) for part in scope.parts)
+        found = next((link for link in links if link is not None), None)
+    context.canonical[key] = found
+    return found

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.world.extent import shape_bounds
+from ddenv.world.extent import around, shape_bounds
 from ddenv.world.model import Box, Collision, Link, Visual
 from ddenv.world.pose import HERE, ONE, Pose, Vector, vector
 from ddenv.world.sdf.context import Context, note_unread
 from ddenv.world.sdf.frames import Scope, pose_of
 from ddenv.world.sdf.geometry import Lost, Placed, read_shape, remedies, scaled_stand_in
-from ddenv.world.sdf.guess import guess
 from ddenv.world.sdf.inertia import WATER, read_density, read_inertia
-from ddenv.world.sdf.standin import AUTO, NONE
+from ddenv.world.sdf.standin import AUTO, NONE, guess
 from ddenv.world.sdf.xml import Element, complain, name_of, number, numbers, text_of, truth
 
 Color = tuple[float, float, float, float]
@@ -69,6 +68,8 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
     note_unread(element, context)
     items = [_item(child, scope, site, context) for child in element if child.tag in ("collision", "visual")]
     collisions, density = [], []
+    inertial = element.find("inertial")
+    usual = WATER if inertial is None else read_density(inertial, WATER)
     for item in items:
         if item.element.tag == "collision":
             placed = _settled(item, items, element, context)
@@ -76,7 +77,7 @@ def read_link(element: Element, scope: Scope, site: Site, context: Context) -> L
                 pose = site.pose @ item.pose @ placed.offset
                 mu = read_friction(item.element, context)
                 collisions.append(Collision(name_of(item.element), placed.shape, pose, mu))
-                density.append(read_density(item.element, _density(element)))
+                density.append(read_density(item.element, usual))
     inertia = read_inertia(element, site.pose, collisions, density, context) if site.moving else None
     kinematic = element.find("kinematic")
     if kinematic is not None and site.moving and truth(element, "kinematic", False):
@@ -96,17 +97,10 @@ class _Item:
 def _item(child: Element, scope: Scope, site: Site, context: Context) -> _Item:
     note_unread(child, context)
     name_of(child)
-    pose = child.find("pose")
+    pose, local = child.find("pose"), scope.place(child)
     if pose is not None and (pose.get("relative_to") or pose.get("frame")):
-        local = site.local.inverse() @ scope.place(child)
-    else:
-        local = scope.place(child)
+        local = site.local.inverse() @ local
     return _Item(child, local, read_shape(child, context, site.scale))
-
-
-def _density(link: Element) -> float:
-    inertial = link.find("inertial")
-    return WATER if inertial is None else read_density(inertial, WATER)
 
 
 def _settled(item: _Item, items: list[_Item], link: Element, context: Context) -> Placed | None:
@@ -152,10 +146,10 @@ def _guessed(lost: Lost, item: _Item, link: Element, context: Context) -> Placed
 def _box_around(items: list[_Item]) -> Placed | None:
     """The box around the shapes of `items`, in the frame of their link; None if there are no shapes."""
     placed = [(item.shape, item.pose) for item in items if isinstance(item.shape, Placed)]
-    if not placed:
+    box = around(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed)
+    if box is None:
         return None
-    lows, highs = zip(*(shape_bounds(one.shape, pose @ one.offset) for one, pose in placed), strict=True)
-    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    low, high = box
     return Placed(Box(vector(np.maximum(high - low, 1e-3))), Pose(vector((low + high) / 2)))
 
 
@@ -178,7 +172,10 @@ def can_be_touched(collision: Element, context: Context) -> bool:
         return True
     mask = contact.find("collide_bitmask")
     if mask is not None and text_of(mask):
-        bits = _integer(mask) & EVERYTHING
+        try:
+            bits = int(text_of(mask), 0) & EVERYTHING
+        except ValueError:
+            raise complain(mask, f"expected a whole number, found '{text_of(mask)[:60]}'") from None
         if bits == 0:
             context.note("ignored", collision, "its collide_bitmask lets nothing touch it")
             return False
@@ -188,14 +185,6 @@ def can_be_touched(collision: Element, context: Context) -> bool:
         context.note("ignored", collision, "it collides without contact")
         return False
     return True
-
-
-def _integer(element: Element) -> int:
-    text = text_of(element)
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise complain(element, f"expected a whole number, found '{text[:60]}'") from None
 
 
 def read_friction(collision: Element, context: Context) -> float:
@@ -221,7 +210,8 @@ def read_friction(collision: Element, context: Context) -> float:
 def read_color(visual: Element) -> Color | None:
     """The diffuse colour, else the ambient one, else that of a known Gazebo material; None if there is none."""
     opacity = 1.0 - min(max(number(visual, "transparency", 0.0), 0.0), 1.0)
-    color = _written(visual) or _named(text_of(visual.find("material/script/name")))
+    name = text_of(visual.find("material/script/name")).removeprefix("Gazebo/")
+    color = _written(visual) or ((*GAZEBO_COLORS[name], 1.0) if name in GAZEBO_COLORS else None)
     if color is None:
         return None
     # Many files have colours with an alpha of zero, which the simulators that wrote them ignored.
@@ -237,8 +227,3 @@ def _written(visual: Element) -> Color | None:
             red, green, blue, *alpha = (min(max(value, 0.0), 1.0) for value in numbers(element, count))
             return red, green, blue, alpha[0] if alpha else 1.0
     return None
-
-
-def _named(material: str) -> Color | None:
-    color = GAZEBO_COLORS.get(material.removeprefix("Gazebo/"))
-    return None if color is None else (*color, 1.0)

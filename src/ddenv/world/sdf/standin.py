@@ -1,4 +1,4 @@
-"""Stand-ins: simple shapes that replace missing models and meshes."""
+"""Stand-ins: simple shapes that replace missing models and meshes, as the user gives them or as a guess."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ddenv.errors import UserError
+from ddenv.world.extent import shape_bounds
+from ddenv.world.files.resolve import model_named
 from ddenv.world.model import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
-from ddenv.world.pose import Vector, vector
+from ddenv.world.pose import HERE, ONE, Vector, vector
+from ddenv.world.sdf.xml import Element, floats
 
 # The sizes (m) of each kind, as shown in error messages.
 SIZES = {
@@ -80,7 +83,9 @@ def parse_stand_in(text: str, where: str) -> StandIn:
     if min(sizes) <= 0:
         raise UserError(f"{where}: {kind}: sizes must be positive, found '{words[:60]}'")
     shape = _shape(kind, sizes)
-    middle = _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, _height(shape) / 2)
+    middle = (
+        _numbers(center, "x,y,z", f"{where}: the centre after @") if at else (0.0, 0.0, shape_bounds(shape, HERE)[1][2])
+    )
     return StandIn(shape, vector(middle))
 
 
@@ -107,22 +112,83 @@ def _shape(kind: str, sizes: tuple[float, ...]) -> Shape:
     return Ellipsoid(vector(size / 2 for size in sizes))
 
 
-def _height(shape: Shape) -> float:
-    match shape:
-        case Box(size):
-            return size[2]
-        case Cylinder(_, length):
-            return length
-        case Sphere(radius):
-            return 2 * radius
-        case Capsule(radius, length):
-            return length + 2 * radius
-        case Ellipsoid(radii):
-            return 2 * radii[2]
-    raise TypeError(type(shape).__name__)
-
-
 def matching(stand_ins: Mapping[str, StandIn], uri: str) -> str | None:
     """The longest key of `stand_ins` that is `uri` or a folder above it; None if there is none."""
     found = [key for key in stand_ins if uri == key or uri.startswith(key.rstrip("/") + "/")]
     return max(found, key=len, default=None)
+
+
+# SDF's default for a moment of inertia, kg m^2: it tells nothing.
+DEFAULT_MOMENT = 1.0
+SOME = "box:1,1,1"
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A stand-in, its `text`, and `why` it is this one; `scale` is that of a mesh of this size.
+
+    It stands where the mesh would, or with `at_mass` at the link's centre of mass.
+    """
+
+    stand_in: StandIn
+    text: str
+    why: str
+    scale: Vector
+    at_mass: bool = False
+
+
+def guess(uri: str, link: Element | None = None) -> Guess:
+    """The shape for a missing model, or for a missing mesh of the `link`."""
+    text, scale = KNOWN_SIZES.get(model_named(uri), (SOME, ONE))
+    why, at_mass = "the size of Gazebo's model", False
+    if text == SOME:
+        box = None if link is None else _box_of_inertia(link)
+        text, at_mass = box or SOME, box is not None
+        why = "the box that has the link's inertia" if at_mass else "nothing says how large it is"
+    return Guess(parse_stand_in(text, "guess"), text, why, scale, at_mass)
+
+
+def _box_of_inertia(link: Element) -> str | None:
+    """The uniform box with the mass and the moments of `link`; None if there is no such box."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return None
+    mass, x, y, z = (_value(inertial, path) for path in ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz"))
+    squares = [6 * (y + z - x), 6 * (x + z - y), 6 * (x + y - z)]
+    if not mass > 0 or x == y == z == DEFAULT_MOMENT or not all(1e-6 * mass < square < math.inf for square in squares):
+        return None
+    sides = ",".join(f"{math.sqrt(square / mass):.3g}" for square in squares)
+    return f"box:{sides}@0,0,0"
+
+
+def _value(inertial: Element, path: str) -> float:
+    element = inertial.find(path)
+    values = () if element is None else floats(element)
+    return values[0] if len(values) == 1 else math.nan
+
+
+# From the collisions and meshes in github.com/osrf/gazebo_models: the box around the model, or the cylinder. Of the barrel
+# without its flat foot, which has a radius of 0.51 m. Only models whose mesh has the frame of the model.
+# The text of the stand-in, in the frame of the model as of its mesh; and the scale that draws the mesh in that size.
+KNOWN_SIZES: dict[str, tuple[str, Vector]] = {
+    "asphalt_plane": ("box:20,20,0.1@0,0,0", ONE),
+    "beer": ("cylinder:0.055,0.23@0,0,0", ONE),
+    "bookshelf": ("box:0.92,0.405,1.2@0,-0.1925,0.6", ONE),
+    "brick_box_3x1x3": ("box:3,1,3", ONE),
+    "cabinet": ("box:0.47,0.49,1.02@0.01,0,0.51", ONE),
+    "cafe_table": ("box:0.913,0.913,0.775", ONE),
+    "cardboard_box": ("box:0.5,0.4,0.3", (1.259, 1.007, 0.756)),
+    "cinder_block": ("box:0.435,0.203,0.203", ONE),
+    "cinder_block_2": ("box:0.194,0.397,0.143", ONE),
+    "cinder_block_wide": ("box:0.387,0.387,0.143", ONE),
+    "construction_barrel": ("cylinder:0.296,1.315", ONE),
+    "construction_cone": ("cylinder:0.251,1.089", (10.0, 10.0, 10.0)),
+    "cricket_ball": ("sphere:0.0375", ONE),
+    "drc_practice_2x4": ("box:1.219,0.038,0.089@0,0,0", ONE),
+    "drc_practice_2x6": ("box:1.219,0.038,0.14@0,0,0", ONE),
+    "drc_practice_4x4x20": ("box:0.508,0.089,0.089@0,0,0", ONE),
+    "drc_practice_4x4x40": ("box:1.016,0.089,0.089@0,0,0", ONE),
+    "jersey_barrier": ("box:4.065,0.811,1.143", ONE),
+    "table": ("box:1.5,0.8,1.015", ONE),
+    "wood_cube_10cm": ("box:0.1,0.1,0.1", ONE),
+}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from ddenv.schemas import nearest
 from ddenv.world.model import Model
 from ddenv.world.sdf.context import VERSIONS, Context
-from ddenv.world.sdf.xml import Element, complain, name_of, number, text_of
+from ddenv.world.sdf.xml import Element, complain, name_of, numbers, text_of
 
 KINDS = ("fixed", "revolute", "continuous", "prismatic")
 LIMITED = ("revolute", "prismatic")
@@ -28,7 +28,9 @@ ROOT = "robot"
 
 def to_sdf(robot: Element, context: Context) -> Element:
     """The `<sdf>` for a URDF `<robot>`, its root link first. Raises UserError."""
-    _check_expanded(robot)
+    for each in robot.iter():
+        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
+            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
     # The reader would take it for an SDF version.
     robot.attrib.pop("version", None)
     links = {name_of(link): link for link in reversed(robot.findall("link"))}
@@ -44,9 +46,7 @@ def to_sdf(robot: Element, context: Context) -> Element:
             made.append(origins[name_of(link)])
         model.append(made)
     model.extend([joint_of(joint, parent, child) for joint, parent, child in joints])
-    sdf = element("sdf", robot, version=VERSIONS[-1])
-    sdf.append(model)
-    return sdf
+    return element("sdf", robot, "", model, version=VERSIONS[-1])
 
 
 def massless(robot: Element) -> frozenset[str]:
@@ -66,12 +66,6 @@ def has_mass(link: Element) -> bool:
     return mass is not None and value(mass, "value") != 0.0
 
 
-def _check_expanded(robot: Element) -> None:
-    for each in robot.iter():
-        if "xacro}" in each.tag or any("${" in text or "$(" in text for text in each.attrib.values()):
-            raise complain(each, "is xacro, not URDF; run 'xacro FILE > robot.urdf' and name that file")
-
-
 def _root(robot: Element, links: list[str], children: set[str]) -> str:
     roots = [name for name in reversed(links) if name not in children]
     if len(roots) != 1:
@@ -89,23 +83,19 @@ def link_of(source: Element, robot: Element, context: Context) -> Element:
         made.append(_inertial(inertial))
     for tag in ("collision", "visual"):
         for count, part in enumerate(source.findall(tag)):
-            shape = twin(part, name=part.get("name") or f"{tag}_{count}")
-            shape.extend([pose(part), _geometry(part, context)])
-            made.append(shape)
-            shape.extend(_surface(name, part, robot) if tag == "collision" else _material(part, robot))
+            more = _surface(name, part, robot) if tag == "collision" else _material(part, robot)
+            own = part.get("name") or f"{tag}_{count}"
+            made.append(twin(part, pose(part), _geometry(part, context), *more, name=own))
     return made
 
 
 def _inertial(source: Element) -> Element:
-    made = twin(source)
-    made.append(pose(source))
+    made = twin(source, pose(source))
     mass, tensor = source.find("mass"), source.find("inertia")
     if mass is not None:
         made.append(element("mass", mass, given(mass, "value")))
     if tensor is not None:
-        inertia = twin(tensor)
-        inertia.extend([element(tag, tensor, given(tensor, tag)) for tag in TENSOR])
-        made.append(inertia)
+        made.append(twin(tensor, *(element(tag, tensor, given(tensor, tag)) for tag in TENSOR)))
     return made
 
 
@@ -122,9 +112,7 @@ def _geometry(part: Element, context: Context) -> Element:
         made.append(element(tag, shape, _found(text, shape, context) if tag == "uri" else text))
     if shape.tag == "mesh" and shape.get("scale"):
         made.append(element("scale", shape, three(shape, "scale", "")))
-    geometry = twin(source)
-    geometry.append(made)
-    return geometry
+    return twin(source, made)
 
 
 def _found(uri: str, shape: Element, context: Context) -> str:
@@ -138,16 +126,14 @@ def _found(uri: str, shape: Element, context: Context) -> str:
 
 def _surface(link: str, part: Element, robot: Element) -> list[Element]:
     """The `<surface>` of a collision from `<gazebo reference="link">`, if there is one."""
-    ode = element("ode", part)
-    for extension in robot.findall("gazebo"):
-        for tag, ours in FRICTION.items():
-            found = extension.find(tag)
-            if found is not None and extension.get("reference") == link:
-                ode.append(element(ours, found, text_of(found) or given(found, "value")))
-    friction, surface = element("friction", part), element("surface", part)
-    friction.append(ode)
-    surface.append(friction)
-    return [surface] if len(ode) else []
+    coefficients = [
+        element(ours, found, text_of(found) or given(found, "value"))
+        for extension in robot.findall("gazebo")
+        for tag, ours in FRICTION.items()
+        if (found := extension.find(tag)) is not None and extension.get("reference") == link
+    ]
+    friction = element("friction", part, "", element("ode", part, "", *coefficients))
+    return [element("surface", part, "", friction)] if coefficients else []
 
 
 def _material(part: Element, robot: Element) -> list[Element]:
@@ -159,9 +145,7 @@ def _material(part: Element, robot: Element) -> list[Element]:
     color = next((found for each in (own, *named) if (found := each.find("color")) is not None), None)
     if color is None:
         return []
-    made = twin(own)
-    made.append(element("diffuse", color, given(color, "rgba")))
-    return [made]
+    return [twin(own, element("diffuse", color, given(color, "rgba")))]
 
 
 def ends(joint: Element, links: list[str]) -> tuple[str, str]:
@@ -183,8 +167,9 @@ def joint_of(source: Element, parent: str, child: str) -> Element:
     kind = (source.get("type") or "").strip()
     if kind not in KINDS:
         raise complain(source, f"joint type '{kind[:40]}' is not supported (only {', '.join(KINDS)})")
-    made = twin(source, name=name_of(source), type=kind)
-    made.extend([element("parent", source, parent), element("child", source, child)])
+    made = twin(
+        source, element("parent", source, parent), element("child", source, child), name=name_of(source), type=kind
+    )
     if kind != "fixed":
         made.append(_axis(source, kind))
     return made
@@ -195,37 +180,30 @@ def _axis(source: Element, kind: str) -> Element:
     if kind in LIMITED and limit is None:
         raise complain(source, f"a {kind} joint needs a <limit>")
     place = source if given_axis is None else given_axis
-    made = element("axis", source)
-    made.append(element("xyz", place, "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")))
+    xyz = "1 0 0" if given_axis is None else three(given_axis, "xyz", "1 0 0")
+    made = element("axis", source, "", element("xyz", place, xyz))
     if limit is not None:
-        made.append(_limit(limit, kind))
+        given_limits = {tag: text for tag in ("effort", "velocity") if (text := limit.get(tag))}
+        defaults = {tag: limit.get(tag, default) for tag, default in LIMITS.items()} if kind in LIMITED else {}
+        made.append(twin(limit, *(element(tag, limit, text) for tag, text in (defaults | given_limits).items())))
     if dynamics is not None:
-        damped = twin(dynamics)
-        damped.append(element("damping", dynamics, dynamics.get("damping", "0")))
-        made.append(damped)
+        made.append(twin(dynamics, element("damping", dynamics, dynamics.get("damping", "0"))))
     return made
 
 
-def _limit(source: Element, kind: str) -> Element:
-    made = twin(source)
-    for tag, default in LIMITS.items() if kind in LIMITED else ():
-        made.append(element(tag, source, source.get(tag, default)))
-    made.extend([element(tag, source, text) for tag in ("effort", "velocity") if (text := source.get(tag))])
-    return made
-
-
-def element(tag: str, source: Element, text: str = "", **attributes: str) -> Element:
-    """An SDF element with `text`, at the position of `source` in the file and with it as parent."""
+def element(tag: str, source: Element, text: str = "", *children: Element, **attributes: str) -> Element:
+    """An SDF element with `text` and `children`, at the position of `source` in the file and with it as parent."""
     made = Element(tag, attributes)
     made.text = text
+    made.extend(children)
     made.source, made.line, made.start, made.end = source.source, source.line, source.start, source.end
     made.parent = source
     return made
 
 
-def twin(source: Element, **attributes: str) -> Element:
-    """An empty SDF element with the tag, the position and the parent of `source`."""
-    made = element(source.tag, source, **attributes)
+def twin(source: Element, *children: Element, **attributes: str) -> Element:
+    """An SDF element of `children` with the tag, the position and the parent of `source`."""
+    made = element(source.tag, source, "", *children, **attributes)
     made.parent = source.parent
     return made
 
@@ -240,9 +218,7 @@ def given(source: Element, attribute: str) -> str:
 
 def value(source: Element, attribute: str) -> float:
     """An attribute that is one finite number. Raises UserError."""
-    holder = element(source.tag, source)
-    holder.append(element(attribute, source, given(source, attribute)))
-    return number(holder, attribute, 0.0)
+    return numbers(element(attribute, source, given(source, attribute)), 1)[0]
 
 
 def three(source: Element, attribute: str, default: str) -> str:

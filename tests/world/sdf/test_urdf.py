@@ -8,8 +8,8 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.world.model import Box, Capsule, Cylinder, Mesh, Model, Sphere
-from ddenv.world.read import parse_model, read_model
 from ddenv.world.scenario import Reading
+from ddenv.world.sdf.read import parse_model, read_model
 
 HERE = Path("robot.urdf")
 BODY = '<inertial><origin xyz="0 0 0.1"/><mass value="5"/><inertia ixx="1" iyy="2" izz="2" ixy="0.1" ixz="0" iyz="0"/></inertial>'

@@ -9,14 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.environment import Environment
 from ddenv.evidence.slices import Ties
-from ddenv.robot import reached
-from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Repertoire
 from ddenv.robot.result import RunResult
-from ddenv.robot.robot_hull import Hull
 from ddenv.robot.sensing.lidar import Lidar
+from ddenv.robot.simulation import taking_part
+from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.world.model import Box, Model, Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of
@@ -60,11 +59,7 @@ def bits(result: RunResult, keep: frozenset[str]) -> tuple:
 
 def with_ties(world: Variants, models: frozenset[str], there: frozenset[str]) -> frozenset[str]:
     """`models` with all of `there` that they are tied to."""
-    elements = sorted(there)
-    number = {name: place for place, name in enumerate(elements)}
-    ties = Ties.among((number[name], number[other]) for name, other in world.ties(there))
-    closed = ties.closed(Environment.of(number[name] for name in models), Environment.whole(len(elements)))
-    return frozenset(closed.names(elements))
+    return Ties.among(world.ties(there)).closed(models, there)
 
 
 def is_implied(world: Variants, there: frozenset[str], more: frozenset[str] = frozenset(), seed: int = 1) -> bool:
@@ -191,9 +186,9 @@ def test_the_audit_finds_each_kind_of_participant_that_is_forgotten(flat, monkey
     assert not is_implied(worlds["carriers"], everything["carriers"])
     monkeypatch.setattr(Repertoire, "unusual", lambda *_: frozenset())
     assert not is_implied(worlds["unusual"], everything["unusual"], more["unusual"])
-    monkeypatch.setattr(reached.Reached, "_look_around_robot", lambda *_: None)
+    monkeypatch.setattr(taking_part.Reached, "_look_around_robot", lambda *_: None)
     assert not is_implied(worlds["robot"], everything["robot"])
-    monkeypatch.setattr(reached.Reached, "_look_around_models", lambda *_: None)
+    monkeypatch.setattr(taking_part.Reached, "_look_around_models", lambda *_: None)
     assert not is_implied(worlds["models"], everything["models"])
     monkeypatch.setattr(Lidar, "took_part", frozenset())
     assert not is_implied(worlds["lidar"], everything["lidar"])

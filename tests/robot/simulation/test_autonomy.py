@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ddenv.robot.clock import Clock
-from ddenv.robot.drake.template import Template
 from ddenv.robot.protocol import Twist
+from ddenv.robot.simulation.template import Template
 
 NOISE = {"compass": 0.02, "gyro": 0.02, "odometry": 0.02}
 

@@ -10,9 +10,9 @@ from itertools import pairwise
 from ddenv.world.files.resources import Stored
 from ddenv.world.model import Model, World
 from ddenv.world.pose import Pose
-from ddenv.world.read import parse_world
 from ddenv.world.scenario import Reading
 from ddenv.world.sdf.frames import pose_of
+from ddenv.world.sdf.read import parse_world
 from ddenv.world.sdf.xml import Element, name_of, parse, tag_end
 
 # Two poses nearer than this are the same, m and sine of half the angle.

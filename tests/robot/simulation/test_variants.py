@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from ddenv.robot.drake import template as variants
-from ddenv.robot.drake.template import Template, Variants
 from ddenv.robot.piles.rehearsal import Rehearsals
 from ddenv.robot.result import RunResult
+from ddenv.robot.simulation import template as variants
+from ddenv.robot.simulation.template import Template, Variants
 from ddenv.runs.subject import load_parts
 from ddenv.world.load import SCENARIOS, load_scenario
 from ddenv.world.model import Box, Model, World

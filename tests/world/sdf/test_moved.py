@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ddenv.world.moved import is_same, with_places
 from ddenv.world.pose import Pose
-from ddenv.world.read import parse_world, read_world
 from ddenv.world.scenario import PLAIN
+from ddenv.world.sdf.moved import is_same, with_places
+from ddenv.world.sdf.read import parse_world, read_world
 from tests.conftest import DATA
 
 BOX = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"

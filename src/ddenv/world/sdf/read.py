@@ -12,17 +12,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.world.files.access import read_bytes
+from ddenv.world.access import read_bytes
 from ddenv.world.files.resources import Disk, Resources
 from ddenv.world.model import Model, World
-from ddenv.world.pose import Vector, vector
+from ddenv.world.pose import vector
 from ddenv.world.scenario import PLAIN, Reading
 from ddenv.world.sdf.assemble import Saved, assemble, read_state
 from ddenv.world.sdf.context import Context, note_unread, sdf_root
 from ddenv.world.sdf.frames import Scope
 from ddenv.world.sdf.standin import AUTO
-from ddenv.world.sdf.xml import Element, complain, name_of, numbers, parse
-from ddenv.world.urdf import ROOT, massless, to_sdf, without_mass
+from ddenv.world.sdf.urdf import ROOT, massless, to_sdf, without_mass
+from ddenv.world.sdf.xml import complain, name_of, numbers, parse
 
 GRAVITY = (0.0, 0.0, -9.8)  # SDF's default, m/s^2
 # Elements that add or join models in a way that is not supported, with the error message.
@@ -62,7 +62,9 @@ def read_model(path: Path, reading: Reading = PLAIN, announce: Callable[[str], N
 def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Resources | None = None) -> Model:
     """The one model in `text`, the content of `path`; other files come from `resources`, by default from disk. Raises UserError."""
     context = Context(resources or disk_of(path, reading, None), reading)
-    urdf = _urdf_root(text, path)
+    urdf = parse(text, path) if f"<{ROOT}".encode() in text else None
+    if urdf is not None and urdf.tag != ROOT:
+        urdf = None
     root = sdf_root(text, path) if urdf is None else to_sdf(urdf, context)
     scope = Scope(root, (path,), context)
     if len(scope.parts) != 1:
@@ -73,12 +75,6 @@ def parse_model(text: bytes, path: Path, reading: Reading = PLAIN, resources: Re
         return model if urdf is None else without_mass(model, massless(urdf))
     except RecursionError:
         raise UserError(f"{path}: models or frames are nested too deeply") from None
-
-
-def _urdf_root(text: bytes, path: Path) -> Element | None:
-    """The `<robot>` of a URDF file; None for any other file."""
-    root = parse(text, path) if f"<{ROOT}".encode() in text else None
-    return root if root is not None and root.tag == ROOT else None
 
 
 def disk_of(path: Path, reading: Reading, announce: Callable[[str], None] | None) -> Disk:
@@ -105,13 +101,19 @@ def _world(text: bytes, path: Path, context: Context) -> World:
     models = _models(scope, read_state(world, context), context)
     context.complain_of_missing()
     context.model = ""
-    _note_unused(context, root)
+    # An unused stand-in is probably a typing error; `auto` asks for nothing as long as nothing is missing.
+    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in.word != AUTO}
+    for uri in sorted(asked - context.used):
+        context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")
     anchors = scope.references()
+    gravity = next(
+        (element for tag in ("gravity", "physics/gravity") if (element := world.find(tag)) is not None), None
+    )
     return World(
         path=path,
         name=world.get("name") or "",
         text=text,
-        gravity=_gravity(world),
+        gravity=GRAVITY if gravity is None else vector(numbers(gravity, 3)),
         models=models,
         version=root.get("version") or "",
         notes=tuple(context.notes),
@@ -151,19 +153,3 @@ def unique_names(names: list[str]) -> list[str]:
         taken.add(own)
         unique.append(own)
     return unique
-
-
-def _gravity(world: Element) -> Vector:
-    for tag in ("gravity", "physics/gravity"):
-        element = world.find(tag)
-        if element is not None:
-            return vector(numbers(element, 3))
-    return GRAVITY
-
-
-def _note_unused(context: Context, root: Element) -> None:
-    """An unused stand-in is probably a typing error."""
-    # `auto` asks for nothing as long as nothing is missing.
-    asked = {uri for uri, stand_in in context.stand_ins.items() if stand_in.word != AUTO}
-    for uri in sorted(asked - context.used):
-        context.note("ignored", root, f"the stand-in for '{uri}' is not used: no <include> or mesh names it")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
@@ -11,34 +10,32 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ddenv.errors import UserError
-from ddenv.robot.autonomy import Autonomy, setup_of
 from ddenv.robot.clock import Clock
-from ddenv.robot.controllers import BUILT_IN, controllers
+from ddenv.robot.controllers import BUILT_IN, Heard, Listener, controllers
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built, build
 from ddenv.robot.drake.region import LeftRegion, Place, Region, Watch
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.listening import Heard, Listener
-from ddenv.robot.notice import Notice
 from ddenv.robot.piles.rehearsal import Rehearsals, Repertoire
-from ddenv.robot.piles.settling import settled
+from ddenv.robot.piles.settling import settled, supports
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.piles.support import supports
-from ddenv.robot.reached import Reached, Solids
 from ddenv.robot.result import Progress, RunResult
-from ddenv.robot.robot_hull import Hull
-from ddenv.robot.run import Run, RunParts, Stuck, seconds_for
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.obstacles import Obstacles
 from ddenv.robot.sensing.sensors import SensorSuite
 from ddenv.robot.settled import Settled
-from ddenv.robot.surroundings import YIELD, Surroundings, reach, still_boxes
+from ddenv.robot.simulation.autonomy import Autonomy, setup_of
+from ddenv.robot.simulation.notice import Notice, Surroundings, still_boxes
+from ddenv.robot.simulation.robot_hull import ENDLESS, Hull
+from ddenv.robot.simulation.run import Run, RunParts, Stuck, seconds_for
+from ddenv.robot.simulation.taking_part import Reached, Solids
 from ddenv.world.drive import Drive, find_drive
-from ddenv.world.extent import shape_bounds
-from ddenv.world.ground import with_ground_boxes
+from ddenv.world.extent import shape_bounds, with_ground_boxes
 from ddenv.world.model import Model, World, is_ground
 from ddenv.world.placement import spawn_pose
 from ddenv.world.scenario import Scenario
 
+# A margin for surfaces that sink into each other, and joints that exceed their limits, m.
+YIELD = 0.1
 # A robot this far below everything that it could stand on has fallen out of the world, m.
 FALL = 2.0
 
@@ -52,7 +49,9 @@ class Template:
 
     def __init__(self, world: World, robot: Model, scenario: Scenario) -> None:
         """Raises UserError for a robot or a controller that cannot drive, and for a world that Drake cannot simulate."""
-        self._solid = _with_ground(world, scenario)
+        spawn, goal = scenario.robot.spawn, scenario.goal
+        # Boxes in place of planes, large enough for all models, the spawn and the goal.
+        self._solid = with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
         self._robot = robot
         self._scenario = scenario
         self._drive = find_drive(robot, scenario.robot.wheels)
@@ -69,12 +68,13 @@ class Template:
         self._boxes = still_boxes(world)
         # False only to measure what sleeping saves: then all moving models are always simulated.
         self._sleeping = True
-        self._reach = reach(robot) + YIELD
         self._solids, self._hull = Solids.of(self._solid), Hull.of(robot)
+        self._reach = self._hull.reach + YIELD
         # What decides in a run is known: no controller of the user's, and no model that collides with itself. (Where slices were
         # used beside such models, 23 of 274 implied tests differed.)
         self._slices = scenario.controller.use in BUILT_IN and not any(model.self_collide for model in world.models)
-        self._surround(_region(world, scenario))
+        moving = [model for model in world.models if not model.static]
+        self._surround(Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving))
         self._build(names)
 
     def without(self, names: frozenset[str]) -> Template:
@@ -109,21 +109,21 @@ class Template:
     def shapes_without(self, names: frozenset[str]) -> int:
         """The number of collision shapes in the plant, without those of the models `names`."""
         built = self._context.built
-        kept = [shapes for name, shapes in built.static.items() if name not in names]
-        kept += [body.geometry for name, body in built.moving.items() if name not in names]
-        return len(built.robot.geometry) + sum(map(len, kept))
+        shapes = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        return len(built.robot.geometry) + sum(len(geometry) for name, geometry in shapes if name not in names)
 
     def _surround(self, region: Region) -> None:
         """From the next `_build` on, the plant has nothing outside `region` that never moves."""
         self._region = region
-        self._far = region.far(self._solid.models) if math.isfinite(self._reach) else frozenset()
+        self._far = region.far(self._solid.models) if self._reach < ENDLESS else frozenset()
 
     def _build(self, names: frozenset[str]) -> None:
         """Builds the plant with the models `names`. Everything else stays that of the whole world."""
         self._names = names
-        built = _build(_part(self._solid, names - self._far), self._robot, self._drive, self._scenario)
+        near = tuple(model for model in self._solid.models if model.name in names - self._far)
+        built = _build(replace(self._solid, models=near), self._robot, self._drive, self._scenario)
         boxes = [box for box in self._boxes if box[0] in names]
-        self._surroundings = Surroundings.of(boxes, self._robot, built)
+        self._surroundings = Surroundings.of(boxes, self._reach, built)
         at = spawn_pose(self._scenario.robot.spawn) @ self._robot.pose.inverse()
         self._context = RunContext.of(built, at, self._clock, self._floor, self._region if self._far else None)
         self._rehearsals = Rehearsals(self._repertoire, self._context)
@@ -136,12 +136,9 @@ class Template:
         full: bool = True,
         listener: Listener | None = None,
     ) -> RunResult:
-        """Runs the robot in the world with the models `keep`, and with protected models and grounds, which are always kept.
+        """As `Simulator.run`; `listener` hears the controller.
 
-        `progress(time, pose, models)` gets the simulated time (s), and the poses (x, y, z in m, qw, qx, qy, qz) of the robot and,
-        by name, of the models that can move, at each recorded sample. A run that is not `full` is cut short as soon as the robot is
-        stuck for good. `listener` hears the controller.
-        Raises ValueError for unknown names, and LeftRegion if something comes near what is not in the plant.
+        Raises LeftRegion if something comes near what is not in the plant.
         """
         unknown = keep - self._names
         if unknown:
@@ -156,7 +153,9 @@ class Template:
                 scenario=self._scenario,
                 drive=self._drive,
                 sleep=sleep,
-                notice=self._notice(sleep, kept, present),
+                notice=Notice(
+                    self._surroundings, self._scenario.sensors, self._context.plant_context, sleep, kept, present
+                ),
                 autonomy=self._autonomy(suite, seed, listener),
                 lidar=self._lidar(present, kept, suite),
                 watch=Watch(self._region, self._reach) if self._far else None,
@@ -202,25 +201,16 @@ class Template:
         self._context.diagram_context.SetTime(0.0)
         sleep = Sleep(self._context, kept, scripts, never=not self._sleeping)
         try:
-            yield sleep, unusual | self._carriers(present)
+            # With what those models are tied to that are always kept.
+            ties = self._repertoire.ties if self._repertoire.learnt else {}
+            yield sleep, unusual.union(*(ties[always] & present for always in self._always & set(ties)))
         finally:
             sleep.end()
-
-    def _carriers(self, present: frozenset[str]) -> frozenset[str]:
-        """What those models are tied to that are always kept, among the models `present`."""
-        if not self._repertoire.learnt:
-            return frozenset()
-        ties = self._repertoire.ties
-        return frozenset(name for always in self._always & set(ties) for name in ties[always] & present)
 
     def _reached(self, sleep: Sleep, present: frozenset[str]) -> Reached | None:
         if not (self._slices and self._sleeping and self._repertoire.learnt):
             return None
         return Reached(self._solids, self._hull, sleep, present, self._clock.period)
-
-    def _notice(self, sleep: Sleep, kept: Sequence[Body], present: frozenset[str]) -> Notice:
-        plant_context = self._context.plant_context
-        return Notice(self._surroundings, self._scenario.sensors, plant_context, sleep, kept, present)
 
     def _autonomy(self, suite: SensorSuite, seed: int, listener: Listener | None) -> Autonomy:
         scenario, setup = self._scenario, replace(self._setup, seed=seed)
@@ -236,23 +226,6 @@ class Template:
         if settings is None or self._obstacles is None:
             return None
         return Lidar(settings, self._obstacles, present, [self._models[body.name] for body in kept], suite.lidar)
-
-
-def _with_ground(world: World, scenario: Scenario) -> World:
-    """`world` with boxes in place of its planes, large enough for all models, the spawn and the goal."""
-    spawn, goal = scenario.robot.spawn, scenario.goal
-    return with_ground_boxes(world, [(spawn.x, spawn.y, spawn.z), (goal.x, goal.y, spawn.z)])
-
-
-def _region(world: World, scenario: Scenario) -> Region:
-    spawn, goal = scenario.robot.spawn, scenario.goal
-    moving = (model for model in world.models if not model.static)
-    return Region.of((spawn.x, spawn.y), (goal.x, goal.y), moving)
-
-
-def _part(world: World, names: frozenset[str]) -> World:
-    """`world` with the models `names` alone."""
-    return replace(world, models=tuple(model for model in world.models if model.name in names))
 
 
 def _build(world: World, robot: Model, drive: Drive, scenario: Scenario) -> Built:
@@ -343,22 +316,13 @@ class Variants:
         able = [one for one in (self._whole, *self._smaller) if keep <= one.names]
         template = min(able, key=lambda one: len(one.removable), default=self._whole)
         needless = template.removable & removed
-        if self._pays(needless, template):
-            self._forget()
+        shapes = template.shapes_without(needless)
+        if shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps:
+            if len(self._smaller) == MOST:
+                del self._smaller[0]
+                # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
+                gc.collect()
             template = template.without(needless)
         if template is not self._whole:
             self._smaller = [*(one for one in self._smaller if one is not template), template]
         return template
-
-    def _pays(self, needless: frozenset[str], template: Template) -> bool:
-        """Whether building a plant without the models `needless` takes less time than one run with them."""
-        shapes = template.shapes_without(needless)
-        return shapes <= LARGEST and BUILD + PAIR * shapes**2 < HELD * len(needless) * self._steps
-
-    def _forget(self) -> None:
-        """Makes room for one more smaller template."""
-        if len(self._smaller) < MOST:
-            return
-        del self._smaller[0]
-        # Drake's diagrams refer to themselves: without a collection they would stay in memory, some 20 MB each.
-        gc.collect()

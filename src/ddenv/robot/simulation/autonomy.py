@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ddenv.robot.clock import Clock, Tick
-from ddenv.robot.protocol import Drives, Reading, Setup, Twist, WheelSpeeds
+from ddenv.robot.protocol import Drives, Imu, Reading, Scan, Setup, Twist, WheelSpeeds
 from ddenv.robot.sensing.estimate import Filter
-from ddenv.robot.sensing.sensors import Imu, Scan, SensorSuite, Truth
+from ddenv.robot.sensing.sensors import SensorSuite, Truth
 from ddenv.world.drive import Drive, footprint
 from ddenv.world.model import Model
 from ddenv.world.scenario import Scenario, Sensors
@@ -63,39 +65,28 @@ class Autonomy:
         self._advanced = 0
         self._wheels = (0.0,) * len(drive.joints)
         self._imu = Imu(0.0, 0.0, 0.0)
-        # Measured since the last command.
-        self._new_wheels: tuple[float, ...] | None = None
-        self._new_imu: Imu | None = None
-        self._new_compass: float | None = None
-        self._new_scan: Scan | None = None
+        # What was measured since the last command, by the names of `Reading`.
+        self._new: dict[str, Any] = {}
 
     def sense(self, tick: Tick, truth: Truth, scan: Scan | None) -> None:
         """Takes the measurements that are due at `tick`, and updates the pose estimate."""
         if tick.odometry:
-            self._wheels = self._new_wheels = self._suite.odometry(truth.wheels)
+            self._wheels = self._new["wheels"] = self._suite.odometry(truth.wheels)
         if tick.imu:
-            self._imu = self._new_imu = self._suite.imu(truth)
+            self._imu = self._new["imu"] = self._suite.imu(truth)
         if tick.odometry or tick.imu:
             self._advance(tick.step)
         if tick.compass:
-            self._new_compass = self._suite.compass(truth)
+            self._new["compass"] = compass = self._suite.compass(truth)
             if tick.step:
-                self._filter.correct(self._new_compass)
+                self._filter.correct(compass)
         if scan is not None:
-            self._new_scan = scan
+            self._new["scan"] = scan
 
     def command(self, tick: Tick) -> Twist | WheelSpeeds:
         """The controller's command, valid until the next one. Raises ControllerFailed."""
-        reading = Reading(
-            time=tick.time,
-            estimate=self._filter.estimate,
-            wheels=self._new_wheels,
-            imu=self._new_imu,
-            compass=self._new_compass,
-            scan=self._new_scan,
-        )
-        self._new_wheels = self._new_imu = self._new_compass = self._new_scan = None
-        command = self._controller.step(reading)
+        new, self._new = self._new, {}
+        command = self._controller.step(Reading(tick.time, self._filter.estimate, **new))
         if self.arrived is None and getattr(self._controller, "arrived", False):
             self.arrived = tick.time
         return command
@@ -103,7 +94,11 @@ class Autonomy:
     def _advance(self, step: int) -> None:
         if step == self._advanced:
             return
-        left, right = self._rim_speed(self._left), self._rim_speed(self._right)
+        # The mean speeds of the wheels' rims on both sides, m/s.
+        left, right = (
+            self._radius * sum([self._wheels[number] for number in side]) / len(side)
+            for side in (self._left, self._right)
+        )
         self._filter.advance(
             speed=(left + right) / 2,
             wheel_rate=self._skid * (right - left) / self._track,
@@ -112,8 +107,3 @@ class Autonomy:
             seconds=(step - self._advanced) * self._step,
         )
         self._advanced = step
-
-    def _rim_speed(self, wheels: list[int]) -> float:
-        """The mean speed of the rims of `wheels`, m/s."""
-        measured = self._wheels
-        return self._radius * sum([measured[number] for number in wheels]) / len(wheels)

@@ -1,4 +1,4 @@
-"""The links of models that can move: the boxes around them, their speeds, and the gaps between models."""
+"""The motion of models: boxes around their links, speeds and gaps; when one lies still; how a pile moves by itself."""
 
 from __future__ import annotations
 
@@ -168,3 +168,67 @@ def spread(start: Booleans, joined: Booleans) -> Booleans:
         if (wider == reached).all():
             return reached
         reached = wider
+
+
+SLOW = 0.03  # m/s
+CALM = 0.3  # s; a model that was slow for this long is at rest
+
+
+class Stillness:
+    """For how long each of M models has stayed where it is, up to the way that something slow makes in that time."""
+
+    def __init__(self, links: Links) -> None:
+        self._links = links
+        count = len(links.bodies)
+        self._places, self._turns = np.zeros((count, 3)), np.zeros((count, 3, 3))
+        self._calm = np.zeros(len(links.first))  # s
+
+    def look(self, motion: Motion, seconds: float) -> None:
+        """Takes in where all links are, `seconds` after the last time."""
+        self._calm += seconds
+        self.restart(self.moved(motion), motion)
+
+    def moved(self, motion: Motion) -> Booleans:
+        """Which models (M,) have moved since their time was last counted anew."""
+        way = np.linalg.norm(motion.places - self._places, axis=1)
+        turn = np.linalg.norm(motion.turns - self._turns, axis=(1, 2)) / np.sqrt(2.0)
+        moved: Booleans = np.maximum.reduceat(way + turn * self._links.reach, self._links.first) > SLOW * CALM
+        return moved
+
+    def restart(self, models: Booleans, motion: Motion) -> None:
+        """Counts the time of `models` (M,) from now on."""
+        links = self._links.of_models(np.flatnonzero(models))
+        self._places[links], self._turns[links] = motion.places[links], motion.turns[links]
+        self._calm[models] = 0.0
+
+    @property
+    def at_rest(self) -> Booleans:
+        """Which models (M,) have been still for long enough."""
+        rest: Booleans = self._calm >= CALM
+        return rest
+
+
+# What an array takes besides its numbers, bytes.
+ARRAY = 128
+
+
+@dataclass(frozen=True)
+class Script:
+    """How a pile of K models moves alone, with a row for each tick of the clock.
+
+    `names` are its models in the order of the world file. `states` (T, E) are the pile's positions and velocities in the order of
+    `Hold.entries`; `motions` and `paces` (T of each; `Links.pace`, m/s) are those of its links. `resting` (K,) are the models that
+    are at rest after the last row, or have fallen out of the world.
+    """
+
+    names: tuple[str, ...]
+    states: Floats
+    motions: tuple[Motion, ...]
+    paces: tuple[Floats, ...]
+    resting: Booleans
+
+    @property
+    def size(self) -> int:
+        """About how much memory it takes, bytes."""
+        arrays = [self.states, *self.paces, *(part for motion in self.motions for part in vars(motion).values())]
+        return sum(array.nbytes + ARRAY for array in arrays)

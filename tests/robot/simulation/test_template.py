@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ddenv.errors import UserError
-from ddenv.robot.drake.template import Template, lowest
+from ddenv.robot.simulation.template import Template, lowest
 from ddenv.world.model import Sphere
 from ddenv.world.pose import Pose
 from tests.robot.conftest import joint_of, link_of, model_of

@@ -11,21 +11,22 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from ddenv.robot.autonomy import Autonomy
 from ddenv.robot.clock import Tick
 from ddenv.robot.controllers import ControllerFailed
 from ddenv.robot.deadline import Stopwatch
+from ddenv.robot.drake.context import RunContext
 from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.drake.region import Watch
-from ddenv.robot.drake.run_context import RunContext
-from ddenv.robot.notice import Notice
 from ddenv.robot.oracle import kind_of
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.reached import Reached
 from ddenv.robot.result import PoseRow, Progress, Recording, RunResult
 from ddenv.robot.sensing.lidar import Lidar
 from ddenv.robot.sensing.sensors import Truth
+from ddenv.robot.simulation.autonomy import Autonomy
+from ddenv.robot.simulation.notice import Notice
+from ddenv.robot.simulation.taking_part import Reached
 from ddenv.world.drive import Drive
+from ddenv.world.pose import Pose, angle_between
 from ddenv.world.scenario import Controller, Scenario
 
 # The maximum real time between two recorded poses that counts as time of the run, s.
@@ -225,14 +226,15 @@ class Observer:
 
     def truth(self, pose: PoseRow) -> Truth:
         """What the robot's sensors would measure without noise at its `pose`."""
-        _, _, _, qw, qx, qy, qz = pose
+        qw, qx, qy, qz = pose[3:]
+        roll, pitch, heading = Pose(pose[:3], pose[3:]).rpy()
         state, spin = self._state, self._spin
         # The gyro is fixed to the body: it measures the rotation about the body's own z axis, here in the world frame.
         up_x, up_y, up_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
         return Truth(
-            heading=math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz)),
-            roll=math.atan2(2 * (qy * qz + qw * qx), up_z),
-            pitch=math.asin(min(1.0, max(-1.0, 2 * (qw * qy - qx * qz)))),
+            heading=heading,
+            roll=roll,
+            pitch=pitch,
             yaw_rate=up_x * state[spin] + up_y * state[spin + 1] + up_z * state[spin + 2],
             wheels=tuple([sign * state[start] for start, sign in self._wheels]),
         )
@@ -269,7 +271,8 @@ class Stuck:
 
     def update(self, now: float, pose: PoseRow) -> bool:
         """Whether the robot is stuck at `now` (s). Call it for each recorded pose, in order of time."""
-        if self._place is None or _has_left(self._place, pose):
+        place = self._place
+        if place is None or math.dist(place[:3], pose[:3]) > RADIUS or angle_between(place[3:], pose[3:]) > ANGLE:
             self._since, self._place = now, pose
         # Times are sums of steps: 8 s may come out 1e-15 s short.
         return now - self._since >= self._seconds - 1e-6
@@ -278,11 +281,3 @@ class Stuck:
 def seconds_for(controller: Controller) -> float:
     """How long a robot with this controller must not move to be stuck for good, s."""
     return max(SECONDS, PATIENCES * controller.planner.patience) if controller.use == "costmap" else SECONDS
-
-
-def _has_left(place: PoseRow, pose: PoseRow) -> bool:
-    if math.dist(place[:3], pose[:3]) > RADIUS:
-        return True
-    # The quaternions q and -q are the same rotation.
-    likeness = abs(sum(a * b for a, b in zip(place[3:], pose[3:], strict=True)))
-    return 2 * math.acos(min(1.0, likeness)) > ANGLE

@@ -9,7 +9,7 @@ from ddenv.errors import UserError
 from ddenv.world.load import SDF
 from ddenv.world.model import Box, Cylinder, Plane, Sphere
 from ddenv.world.pose import Pose
-from ddenv.world.read import parse_model, parse_world, read_model, read_world
+from ddenv.world.sdf.read import parse_model, parse_world, read_model, read_world
 from tests.conftest import DATA
 
 HERE = Path("here.sdf")

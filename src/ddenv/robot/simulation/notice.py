@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, OutputPort
 
 from ddenv.arrays import Booleans, Floats, Integers, Objects
-from ddenv.robot.drake.plant import Body
+from ddenv.robot.drake.plant import Body, Built
 from ddenv.robot.piles.sleep import Sleep
-from ddenv.robot.surroundings import Surroundings
+from ddenv.world.extent import bounds, filled_bounds, stacked
+from ddenv.world.model import Model, Plane, World, still_links
 from ddenv.world.pose import Vector
 from ddenv.world.scenario import Sensors
 
@@ -206,3 +208,60 @@ def _entry(low: Floats, high: Floats, direction: Floats) -> Floats:
 def distances(low: Floats, high: Floats, eye: Floats) -> Floats:
     """The distances (...) of the points `eye` (..., 3) from the boxes between `low` and `high` (..., 3), m; 0 inside."""
     return np.asarray(np.linalg.norm(np.maximum(np.maximum(low - eye, eye - high), 0.0), axis=-1))
+
+
+# A model, the lowest and the highest corner (3,) m of a box around parts of it that never move, and whether these are visible.
+Still = tuple[str, Floats, Floats, bool]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """One robot in one world.
+
+    `contacts` is the plant's port of contacts. `robot` are the ids of the robot's geometry; `owners` maps the ids of all other
+    geometry to the names of its models. The robot touches nothing beyond `reach` (m) from the origin of its first link.
+
+    `names` (N,) are the models with parts that never move, `low` and `high` (N, 3) m the corners of the boxes around those parts. A
+    ground model has a second, endless box around all that is below its plane, which is not `visible` (N,).
+    """
+
+    contacts: OutputPort
+    robot: frozenset[int]
+    owners: dict[int, str]
+    reach: float
+    names: Objects
+    low: Floats
+    high: Floats
+    visible: Booleans
+
+    @classmethod
+    def of(cls, boxes: Sequence[Still], reach: float, built: Built) -> Surroundings:
+        """`boxes` are those of `still_boxes`; the robot has no point beyond `reach` (m) from its first link's origin."""
+        geometry = [*built.static.items(), *((name, body.geometry) for name, body in built.moving.items())]
+        geometry += [(name, twin.geometry) for name, twin in built.twins.items()]
+        low, high = stacked((low, high) for _, low, high, _ in boxes)
+        return cls(
+            contacts=built.plant.get_contact_results_output_port(),
+            robot=frozenset(one.get_value() for one in built.robot.geometry),
+            owners={one.get_value(): name for name, members in geometry for one in members},
+            reach=reach,
+            names=np.array([name for name, *_ in boxes], dtype=object),
+            low=low,
+            high=high,
+            visible=np.array([visible for *_, visible in boxes], dtype=bool),
+        )
+
+
+def still_boxes(world: World) -> list[Still]:
+    """The boxes around all parts of `world` that never move."""
+    return [(model.name, *box) for model in world.models for box in _boxes(model)]
+
+
+def _boxes(model: Model) -> Iterator[tuple[Floats, Floats, bool]]:
+    """The lowest and the highest corner (3,) of each box around the parts of `model` that never move, and if it is visible."""
+    collisions = [collision for link in still_links(model) for collision in link.collisions]
+    if (box := bounds(collisions)) is not None:
+        yield *box, True
+    for collision in collisions:
+        if isinstance(collision.shape, Plane):
+            yield *filled_bounds(collision), False

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.arrays import Booleans, Floats, Integers, Objects
-from ddenv.robot.drake.articulation import anchored
 from ddenv.robot.piles.sleep import Sleep
 from ddenv.robot.result import PoseRow
-from ddenv.robot.robot_hull import Hull
-from ddenv.world.extent import shape_bounds
-from ddenv.world.model import Plane, World
-from ddenv.world.pose import Pose
+from ddenv.robot.simulation.robot_hull import Hull
+from ddenv.world.extent import shape_bounds, stacked
+from ddenv.world.model import World, still_links
+from ddenv.world.pose import Pose, angle_between
 
 # What happens between two ticks besides motion at the speed at one of them, m: half of g t^2 for t = 0.1 s.
 SLACK = 0.05
@@ -31,7 +30,7 @@ AROUND = 1.0
 class Solids:
     """The boxes around all S shapes of a world that never move: corners `low` and `high` (S, 3) m, and the number of each owner.
 
-    `names` (N,) are the models that have such shapes. A plane has an endless box.
+    `names` (N,) are the models that have such shapes. There are no planes.
     """
 
     names: Objects
@@ -41,25 +40,11 @@ class Solids:
 
     @classmethod
     def of(cls, world: World) -> Solids:
-        names: list[str] = []
-        owners, low, high = [], [], []
-        for model in world.models:
-            held = anchored(model)
-            links = [link for link in model.links if model.static or link.name in held]
-            for one in (collision for link in links for collision in link.collisions):
-                endless = isinstance(one.shape, Plane)
-                box = (np.full(3, -np.inf), np.full(3, np.inf)) if endless else shape_bounds(one.shape, one.pose)
-                if not names or names[-1] != model.name:
-                    names.append(model.name)
-                owners.append(len(names) - 1)
-                low.append(box[0])
-                high.append(box[1])
-        return cls(
-            np.array(names, dtype=object),
-            np.array(owners, dtype=int),
-            np.array(low, dtype=float).reshape(-1, 3),
-            np.array(high, dtype=float).reshape(-1, 3),
-        )
+        shapes = [(model.name, one) for model in world.models for link in still_links(model) for one in link.collisions]
+        number_of = {name: number for number, name in enumerate(dict.fromkeys(name for name, _ in shapes))}
+        owners = np.array([number_of[name] for name, _ in shapes], dtype=int)
+        low, high = stacked(shape_bounds(one.shape, one.pose) for _, one in shapes)
+        return cls(np.array([*number_of], dtype=object), owners, low, high)
 
 
 class Reached:
@@ -106,7 +91,7 @@ class Reached:
         apart = np.maximum(low[:, None] - self._high, self._low - high[:, None]).max(axis=2).min(axis=0)
         near = apart <= margin
         self._place = pose
-        self._free = float(apart[~self._belong(self._owners[near])].min(initial=math.inf))
+        self._free = float(apart[~np.isin(self._owners, self._owners[near])].min(initial=math.inf))
         self._find(near)
 
     def _look_around_models(self) -> None:
@@ -129,11 +114,6 @@ class Reached:
             near[self._around[met]] = True
             self._find(near)
 
-    def _belong(self, models: Integers) -> Booleans:
-        """Which shapes belong to `models` (K,)."""
-        belong: Booleans = np.isin(self._owners, models)
-        return belong
-
     def _find(self, near: Booleans) -> None:
         """Notes the models of the shapes `near`, and looks at their shapes no more."""
         if not near.any():
@@ -146,5 +126,4 @@ class Reached:
 
 def _moved(one: PoseRow, other: PoseRow, reach: float) -> float:
     """How far any point within `reach` (m) of the origin can have moved between two poses of it, m."""
-    likeness = abs(sum([a * b for a, b in zip(one[3:], other[3:], strict=True)]))
-    return math.dist(one[:3], other[:3]) + 2.0 * math.acos(min(1.0, likeness)) * reach
+    return math.dist(one[:3], other[:3]) + angle_between(one[3:], other[3:]) * reach

@@ -2,8 +2,8 @@
 
 import pytest
 
-from ddenv.world.ground import with_ground_boxes
-from ddenv.world.read import parse_world
+from ddenv.world.extent import with_ground_boxes
+from ddenv.world.sdf.read import parse_world
 from tests.conftest import ROOT
 
 
