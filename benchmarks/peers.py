@@ -37,7 +37,7 @@ from peers_tests import Counts, counts
 from ddenv.engine.pool import DrakeContext
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
-from ddenv.runfile.state import FRESH
+from ddenv.runfile.state import CERTIFY
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import with_options
 from ddenv.study.plan import PAIRS
@@ -176,7 +176,7 @@ def ours(asked: Asked, reducer: str, report: Callable[[int], None]) -> Result:
     searched = [event.time for event in events if event.kind == "certificate_started"]
     if not searched:
         raise UserError(f"ddenv's search did not end: {state.reason}")
-    tests = sum(test.is_finished and test.phase not in FRESH for test in state.tests)
+    tests = sum(test.is_finished and test.phase != CERTIFY for test in state.tests)
     made = Counts(tests, state.deflake_runs, state.tally["lost"])
     # A search ends when no single model can be left out.
     return Result(made, searched[0] - started, state.environment, True)

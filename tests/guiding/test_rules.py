@@ -114,7 +114,7 @@ def test_the_engine_obeys_what_the_rules_allow_and_refuses_the_rest_in_their_wor
             control = Control(journal, threading.Event())
             for kind, data in asked:
                 before = journal.state
-                now = Situation(before, search_due=journal.steered)
+                now = Situation(before, search_due=journal.state.search_due)
                 why = refusal(parse(kind, data), now)
                 command = file.send(kind, **data)
                 control.poll()
@@ -147,7 +147,7 @@ def test_what_a_key_offers_is_what_the_engine_obeys(salt, plan, moment, models, 
                     continue
                 assert not offered.why_not
                 journal = Journal(file)
-                if offer(action, Situation(journal.state, search_due=journal.steered), pointed) != offered:
+                if offer(action, Situation(journal.state, search_due=journal.state.search_due), pointed) != offered:
                     continue
                 command = file.send(offered.command.kind, **data_of(offered.command))
                 Control(journal, threading.Event()).poll()

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.engine.journal import Journal
-from ddenv.runfile.atlas import CHUNK, atlas, models_of
+from ddenv.environment import Environment
+from ddenv.runfile.atlas import CHUNK, atlas
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from tests.engine.fake import drive, new_run
@@ -42,20 +43,21 @@ def test_the_models_of_each_failed_test_are_known_from_the_state(salt, plan, mom
         with RunFile(path) as file:
             journal = Journal(file)
     state = journal.state
+    simulated = set(pool.made)
     for test in state.tests:
         if test.outcome in ("similar", "other"):
-            assert frozenset(models_of(state, test)) == journal.keep_of_test(test.id)
+            assert (frozenset(state.models_of(test)), test.seed) in simulated
     others = [test.id for test in state.tests if test.outcome == "other"]
     found = atlas(state)
     assert sorted(test for each in found for test in each.tests) == others
     for each in found:
-        sizes = {test: len(journal.keep_of_test(test)) for test in each.tests}
+        sizes = {test: len(state.models_of(state.tests[test - 1])) for test in each.tests}
         assert (each.size, each.smallest) == min((size, test) for test, size in sizes.items())
 
 
 def state_of(*ends: tuple[str, float]) -> RunState:
     tests = [
-        Test(id, "baseline", None, None, id, id, "other", kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        Test(id, 0, "baseline", None, None, id, id, "other", kind, end_pose=(x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         for id, (kind, x) in enumerate(ends, 1)
     ]
     empty = RunState()
@@ -63,6 +65,7 @@ def state_of(*ends: tuple[str, float]) -> RunState:
         tests=empty.tests.of(tests),
         tally=empty.tally | {"other": len(tests)},
         elements=("a", "b"),
+        environments=empty.environments.of([Environment.whole(2)]),
         scenario={"failure": {"epsilon": 0.5}},
     )
 

@@ -101,7 +101,11 @@ def test_a_fresh_run_shows_its_own_environment(writer, together):
     assert shown(node=0) == (everything, "the whole world, in full")
     gone = frozenset(elements[: 1 + together])
     more = " and 1 more" if together else ""
-    assert shown(node=0, without=0) == (everything - gone, f"the whole world without {elements[0]}{more}")
+    left = [*range(1 + together, len(elements))]
+    assert shown(node=0, without=0, environment=left) == (
+        everything - gone,
+        f"the whole world without {elements[0]}{more}",
+    )
 
 
 def test_after_a_reduction_the_evidence_is_shown_in_what_is_left(writer):

@@ -3,11 +3,11 @@
 from itertools import pairwise
 
 import pytest
-from ddenv.engine.certify import MOST_STEPS_BACK
 
 from ddenv import schemas
 from ddenv.errors import UserError
 from ddenv.evidence.certificate import MOST_ALONE, MOST_BROKEN, MOST_PAIRS
+from ddenv.reduction.procedure import MOST_STEPS_BACK
 from ddenv.reduction.verdict import LONGEST_BASELINE, MOST_RUNS
 from ddenv.runfile.state import FIRST_FRESH_RUN
 from ddenv.study.plan import PAIRS, make_plan
