@@ -22,7 +22,7 @@ from ddenv.runfile.position import position_in
 from ddenv.runfile.store import RunFile
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.lesson_screen import LessonScreen
-from ddenv.workbench.messages import ShowLesson
+from ddenv.workbench.shared.messages import ShowLesson
 
 STEPS = (("moment", 1), ("moment", -1), ("decision", 1), ("decision", -1), ("reduction", 1), ("reduction", -1))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ddenv.workbench.help.catalogue import Action, actions
+from ddenv.workbench.config import Action, actions
 from ddenv.workbench.help.key_names import shown_key
 
 PAGE = Path(__file__).resolve().with_name("keys.md")

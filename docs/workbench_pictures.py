@@ -36,8 +36,8 @@ from ddenv.workbench.app import Config, Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLessons
 from ddenv.workbench.run.run_screen import RunScreen
+from ddenv.workbench.shared.messages import ShowLessons
 from ddenv.world.load import SDF, find_scenario, load_scenario
 
 SCREENS = Path(__file__).resolve().parent / "screens"

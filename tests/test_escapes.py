@@ -8,14 +8,14 @@ import sqlite3
 import pytest
 
 from ddenv.cli.summary import summary_lines
-from ddenv.errors import printable
 from ddenv.runfile.events import EngineFailed, Noted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
+from ddenv.text import printable
 from ddenv.words import headline
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.help.config import Config
+from ddenv.workbench.config import Config
 from ddenv.workbench.lines.line_mode import LineMode
 from tests.command import in_process
 from tests.workbench import fake_moments, fake_run

@@ -20,7 +20,7 @@ from ddenv.scene.player import Player
 from ddenv.scene.stage import Stage
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.race_screen import race_of_runs
-from ddenv.workbench.messages import ShowRun
+from ddenv.workbench.shared.messages import ShowRun
 from tests.hostile_runs import hostile_run, templates
 from tests.tiers import slow
 

@@ -3,16 +3,8 @@
 import re
 import subprocess
 import sys
-from collections import Counter
 
 from tests.conftest import ROOT
-
-
-def test_no_file_is_over_400_lines():
-    long = {
-        str(path): count for path in (ROOT / "src").rglob("*.py") if (count := len(path.read_text().splitlines())) > 400
-    }
-    assert not long
 
 
 def test_drake_is_never_imported_with_a_star():
@@ -36,8 +28,3 @@ def test_the_first_paint_of_a_run_waits_for_no_slow_import():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
-
-
-def test_no_two_files_have_one_name():
-    names = Counter(path.name for path in (ROOT / "src").rglob("*.py") if not path.name.startswith("__"))
-    assert not {name: count for name, count in names.items() if count > 1}

@@ -1,5 +1,8 @@
 """The one kind of error a user can cause."""
 
+from ddenv.text import plain
+from ddenv.text import printable as printable
+
 LONGEST = 1500  # characters of a message
 
 
@@ -10,14 +13,5 @@ class UserError(Exception):
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(shortened(printable(" ".join(message.split()))))
-
-
-def shortened(text: str) -> str:
-    """`text` without its middle if it is longer than `LONGEST`."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 300]} ... {text[-290:]}"
-
-
-def printable(text: str) -> str:
-    """`text` with control characters replaced, since parts of it may come from untrusted files."""
-    return "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
+        line = plain(message)
+        super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST - 300]} ... {line[-290:]}")

@@ -10,7 +10,7 @@ import pytest
 
 from ddenv import schemas
 from ddenv.cli.schemas_command import lines, report
-from ddenv.map.names import width
+from ddenv.text import width
 from tests.waiting import PATIENCE
 
 

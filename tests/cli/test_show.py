@@ -5,7 +5,7 @@ import re
 import pytest
 
 from ddenv.cli.world_show import terminal_map
-from ddenv.map.names import width
+from ddenv.text import width
 from ddenv.world.load import SDF
 from ddenv.world.sdf.read import read_world
 from tests.map.worlds import GROUND, box, world_of

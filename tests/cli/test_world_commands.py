@@ -6,7 +6,7 @@ import re
 import pytest
 
 from ddenv.cli.world_check import lines, report
-from ddenv.map.names import width
+from ddenv.text import width
 from ddenv.world.sdf.read import parse_world
 from tests.command import ddenv, in_process
 from tests.conftest import DATA

@@ -10,7 +10,7 @@ from docs.workbench_pictures import PICTURES
 from textual.screen import Screen
 
 import ddenv.workbench
-from ddenv.workbench.help.catalogue import actions
+from ddenv.workbench.config import actions
 from tests.conftest import ROOT
 
 DOCS = ROOT / "docs"

@@ -13,7 +13,7 @@ from ddenv.report.run_data import read_run
 from ddenv.runfile.fold import fold
 from ddenv.words import news
 from ddenv.workbench.run.explain import explain
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 from tests.workbench import fake_run
 
 PINNED = "1 pinned model was never left out"

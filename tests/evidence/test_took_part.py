@@ -15,8 +15,8 @@ from ddenv.runfile.store import RunFile
 from ddenv.words import news
 from ddenv.workbench.run.candidate_rows import IN_SHORT, listed, words
 from ddenv.workbench.run.explain import explain
-from ddenv.workbench.run.models_chart import FREE, Course, steps
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.run.models import FREE, Course, steps
+from ddenv.workbench.shared.poll import Snapshot
 from tests.command import in_process
 from tests.engine.fake import drive
 from tests.engine.participation import MODELS, Participation, sliced_run

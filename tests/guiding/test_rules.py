@@ -17,8 +17,7 @@ from ddenv.guiding.offers import ACTIONS, Pointed, offer
 from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.store import RunFile
-from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.run_keys import GUIDING
+from ddenv.workbench.run.run_keys import GUIDING, KeyOffers
 from tests.engine.fake import ELEMENTS, drive, new_run
 from tests.engine.guided import COMMANDS, Disturbed, at_once
 from tests.engine.killing import Killed, kill_after

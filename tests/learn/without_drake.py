@@ -17,7 +17,7 @@ from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLesson, ShowLessons, ShowRace
+from ddenv.workbench.shared.messages import ShowLesson, ShowLessons, ShowRace
 
 TOY, REAL = LESSONS / "delivery.ddenv", LESSONS / "ditch.ddenv"
 

@@ -25,7 +25,7 @@ def lasting(notify):
 def still_time(monkeypatch):
     """Neither events nor screens depend on the clock."""
     monkeypatch.setattr("ddenv.runfile.store.time", SimpleNamespace(time=lambda: MOMENT))
-    monkeypatch.setattr("ddenv.workbench.run.poll.now", lambda: MOMENT + 83.0)
+    monkeypatch.setattr("ddenv.workbench.shared.poll.now", lambda: MOMENT + 83.0)
     monkeypatch.setattr("ddenv.workbench.app.Workbench.notify", lasting(Workbench.notify))
     monkeypatch.setenv("TZ", "UTC")
     monkeypatch.delenv("NO_COLOR", raising=False)

@@ -8,7 +8,7 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Label
 
-from ddenv.workbench.background import call_if_open, is_open
+from ddenv.workbench.shared.background import call_if_open, is_open
 from tests.waiting import eventually
 
 

@@ -15,9 +15,9 @@ from ddenv.workbench.map.map_words import LEGEND, MORE_SIGNS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidate_rows import COLUMNS, FRESH_COLUMNS, MEANINGS
 from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.facts_dialog import FactsDialog
+from ddenv.workbench.run.facts import FactsDialog
+from ddenv.workbench.shared.wording import CLAIM, OUTCOME, STATUS, VERDICT
 from ddenv.workbench.widgets.lines import Lines
-from ddenv.workbench.wording import CLAIM, OUTCOME, STATUS, VERDICT
 from tests.waiting import eventually
 
 

@@ -13,7 +13,7 @@ from ddenv.runfile.state import Candidate, Round, RunState, Split, Trial
 from ddenv.workbench.run import candidates as module
 from ddenv.workbench.run.candidate_rows import COLUMNS, fitting, listed, words
 from ddenv.workbench.run.candidates import Candidates
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 
 
 def snapshot(run, engine="alive") -> Snapshot:
@@ -43,7 +43,7 @@ def large(number: int, judged: int = 0) -> Snapshot:
         for index in range(number)
     )
     tests = PersistentTuple.of(
-        runs_state.Test(id, "round", 1, id - 1, 0, 0, "pass", distance=1.0) for id in range(1, judged + 1)
+        runs_state.Test(id, 0, "round", 1, id - 1, 0, 0, "pass", distance=1.0) for id in range(1, judged + 1)
     )
     state = RunState(status="running", elements=names, environment=names, tests=tests)
     return Snapshot(state.changed(round=Round(1, len(names), split, candidates)), (), "alive")

@@ -3,7 +3,7 @@
 import pytest
 
 from ddenv.runfile.progress import Point
-from ddenv.workbench.run.models_chart import DECIDED, NEEDED, Course, steps
+from ddenv.workbench.run.models import DECIDED, NEEDED, Course, steps
 
 FALLING = Course((Point(0, 40), Point(10, 20), Point(20, 5)), 20)
 GUIDED = Course((Point(0, 40), Point(10, 20, 11), Point(20, 14, 11)), 24, 11, (3, 20))

@@ -8,8 +8,8 @@ import pytest
 
 from ddenv.runfile.fold import fold
 from ddenv.workbench.run.explain import baseline_sentence, explain
-from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.run.status import facts
+from ddenv.workbench.shared.poll import Poll, Snapshot
 from tests.shorthand import raw
 
 

@@ -19,7 +19,7 @@ from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels
 from ddenv.workbench.run.dialogs import Quit
-from ddenv.workbench.run.poll import Poll
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.widgets.question import Question
 from tests.waiting import eventually
 

@@ -23,17 +23,17 @@ from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile, recorded
 from ddenv.runs.tests_left import remaining
 from ddenv.workbench.app import Workbench
+from ddenv.workbench.config import read_config
 from ddenv.workbench.export.export_dialog import Wanted, suggested, write
-from ddenv.workbench.help.config import read_config
 from ddenv.workbench.launch import check_terminal
 from ddenv.workbench.run.candidate_rows import listed
 from ddenv.workbench.run.explain import explain
-from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.recent_runs import RunsFolder
 from ddenv.workbench.runs.runs_table import moment
 from ddenv.workbench.setup.open_file import WorldTree, complain_about
 from ddenv.workbench.setup.save_scenario import scenario_path
+from ddenv.workbench.shared.poll import Snapshot
 from tests.tiers import slow
 
 NAMES = [
@@ -258,7 +258,7 @@ SIZES = [(20, 5), (1, 1), (64, 18), (80, 24), (120, 36), (300, 100)]
 @pytest.mark.parametrize("watch", slow(pytest.mark.fuzz, [True, False], but=[False]), ids=["watch", "guide"])
 async def test_keys_and_clicks_at_random_break_nothing(run, monkeypatch, watch):
     started = starts(monkeypatch)
-    monkeypatch.setattr("ddenv.workbench.run.processes.Scene.start", lambda self: None)
+    monkeypatch.setattr("ddenv.workbench.shared.processes.Scene.start", lambda self: None)
     fake_moments.guided(run)
     run.hold()
     chance = random.Random(20 + watch)

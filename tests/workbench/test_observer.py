@@ -1,10 +1,7 @@
 """A screen looks at a run file: whatever becomes of the file, it neither writes, nor waits, nor falls over."""
 
 import os
-import signal
 import sqlite3
-import subprocess
-import sys
 import threading
 
 import fake_moments
@@ -13,25 +10,14 @@ import pytest
 from attached import Attached
 
 from ddenv import __version__
-from ddenv.doctor.run_health import run_health
 from ddenv.errors import UserError
 from ddenv.guiding.pace import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
-from ddenv.workbench.run import poll as polling
-from ddenv.workbench.run.observed import Busy, Observed
-from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.status import facts
-from tests.waiting import eventually, wait_until
-
-# Works on a run until it is told that all is over.
-ENGINE = """
-import pathlib, sys
-from ddenv.runfile.lock import engine_lock
-with engine_lock(pathlib.Path(sys.argv[1])):
-    print("at work", flush=True)
-    sys.stdin.read()
-"""
+from ddenv.workbench.shared import poll as polling
+from ddenv.workbench.shared.observed import Busy, Observed
+from ddenv.workbench.shared.poll import Poll
+from tests.waiting import eventually
 
 
 def look(poll):
@@ -228,28 +214,3 @@ def test_a_folder_where_nothing_may_be_written(run, runs):
         poll.close()
     finally:
         runs.chmod(0o700)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's /proc")
-def test_an_engine_that_is_suspended_is_told_with_the_way_on(run, poll):
-    command = [sys.executable, "-c", ENGINE, str(run.path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as engine:
-
-        def told():
-            look(poll)
-            return {fact.name: fact.forms for fact in facts(poll.snapshot)}
-
-        try:
-            assert engine.stdout.readline()
-            assert told()["state"] == ("▶ running", "▶ running")
-            engine.send_signal(signal.SIGSTOP)
-            wait_until(lambda: told()["state"][0] == f"! engine suspended: kill -CONT {engine.pid} wakes it", told)
-            # Nobody knows for how long.
-            assert told()["left"][1].endswith("tests left")
-            (found,) = (finding for finding in run_health(run.path) if finding.what == "engine")
-            assert (found.says, found.advice) == ("suspended", f"kill -CONT {engine.pid} wakes it")
-            engine.send_signal(signal.SIGCONT)
-            wait_until(lambda: told()["state"][0] == "▶ running", told)
-        finally:
-            engine.kill()
-    assert poll.snapshot.suspended is None and told()["state"][0] == "✗ engine is gone: r resumes"

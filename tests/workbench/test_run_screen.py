@@ -15,17 +15,16 @@ from ddenv.schemas import explanation
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.shortcuts import Help
-from ddenv.workbench.history.compare import Compare
-from ddenv.workbench.history.history_screen import History
+from ddenv.workbench.history.history_screen import Compare, History
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.change import Change
 from ddenv.workbench.run.choose import ChooseModels, Copy, Layers
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog, ssh_line
-from ddenv.workbench.run.poll import Poll
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.setup.fields import SchemaSelect
 from ddenv.workbench.setup.setup_screen import SetupScreen
+from ddenv.workbench.shared.poll import Poll
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
 

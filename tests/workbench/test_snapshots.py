@@ -15,7 +15,7 @@ from ddenv.learn.shelf import bundled, open_lesson
 from ddenv.runfile.store import ROBOT
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import keep_score
-from ddenv.workbench.messages import ShowLessons
+from ddenv.workbench.shared.messages import ShowLessons
 from tests.tiers import slow
 
 SMALL, USUAL, LARGE = (80, 24), (120, 36), (200, 60)
@@ -27,7 +27,7 @@ THEMES = ["ddenv", "ddenv-light", "ansi-dark"]
 def no_clock(monkeypatch):
     """Notifications go by the clock, and so does what is seen of a run that is read in parts."""
     monkeypatch.setattr(Workbench, "notify", lambda *_, **__: None)
-    monkeypatch.setattr("ddenv.workbench.run.poll.PATIENCE", math.inf)
+    monkeypatch.setattr("ddenv.workbench.shared.poll.PATIENCE", math.inf)
 
 
 async def settled(pilot):

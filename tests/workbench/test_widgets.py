@@ -11,12 +11,13 @@ from ddenv.map.footprints import footprints
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import View, masks, owners
 from ddenv.runfile.fold import fold
+from ddenv.text import plain, truncated
 from ddenv.workbench.map.model_looks import FLOOR, KEPT, LEFT_OUT, PROTECTED, REMOVED, fill, kept, looks
 from ddenv.workbench.map.picture import strip
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.run.processes import last_line
 from ddenv.workbench.runs.recent_runs import recent_runs
-from ddenv.workbench.wording import about, brief, duration, metres, percent, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.processes import last_line
+from ddenv.workbench.shared.wording import about, brief, duration, metres, percent
 from ddenv.world.sdf.read import parse_world
 
 
@@ -65,7 +66,7 @@ def test_no_distance_is_no_text(value):
 
 def test_names_cannot_steer_the_terminal():
     assert plain("a\x1b[31m\nb\x07") == "a�[31m b�"
-    assert shorten("abcdef", 4) == "abc…"
+    assert truncated("abcdef", 4) == "abc…"
 
 
 def looks_of(run, candidate=None):

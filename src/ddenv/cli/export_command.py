@@ -99,7 +99,7 @@ def _write_mcap(run: Path, file: Path, trust: bool) -> None:
 
 def announce_needs(sdf: Path, uris: list[str]) -> None:
     """Lists the other files that a written world still needs, since it keeps their names."""
-    from ddenv.map.names import shortened
+    from ddenv.text import shortened
     from ddenv.words import first_of
 
     if uris:

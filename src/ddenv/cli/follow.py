@@ -13,7 +13,8 @@ from typing import TextIO
 
 from ddenv.cli.summary import summary, summary_lines
 from ddenv.errors import UserError, printable
-from ddenv.runfile.fold import apply, fold
+from ddenv.runfile.fold import fold
+from ddenv.runfile.follow import Follower
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words, stop_engines
@@ -52,21 +53,22 @@ def follow(path: Path, engine: subprocess.Popen[bytes], out: TextIO) -> RunState
     signal.signal(signal.SIGTERM, _interrupt)
     view = _View(out)
     with RunFile(path) as file:
-        state = fold(file.events())
-        before = state.revision
-        view.now(state, None)
+        follower = Follower(file, fold(file.events()))
+        before = follower.state.revision
+        view.now(follower.state, None)
         try:
             while engine.poll() is None:
-                state = _update(file, state, view)
+                _update(file, follower, view)
                 time.sleep(POLL)
         except KeyboardInterrupt:
             with contextlib.suppress(KeyboardInterrupt):
                 stop_engines([(file, engine)])
-            state = _update(file, state, view)
+            _update(file, follower, view)
             view.close()
-            raise Interrupted(state) from None
-        state = _update(file, state, view)
+            raise Interrupted(follower.state) from None
+        _update(file, follower, view)
     view.close()
+    state = follower.state
     # An engine without any output did not start, unless there was nothing left to do.
     silent = state.revision == before and engine.returncode != 0
     if silent or not state.ended:
@@ -80,12 +82,10 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _update(file: RunFile, state: RunState, view: _View) -> RunState:
-    for event in file.read(state.revision):
-        before, state = state, apply(state, event)
-        view.happened(event.kind, before, state)
-    view.now(state, max((live.time for live in file.live()), default=None))
-    return state
+def _update(file: RunFile, follower: Follower, view: _View) -> None:
+    for event, before, after in follower.new():
+        view.happened(event.kind, before, after)
+    view.now(follower.state, max((live.time for live in file.live()), default=None))
 
 
 class _View:

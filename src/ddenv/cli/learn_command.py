@@ -88,7 +88,7 @@ def _race(names: list[str]) -> int:
     from ddenv.learn.race import RACERS
     from ddenv.runs.folder import find_run
     from ddenv.workbench.launch import run_workbench
-    from ddenv.workbench.messages import ShowRace
+    from ddenv.workbench.shared.messages import ShowRace
 
     if not RACERS[0] <= len(names) <= RACERS[1]:
         raise UserError(f"--race: expected {RACERS[0]} to {RACERS[1]} runs, found {len(names)}")
@@ -128,7 +128,7 @@ def _open(name: str | None) -> int:
     from ddenv.learn.shelf import find_lesson, open_lesson
     from ddenv.runs.folder import find_run
     from ddenv.workbench.launch import run_workbench
-    from ddenv.workbench.messages import ShowLesson, ShowLessons
+    from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 
     if name is None:
         return run_workbench(first=ShowLessons())

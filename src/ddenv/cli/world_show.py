@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ddenv.map.cells import FAINT, picture, signs
+from ddenv.map.colors import PLAIN
 from ddenv.map.footprints import Drawn, plan
 from ddenv.map.frame import tick_step, tick_text, ticks
-from ddenv.map.names import padded, shortened, width
-from ddenv.map.paint import PLAIN, Canvas, Run
+from ddenv.map.paint import Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
+from ddenv.text import padded, shortened, width
 from ddenv.words import count
 from ddenv.world.model import World
 

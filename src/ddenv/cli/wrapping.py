@@ -6,7 +6,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 
-from ddenv.map.names import width
+from ddenv.text import width
 
 # The minimum width for readable text, columns.
 LEAST = 8

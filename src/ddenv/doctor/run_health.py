@@ -12,7 +12,7 @@ from ddenv.amounts import count
 from ddenv.doctor.finding import Finding
 from ddenv.errors import UserError
 from ddenv.runfile.integrity import Whole, faults, rescue, whole
-from ddenv.runfile.lock import engine_is_alive, mode_beside, suspended_engine
+from ddenv.runfile.lock import engine_is_alive, mode_beside
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.runs.subject import read_parts
@@ -158,8 +158,6 @@ def _made_with(read: Whole) -> Iterator[Finding]:
 
 def _engine(read: Whole, path: Path, alive: bool) -> Finding:
     state = read.state
-    if alive and (process := suspended_engine(path)) is not None:
-        return Finding(GROUP, "engine", "suspended", "note", f"kill -CONT {process} wakes it")
     if alive:
         return Finding(
             GROUP,

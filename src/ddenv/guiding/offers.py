@@ -12,9 +12,9 @@ from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
-from ddenv.map.names import shortened
 from ddenv.runfile.state import REFUSED, RunState, Trial
 from ddenv.settings import Value
+from ddenv.text import shortened
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,9 +21,9 @@ from ddenv.guiding.situation import (
     names_of,
     new_search,
 )
-from ddenv.map.names import shortened
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState, Test, Trial
+from ddenv.text import shortened
 from ddenv.words import count
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
-from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
+from ddenv.text import shortened
 from ddenv.words import count, first_of
 
 EngineIs = Literal["alive", "starting", "absent"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from ddenv.errors import UserError
 from ddenv.learn.recorded_oracle import Oracle
 from ddenv.runfile.events import TestFinished, TestStarted
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Split, Trial
 from ddenv.runfile.store import Recorded, RunFile
@@ -110,8 +110,8 @@ def plays_of_runs(runs: Sequence[Path]) -> tuple[Play, ...]:
 def _play_of_run(run: Path, events: Sequence[Recorded]) -> Play:
     """The search of a run. Tests that others imply cost nothing, and are no turns."""
     state, turns, begun = RunState(), list[Turn](), dict[int, tuple[Candidate | Trial, bool]]()
-    for recorded in events:
-        state, event = apply(state, recorded), recorded.event
+    for recorded, _, state in steps(events):
+        event = recorded.event
         if isinstance(event, TestStarted):
             test = state.tests[event.test - 1]
             candidate = made_for(state, test)

@@ -6,8 +6,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ddenv.map import lazy_numpy as np
-from ddenv.map.paint import PLAIN, RGB, Canvas, blend, packed, readable
+import numpy as np
+
+from ddenv.map.colors import PLAIN, RGB, blend, packed, readable
+from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY, View, label_cells, masks, owners
 
 if TYPE_CHECKING:

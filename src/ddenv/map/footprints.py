@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.map.paint import RGB
+from ddenv.map.colors import RGB
 from ddenv.world.extent import convex_hull, model_bounds, shape_bounds
 from ddenv.world.model import (
     Box,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddenv.map.names import width
+from ddenv.text import width
 
 SIZES = (12.0, 10.5, 9.0)  # of fonts, the preferred first, pixels
 # Mean width and height of a letter, relative to the font size.

@@ -5,50 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import overload
 
-from ddenv.map import lazy_numpy as np
+import numpy as np
 
-RGB = tuple[int, int, int]
-# Eight hues, as distinct as possible for colour-blind readers; partitions beyond H repeat the hues, but not the letters.
-HUES: tuple[RGB, ...] = (
-    (86, 180, 233),
-    (240, 160, 40),
-    (60, 190, 140),
-    (222, 130, 190),
-    (232, 220, 90),
-    (235, 105, 65),
-    (140, 140, 250),
-    (150, 200, 90),
-)
-# The packed colour of the terminal's default, and the offset of packed numbers 0..15 of the terminal's palette.
-PLAIN, NUMBERED = -1, 1 << 24
-BLACK, WHITE = 0x000000, 0xFFFFFF
+from ddenv.map.colors import BLACK, NUMBERED, RGB, WHITE, luminance, packed, readable
+
 # Minimum difference in brightness between a dot and its background, of 255.
 LEAST_APART = 70
 # Blocks that fill their cells: text over them takes their colour as background.
 FILLED = tuple(map(ord, "█▉▇"))
-_BRIGHT = frozenset({2, 3, 6, 7, 10, 11, 13, 14, 15})
-
-
-def blend(back: RGB, front: RGB, amount: float) -> RGB:
-    """The colour between `back` (`amount` 0) and `front` (1)."""
-    red, green, blue = (round(b + (f - b) * amount) for b, f in zip(back, front, strict=True))
-    return red, green, blue
-
-
-def packed(color: RGB) -> int:
-    """The colour as one number, 0xRRGGBB."""
-    return color[0] << 16 | color[1] << 8 | color[2]
-
-
-def readable(back: int) -> int:
-    """Black or white, whichever is more readable on a packed colour; the terminal's default on its own default."""
-    if back < 0:
-        return PLAIN
-    if back >= NUMBERED:
-        return NUMBERED | (0 if back - NUMBERED in _BRIGHT else 15)
-    return BLACK if luminance(back) > 110 else WHITE
 
 
 def _apart(backs: np.ndarray, color: int) -> np.ndarray:
@@ -61,19 +26,6 @@ def _apart(backs: np.ndarray, color: int) -> np.ndarray:
     near = mixed & (abs(bright - luminance(color)) < LEAST_APART)
     colors[near] = np.where(bright[near] > 110, BLACK, WHITE)
     return colors
-
-
-@overload
-def luminance(color: int) -> float: ...
-
-
-@overload
-def luminance(color: np.ndarray) -> np.ndarray: ...
-
-
-def luminance(color: int | np.ndarray) -> float | np.ndarray:
-    """The brightness of a packed colour, or of an array of them, 0..255."""
-    return 0.3 * (color >> 16) + 0.59 * (color >> 8 & 255) + 0.11 * (color & 255)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from ddenv.map import lazy_numpy as np
+import numpy as np
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

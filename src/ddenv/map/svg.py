@@ -8,13 +8,12 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ddenv.errors import printable
+from ddenv.map.colors import RGB, blend, packed, readable
 from ddenv.map.footprints import Drawn, plan
 from ddenv.map.frame import Frame, tick_step, tick_text, ticks
 from ddenv.map.labels import HEIGHT, Label, Spot, place_labels, spot
-from ddenv.map.names import shortened
-from ddenv.map.paint import RGB, blend, packed, readable
 from ddenv.map.raster import extent
+from ddenv.text import printable, shortened
 from ddenv.world.extent import convex_hull
 from ddenv.world.model import World, is_ground
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from ddenv.errors import printable
 from ddenv.words import duration as duration
 from ddenv.words import percent as percent
 
@@ -91,11 +90,6 @@ class Report:
 def parts(cell: Cell) -> tuple[Part, ...]:
     """The parts of a cell."""
     return cell if isinstance(cell, tuple) else (cell,)
-
-
-def plain(text: object) -> str:
-    """`text` on one line without characters that control a terminal or change the direction of text."""
-    return printable(" ".join(str(text).split()))
 
 
 def say(*words: Part, notice: bool = False) -> Paragraph:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts, plain
+from ddenv.page.blocks import Block, Cell, Code, Name, Paragraph, Part, Picture, Report, Strong, Table, parts
 from ddenv.page.policy import hashed, policy
+from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
 
@@ -75,7 +76,7 @@ def _side(table: Table, column: int) -> str:
 
 
 def _code(code: Code) -> str:
-    text = "\n".join(escape("".join(char if char.isprintable() else "�" for char in line)) for line in code.lines)
+    text = "\n".join(escape(printable(line)) for line in code.lines)
     shown = f"<pre>{text}</pre>"
     return f"<details><summary>{_text(code.folded)}</summary>{shown}</details>" if code.folded else shown
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
-from ddenv.errors import printable
 from ddenv.page.blocks import (
     Block,
     Cell,
@@ -21,8 +20,8 @@ from ddenv.page.blocks import (
     Strong,
     Table,
     parts,
-    plain,
 )
+from ddenv.text import plain, printable
 
 HERE = Path(__file__).parent
 _MARKUP = re.compile(r"([\\`*_\[\]<>|~$&])")

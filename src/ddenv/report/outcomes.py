@@ -1,34 +1,44 @@
-"""How sure the result of a run is: its baseline, and the outcomes of its tests."""
+"""How sure the result of a run is: its baseline, how its tests ended, the other failures they met, and its fresh runs."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
-from ddenv.evidence.claims import missed
+from ddenv.evidence.claims import current, drift, meaning, missed, missing, never_left_out, promise, verdict_on
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
-from ddenv.page.blocks import (
-    Block,
-    Cell,
-    Name,
-    Picture,
-    Section,
-    Strong,
-    Table,
-    percent,
-    plain,
-    say,
-    section,
-    thousands,
-)
+from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, percent, say, section, thousands
 from ddenv.report.run_data import Record
+from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import BROKEN, RunState
+from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
+from ddenv.text import plain
 from ddenv.words import count, failed_in
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200
 WIDTH, HEIGHT, LEFT, RIGHT, LINE = 880.0, 58.0, 20.0, 36.0, 26.0
+MEANING = {
+    "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
+    "other": "another failure",
+    "pass": "the goal was reached",
+    "error": "the simulation broke",
+    "timeout": "the test took too long on the clock",
+    "failed": "failed, before f was fixed",
+}
+PHASES = (
+    ("baseline", "whole world"),
+    ("round", "in rounds"),
+    ("hand", "by hand"),
+    ("audit", "audits of slices"),
+    ("certify", "fresh runs"),
+    ("isolate", "isolation"),
+)
+# The maximum number of failures in the table, and of models by name.
+MOST, MOST_NAMES = 30, 6
 
 
 def interval(base: Baseline) -> str:
@@ -49,24 +59,6 @@ def interval(base: Baseline) -> str:
         f'<circle class="dot" cx="{at(base.rate):.1f}" cy="{LINE}" r="6"/>'
         f'<text class="said" x="{at(base.rate):.1f}" y="{LINE - 13}" text-anchor="middle">{percent(base.rate)}</text></svg>'
     )
-
-
-MEANING = {
-    "similar": "f again: the robot did not reach the goal, and ended where it ended in f",
-    "other": "another failure",
-    "pass": "the goal was reached",
-    "error": "the simulation broke",
-    "timeout": "the test took too long on the clock",
-    "failed": "failed, before f was fixed",
-}
-PHASES = (
-    ("baseline", "whole world"),
-    ("round", "in rounds"),
-    ("hand", "by hand"),
-    ("audit", "audits of slices"),
-    ("certify", "fresh runs"),
-    ("isolate", "isolation"),
-)
 
 
 def sureness(record: Record) -> Section | None:
@@ -181,3 +173,100 @@ def _outcome(state: RunState, outcome: str, number: int, by_phase: list[int]) ->
         last = next((test for test in reversed(state.tests) if test.outcome == outcome), None)
         meaning += f", the last time: {plain(last.failure)[:200]}" if last is not None and last.failure else ""
     return outcome, str(number), share, *(str(each) if each else "–" for each in by_phase), meaning
+
+
+def others_met(record: Record) -> Section | None:
+    """The section on other failures; None if there is none."""
+    found = atlas(record.state)
+    if not found:
+        return None
+    tests = count(sum(len(each.tests) for each in found), "test")
+    lead = say(
+        f"{count(len(found), 'other failure')} in {tests}, each with the smallest environment that showed it. "
+        "The workbench reduces any of them in a branch of the run (key f)."
+    )
+    head = ("failure", "from f's end, m", "tests", "smallest environment", "its models")
+    table = Table(head, tuple(_row(record.state, each) for each in found[:MOST]), frozenset({1, 2}))
+    more = len(found) - MOST
+    rest = [say(f"And {count(more, 'more failure')}.")] if more > 0 else []
+    return Section("Other failures met", (lead, table, *rest))
+
+
+def _row(state: RunState, failure: OtherFailure) -> tuple[Cell, ...]:
+    models = state.models_of(state.tests[failure.smallest - 1])
+    names: list[Part] = []
+    for name in models[:MOST_NAMES]:
+        names += [", ", Name(name)]
+    more = len(models) - MOST_NAMES
+    names += [f" and {more} more"] if more > 0 else []
+    size = f"{count(failure.size, 'model')} (test {failure.smallest})"
+    f = state.f_position
+    away = "" if f is None else f"{math.dist(f, failure.position):.2f}"
+    return failure.name, away, thousands(len(failure.tests)), size, tuple(names[1:]) or "none"
+
+
+def worth(record: Record) -> Section | None:
+    """The section on the certificate, or on why there is none; None before f is known."""
+    state = record.state
+    if state.baseline is None or not state.nodes:
+        return None
+    found = current(state)
+    blocks = _without(state) if found is None else _with(state, found)
+    return Section("What it is worth", tuple(blocks))
+
+
+def _without(state: RunState) -> list[Block]:
+    so_far = drift(state)
+    words = missing(state)
+    first = f"{words[:1].upper()}{words[1:]}: nothing is claimed of what is left."
+    return [say(first, f" From all runs so far: {so_far[0]}." if so_far else "")]
+
+
+def _with(state: RunState, found: Certificate) -> list[Block]:
+    rows = fresh_runs(state)
+    head = ("environment", "runs", "ended", "f shown", "95 % interval", "which means")
+    table = Table(
+        head, tuple(_fresh_row(each, found) for each in rows[:MOST_ROWS]), frozenset({1, 3, 4}), frozenset({0})
+    )
+    words = (
+        "These runs have seeds that the search did not use, and none of them ended early. Rates leave broken runs out."
+    )
+    if state.certified:
+        means = promise(state, found)
+        words += f" {means[:1].upper()}{means[1:]}."
+    return [table, say(words), *_earlier(state, found)]
+
+
+def _fresh_row(each: FreshRuns, found: Certificate) -> tuple[Cell, ...]:
+    ended = ", ".join(f"{number} {outcome}" for outcome, number in each.outcomes)
+    shown = percent(each.shown / each.runs) if each.runs else "–"
+    interval = f"{percent(each.low)} to {percent(each.high)}" if each.runs else "–"
+    means = "" if each.claim is None else meaning(each.claim, found)
+    return _name(each), thousands(each.runs), ended, shown, interval, means
+
+
+def _name(each: FreshRuns) -> Cell:
+    if each.without is not None:
+        return "without ", Name(each.without)
+    if each.is_left:
+        return "what is left"
+    return "the whole world" if each.node == 0 else f"environment {each.node}"
+
+
+def _earlier(state: RunState, found: Certificate) -> list[Block]:
+    """Other certificates of the same environment: each stands for itself."""
+    others = [one for one in state.certificates if one.node == found.node and one.claims and one is not found]
+    return [
+        say(f"Certificate {one.number}, made before: {plain(verdict_on(one, never_left_out(state, one)))}.")
+        for one in others
+    ]
+
+
+def rate_of_left(state: RunState) -> tuple[str, str]:
+    """How often f shows in what is left, and what that is, for the figures at the top."""
+    found, here = current(state), state.here
+    if found is not None:
+        return f"{found.claims[0].shown} of {thousands(found.claims[0].runs)}", "fresh runs show f"
+    if here is None or not here.runs:
+        return "", ""
+    return f"{here.shown} of {thousands(len(here.runs))}", "runs of it show f"

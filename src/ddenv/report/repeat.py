@@ -5,9 +5,10 @@ from __future__ import annotations
 import shlex
 from typing import Any
 
-from ddenv.page.blocks import Block, Code, Name, Section, Table, plain, say, section
+from ddenv.page.blocks import Block, Code, Name, Section, Table, say, section
 from ddenv.report.run_data import Record
 from ddenv.settings import JOBS, OPTIONS, PRINTED, SETTINGS, Setting, read
+from ddenv.text import plain
 
 LONGEST_VALUE = 120
 

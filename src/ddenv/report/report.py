@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 from ddenv.errors import UserError
-from ddenv.evidence.claims import ended
+from ddenv.evidence.claims import current, ended, for_everyone
 from ddenv.page.blocks import (
+    Name,
     Paragraph,
+    Part,
     Report,
     Strong,
     duration,
     moment,
     percent,
     place,
-    plain,
     say,
     section,
     thousands,
@@ -23,23 +25,26 @@ from ddenv.page.blocks import (
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
 from ddenv.report.by_hand import guiding
-from ddenv.report.in_short import in_short
-from ddenv.report.others_met import others_met
-from ddenv.report.outcomes import sureness
+from ddenv.report.outcomes import others_met, rate_of_left, sureness, worth
 from ddenv.report.repeat import repeat, settings
 from ddenv.report.rounds import way
 from ddenv.report.run_data import Record, read_run
 from ddenv.report.what_is_left import what_is_left
 from ddenv.report.why import why
-from ddenv.report.worth import rate_of_left, worth
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.failures import Place
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
+from ddenv.text import plain
 from ddenv.version import __version__
 from ddenv.words import count
 from ddenv.world.access import write_file
+
+KINDS = (".html", ".htm", ".md")
+PICTURES = ("map", "near", "chart", "interval")
+# Models are named up to this number.
+MOST_NAMES = 6
 
 
 def content(record: Record) -> Report:
@@ -168,10 +173,6 @@ def _foot(record: Record) -> str:
     return f"{plain(record.path.name)}{when}; {by}report by ddenv {__version__}. Times are in UTC, lengths in m."
 
 
-KINDS = (".html", ".htm", ".md")
-PICTURES = ("map", "near", "chart", "interval")
-
-
 def files_of(file: Path) -> list[Path]:
     """The files that a report called `file` may consist of."""
     beside = PICTURES if file.suffix.lower() == ".md" else ()
@@ -217,3 +218,31 @@ def _check(file: Path) -> None:
             raise UserError(f"{file}: there is no folder {file.parent}")
     except OSError as error:
         raise UserError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def in_short(record: Record) -> list[Paragraph]:
+    """The paragraph that a report begins with; none before a failure is known."""
+    state, found = record.state, current(record.state)
+    if state.baseline is None:
+        return []
+    sure = "Fresh runs have not checked that yet." if found is None else f"{for_everyone(found)}."
+    runs = "1 simulated drive" if state.made == 1 else f"{thousands(state.made)} simulated drives"
+    cost = f"This took {runs} and {duration(spent(state, state.updated_at))} of computing."
+    what = f" The robot {deed(state.failure)} before it reached its goal. "
+    return [say(Strong("In short:"), what, *_enough(state), f" {sure} {cost}")]
+
+
+def _enough(state: RunState) -> Iterator[Part]:
+    left, whole = state.environment, count(len(state.elements), "model")
+    if not left:
+        yield f"Without any of the {whole} of its world it fails, too: look at the robot, its goal and what always stays."
+        return
+    if len(left) == len(state.elements):
+        yield f"Each of the {whole} of its world may have to do with it."
+        return
+    these = "1 is" if len(left) == 1 else f"{len(left)} are"
+    yield f"Of the {whole} of its world, {these} enough to make it fail like that: "
+    for number, name in enumerate(left[:MOST_NAMES]):
+        yield "" if not number else " and " if number == len(left) - 1 else ", "
+        yield Name(plain(name))
+    yield f" and {len(left) - MOST_NAMES} more." if len(left) > MOST_NAMES else "."

@@ -15,11 +15,11 @@ import numpy as np
 from ddenv.map.footprints import Drawn
 from ddenv.map.frame import FAR, Frame, tick_step, tick_text, ticks
 from ddenv.map.labels import HEIGHT, Spot, place_labels, spot
-from ddenv.map.names import shortened
 from ddenv.map.raster import extent
-from ddenv.page.blocks import plain, section
+from ddenv.page.blocks import section
 from ddenv.report.run_data import Record
 from ddenv.runfile.store import COLUMNS
+from ddenv.text import plain, shortened
 from ddenv.world.extent import convex_hull
 
 # Paths of the robot by their sign: flat rows of `COLUMNS` floats, or None.

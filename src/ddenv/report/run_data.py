@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 from ddenv.evidence.claims import current
 from ddenv.runfile.events import Created, RoundStarted
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Round, RunState
 from ddenv.runfile.store import Recorded, RunFile
@@ -93,11 +93,11 @@ def _story(file: RunFile) -> tuple[Recorded | None, RunState, tuple[Round, ...],
     rounds: dict[int, Round] = {}
     trouble = ""
     try:
-        for recorded in file.read():
-            after, first = apply(state, recorded), first or recorded
+        for recorded, before, after in steps(file.read()):
+            first = first or recorded
             # A round does not change after its end.
-            if isinstance(recorded.event, RoundStarted) and state.round is not None:
-                rounds[state.round.number] = state.round
+            if isinstance(recorded.event, RoundStarted) and before.round is not None:
+                rounds[before.round.number] = before.round
             state = after
     except UserError as error:
         trouble = f"{error}; the report shows what came before it"

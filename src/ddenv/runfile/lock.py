@@ -19,9 +19,6 @@ except ImportError:
 
 # The mode of a file that only its owner may read.
 OWN = 0o600
-PROC = Path("/proc")
-# More than any number of a process has.
-_DIGITS = 20
 
 
 def _lock_path(run: Path) -> Path:
@@ -100,17 +97,6 @@ def engine_is_alive(run: Path) -> bool:
         return False
     finally:
         os.close(handle)
-
-
-def suspended_engine(run: Path) -> int | None:
-    """The process of the engine that works on the run, if it is suspended (SIGSTOP); None if not, and where that is unknown."""
-    try:
-        with _lock_path(run).open("rb") as lock:
-            process = int(lock.read(_DIGITS))
-        # The name of the program stands before this in brackets, and may have any letters.
-        return process if (PROC / str(process) / "stat").read_bytes().rpartition(b")")[2].split()[0] == b"T" else None
-    except (OSError, ValueError, IndexError):
-        return None
 
 
 def _try(handle: int, kind: int) -> bool:

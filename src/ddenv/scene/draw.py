@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from meshcat.geometry import Object
 
 from ddenv.scene import colors, mesh
 from ddenv.scene.colors import Color
-from ddenv.scene.crowd import MOST_SINGLE, Crowd
 from ddenv.scene.mesh import Surface
-from ddenv.scene.painted import Painted, edges_of, lines, outline, paint, plain
+from ddenv.scene.painted import Painted, edges_of, lines, merged, outline, paint, plain
 from ddenv.scene.shot import Shot
 from ddenv.scene.stage import Path, Stage
 from ddenv.scene.wheels import Wheels
 from ddenv.world.model import Model, Plane, World, is_ground
 from ddenv.world.pose import Pose, Vector
 
+# With more elements than this, those that never move are drawn together. A browser takes some 10 ms for each object of its own.
+MOST_SINGLE = 300
 WORLD: Path = ("world",)
 MODELS, LEFT_OUT, REMOVED = (*WORLD, "models"), (*WORLD, "left-out"), (*WORLD, "removed")
 ROBOT, EVIDENCE, TRAIL = (*WORLD, "robot"), (*WORLD, "trajectory-of-f"), (*WORLD, "trail")
@@ -31,6 +33,36 @@ GROUND_SIZE, GRID_SIZE = 240.0, 60.0  # m
 STEEP = 1e-6  # a plane whose unit normal has a smaller z is vertical
 LINE = 0.025  # radius of drawn trajectories, m
 ABOVE = 0.05  # height of drawn trajectories above the robot's lowest point, m
+
+
+class Crowd:
+    """The still elements of a large world: the surfaces of each one, and the ends of its edges."""
+
+    def __init__(self, models: Path, left_out: Path, removed: Path) -> None:
+        self._paths = models, left_out, removed
+        self._painted: dict[str, list[Painted]] = {}
+        self._edges: dict[str, np.ndarray] = {}
+
+    def add(self, name: str, painted: list[Painted], edges: np.ndarray | None) -> None:
+        """Adds a model; `edges` (N, 3) come for all elements, also for those that are drawn by themselves."""
+        self._painted[name] = painted
+        if edges is not None:
+            self._edges[name] = edges
+
+    def objects(self, shot: Shot) -> Iterator[tuple[Path, Object | None]]:
+        """What shows the environment of `shot`; None where nothing is left to show."""
+        models, left_out, removed = self._paths
+        parts = [item for name, items in self._painted.items() if name in shot.models for item in items]
+        solid = merged([item for item in parts if item.alpha == 1])
+        clear = merged([item for item in parts if item.alpha < 1])
+        yield (*models, "still"), solid
+        yield (*models, "still clear"), clear
+        yield (*left_out, "all"), self._outlines(shot.left_out, colors.LEFT_OUT)
+        yield (*removed, "all"), self._outlines(shot.removed, colors.REMOVED)
+
+    def _outlines(self, names: Iterable[str], color: colors.Color) -> Object | None:
+        ends = [self._edges[name] for name in sorted(names) if name in self._edges]
+        return lines(np.concatenate(ends), color) if ends else None
 
 
 def safe_name(number: int, name: str) -> str:

@@ -21,7 +21,7 @@ from ddenv.runfile.events import (
     TestFinished,
 )
 from ddenv.runfile.failures import Baseline
-from ddenv.runfile.fold import apply
+from ddenv.runfile.follow import steps
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import Recorded, RunFile
@@ -180,8 +180,7 @@ def _story(events: Iterable[Recorded]) -> _Story:
     certificates: dict[int, None] = {}
     sizes: list[tuple[int, int]] = []
     misses: list[int] = []
-    for recorded in events:
-        state = apply(state, recorded)
+    for recorded, _, state in steps(events):
         match event := recorded.event:
             case TestFinished(test) if state.tests[test - 1].phase == "baseline":
                 search[test] = None

@@ -1,26 +1,153 @@
-"""The tables of a study: which method is best where, and for each scenario our numbers beside the paper's."""
+"""The tables and charts of a study: which method is best where, and our numbers beside the paper's."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from html import escape
 from pathlib import Path
 
+from ddenv.errors import UserError
 from ddenv.evidence.rates import wilson_interval
-from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, plain, say
-from ddenv.study.figures import chart, worlds
+from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, say
+from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
+from ddenv.report.report_map import CORNERS, picture
+from ddenv.report.run_data import read_run
 from ddenv.study.plan import Method, file_name
 from ddenv.study.results import Found
 from ddenv.study.rows import TABLES, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
+from ddenv.study.study_folder import run_path
+from ddenv.text import plain
 from ddenv.words import count
 
+HEIGHT = 320.0
+LINE, SAMPLE = 22.0, 30.0
+# Widths of the lines of methods with their own colour: where lines coincide, the wider first ones stay visible.
+WIDTHS = (9.0, 5.0, 2.4, 2.2, 2.0, 2.0)
+# The maximum number of worlds drawn for a scenario, and of models named for each.
+MOST_WORLDS, MOST_LEFT = 4, 12
 # The maximum number of models that are named.
 MOST_NAMES = 8
 # With more methods than this, the details are not a table but a sentence for each set of models that is left.
 MOST_ROWS = 12
 # The maximum number of cells with the same problem that are named.
 MOST_CELLS = 3
+BEHIND = (
+    *("method", "re-runs", "models left", "f in the whole world", "f in what is left", "f without one of them"),
+    *("steps back", "least tests"),
+)
+# A comparison needs at least this many methods.
+FEWEST = 4
+
+
+def chart(group: Group) -> str:
+    """The chart of a scenario with at least one cell that came to an end."""
+    named, others = _looks(group)
+    last = max(1, *(each.tests for each in group.over))
+    most = max(1, group.models)
+
+    def at(tests: float, models: float) -> tuple[float, float]:
+        x = LEFT + (WIDTH - LEFT - RIGHT) * tests / last
+        return x, HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * models / most
+
+    height = HEIGHT + LINE * (len(named) + bool(others)) + 4
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="drawing" role="img" viewBox="0 0 {WIDTH:.0f} {height:.0f}">',
+        *axes(at, last, most),
+    ]
+    for row in others:
+        parts += _lines(row, at, "faint")
+    for number, row in enumerate(named):
+        parts += _lines(row, at, f"look look{number}", WIDTHS[number])
+    parts += _legend(named, others)
+    return "\n".join([*parts, "</svg>"])
+
+
+def _looks(group: Group) -> tuple[list[Row], list[Row]]:
+    """The rows with their own colour, and all others: of many, the paper's methods and those with the fewest tests."""
+    rows = [row for row in group.rows if row.over]
+    if len(rows) <= len(WIDTHS):
+        return rows, []
+    first = [row for row in rows if theirs(row.found[0].cell) is not None]
+    best = sorted((row for row in rows if row not in first), key=lambda row: (not row.certified, row.tests or 0.0))
+    named = [*first, *best][: len(WIDTHS)]
+    return named, [row for row in rows if row not in named]
+
+
+def _lines(row: Row, at: At, look: str, width: float | None = None) -> Iterator[str]:
+    wide = "" if width is None else f' stroke-width="{width:g}"'
+    for each in row.over:
+        corners = [at(*corner) for corner in steps(each.sizes)]
+        line = "L".join(f"{x:.1f} {y:.1f}" for x, y in corners)
+        title = escape(f"{plain(each.cell.label)}, seed {each.cell.seed}")
+        yield f'<path class="{look}"{wide} d="M{line}"><title>{title}</title></path>'
+        if width is not None:
+            x, y = corners[-1]
+            yield f'<circle class="{look} tip" cx="{x:.1f}" cy="{y:.1f}" r="{1.5 + width / 2:g}"/>'
+
+
+def _legend(named: Sequence[Row], others: Sequence[Row]) -> Iterator[str]:
+    y = HEIGHT + 4
+    for number, row in enumerate(named):
+        wide = WIDTHS[number]
+        yield f'<path class="look look{number}" stroke-width="{wide:g}" d="M{LEFT} {y:.1f}h{SAMPLE}"/>'
+        yield f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{escape(plain(_line_end(row)))}</text>'
+        y += LINE
+    if others:
+        yield f'<path class="faint" d="M{LEFT} {y:.1f}h{SAMPLE}"/>'
+        words = count(len(others), "other method")
+        yield f'<text class="tick" x="{LEFT + SAMPLE + 10}" y="{y + 4:.1f}">{words}</text>'
+
+
+def _line_end(row: Row) -> str:
+    if len(row.found) > 1:
+        return f"{row.method.label}, {len(row.minimal)} of {len(row.found)} seeds certified"
+    (only,) = row.over
+    doubt = "" if only.minimal else ", not certified"
+    return f"{row.method.label}: {count(len(only.left), 'model')} left after {count(only.tests, 'test')}{doubt}"
+
+
+def worlds(folder: Path, group: Group, file: str) -> Iterator[Block]:
+    """A map of each set of models that is left, the certified and frequent ones first; `file` is part of the pictures' names."""
+    sets: dict[tuple[str, ...], list[Found]] = {}
+    for each in group.over:
+        sets.setdefault(each.left, []).append(each)
+    ranked = sorted(sets.items(), key=lambda one: (-sum(each.minimal for each in one[1]), -len(one[1])))
+    for number, (left, cells) in enumerate(ranked[:MOST_WORLDS], start=1):
+        yield say(*_said(left, cells, len(group.over)))
+        yield from _map(folder, cells[0], f"figure-3-{file}" + (f".{number}" if len(ranked) > 1 else ""))
+    if len(ranked) > MOST_WORLDS:
+        yield say(f"And {count(len(ranked) - MOST_WORLDS, 'more world')}, which fewer cells found.")
+
+
+def _said(left: tuple[str, ...], cells: Sequence[Found], of_them: int) -> Iterator[Part]:
+    minimal = any(each.minimal for each in cells)
+    yield f"{'The minimal world' if minimal else 'What is left, not shown to be minimal'} (the paper's Figure 3)"
+    yield f", the end of {len(cells)} of {of_them} cells: " if of_them > 1 else ": "
+    if not left:
+        yield "nothing that can be removed"
+    for number, name in enumerate(left[:MOST_LEFT]):
+        yield ", " if number else ""
+        yield Name(name)
+    yield f" and {len(left) - MOST_LEFT} more." if len(left) > MOST_LEFT else "."
+
+
+def _map(folder: Path, found: Found, name: str) -> Iterator[Block]:
+    from ddenv.map.footprints import plan
+
+    try:
+        record = read_run(run_path(folder, found.cell))
+    except UserError as error:
+        yield say(f"No map: {plain(error)}", notice=True)
+        return
+    if record.world is None:
+        yield say("No map: the world cannot be read.", notice=True)
+        return
+    alternative = (
+        f"The world of {plain(found.cell.scenario.name)} from above: what is left is solid, what was removed is faint."
+    )
+    yield Picture(name, picture(record, plan(record.world, CORNERS), name), alternative)
 
 
 def section(folder: Path, group: Group) -> Section:
@@ -99,12 +226,6 @@ def _minutes(value: float) -> str:
 
 def _has_theirs(group: Group) -> bool:
     return any(theirs(row.found[0].cell) is not None for row in group.rows)
-
-
-BEHIND = (
-    *("method", "re-runs", "models left", "f in the whole world", "f in what is left", "f without one of them"),
-    *("steps back", "least tests"),
-)
 
 
 def behind(group: Group) -> Table:
@@ -197,10 +318,6 @@ def _problems(group: Group) -> Iterator[Paragraph]:
     for problem, names in cells.items():
         which = "; ".join(names) if len(names) <= MOST_CELLS else count(len(names), "cell")
         yield say(f"Not certified: {which}: {problem}.", notice=True)
-
-
-# A comparison needs at least this many methods.
-FEWEST = 4
 
 
 def best(groups: Sequence[Group]) -> Section | None:

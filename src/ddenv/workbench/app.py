@@ -16,24 +16,50 @@ from textual import events, on
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.command import Provider
+from textual.css.stylesheet import Stylesheet
+from textual.geometry import Size
 from textual.notifications import SeverityLevel
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
-from ddenv.workbench.terminal.parsed_once import ParsedOnce
+from ddenv.text import plain
+from ddenv.workbench.shared.messages import Attention, ShowLesson, ShowLessons, ShowRace, ShowRun, ShowSetup
 from ddenv.workbench.terminal.themes import DARK, OURS, for_rich
 from ddenv.workbench.terminal.written import Written
-from ddenv.workbench.widgets.breakpoints import classes_at
-from ddenv.workbench.wording import plain
 
+BELL = "\x07"
 # New objects until garbage is collected, then how often until older ones are looked through, too.
 THRESHOLDS = (20_000, 20, 20)
 # The keys that move the focus, with Textual's actions for them.
 TABS = {"tab": ("app.focus_next",), "shift+tab": ("app.focus_previous",)}
 # So many notices wait for a dialog to close, the latest ones.
 HELD = 3
+
+
+def classes_at(screen: type[Screen[Any]], size: Size) -> str:
+    """The classes of its breakpoints. A screen that begins with them computes its styles and its layout once, not twice."""
+    sides = (screen.HORIZONTAL_BREAKPOINTS or (), size.width), (screen.VERTICAL_BREAKPOINTS or (), size.height)
+    return " ".join(max(each for each in steps if each[0] <= length)[1] for steps, length in sides if steps)
+
+
+def attention(title: str, words: str, environment: Mapping[str, str]) -> str:
+    """The characters to send. Terminals ignore what they do not know, and some know both kinds: only one is sent.
+
+    OSC 777 is for VTE (GNOME Terminal and others) and rxvt, OSC 9 for the others: iTerm2, WezTerm, kitty, Ghostty, foot, Windows.
+    """
+    title, words = plain(title).replace(";", ","), plain(words).replace(";", ",")
+    if "VTE_VERSION" in environment or environment.get("TERM", "").startswith("rxvt"):
+        return f"{BELL}\x1b]777;notify;{title};{words}\x1b\\"
+    return f"{BELL}\x1b]9;{title}: {words}\x1b\\"
+
+
+class ParsedOnce(Stylesheet):
+    """Textual's stylesheet, which forgets what it has parsed only when the theme's variables change."""
+
+    def reparse(self) -> None:
+        """Parses what is new. Raises what `Stylesheet.parse` raises."""
+        self.parse()
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +163,7 @@ class Workbench(App[int]):
         self._held: deque[tuple[str, dict[str, Any]]] = deque(maxlen=HELD)
         self._first = first or (ShowSetup(file=file) if run is None else ShowRun(run, watch))
         if run is not None:
-            from ddenv.workbench.run.observed import Observed
+            from ddenv.workbench.shared.observed import Observed
 
             # Opened before the screen, so that an error in the file is one line in the terminal.
             Observed(run, strictly=watch).close()
@@ -322,8 +348,6 @@ class Workbench(App[int]):
     @on(Attention)
     def _get_attention(self, asked: Attention) -> None:
         if self._notifies:
-            from ddenv.workbench.terminal.attention import attention
-
             self._write(attention(f"ddenv {asked.run}", asked.why, os.environ))
 
     def _write(self, sequence: str) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ddenv.errors import UserError
 
 if TYPE_CHECKING:
-    from ddenv.workbench.messages import ShowLesson, ShowLessons, ShowRace
+    from ddenv.workbench.shared.messages import ShowLesson, ShowLessons, ShowRace
 
 # One character of each kind that is drawn.
 SIGNS = "╭▶●⠒█…"
@@ -46,7 +46,7 @@ def _run(
     first: ShowLessons | ShowLesson | ShowRace | None,
 ) -> int:
     from ddenv.workbench.app import Workbench
-    from ddenv.workbench.help.config import read_config
+    from ddenv.workbench.config import read_config
     from ddenv.workbench.terminal.themes import fitting
 
     config = read_config()

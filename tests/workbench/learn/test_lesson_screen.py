@@ -1,8 +1,5 @@
 """Lessons on the screen: the list, a lesson with right, wrong and skipped answers, and any run step by step."""
 
-import json
-import shutil
-
 import pytest
 from textual.widgets import OptionList, Static
 
@@ -12,13 +9,11 @@ from ddenv.runfile.store import RunFile
 from ddenv.runs.remembered import state_file
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.lesson_pane import LessonPane
+from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.lessons_screen import LessonsScreen
-from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLesson, ShowLessons
-from ddenv.workbench.run.guide_place import place_file
+from ddenv.workbench.shared.messages import ShowLesson, ShowLessons
 from tests.tiers import slow
 
 SIZES = slow(pytest.mark.screens, [(80, 24), (120, 36)], but=[(80, 24)])
@@ -139,20 +134,6 @@ async def test_what_was_said_before_an_answer_does_not_hide_what_is_said_of_it()
         remark = next(line for line in text(pilot).splitlines() if line[1:4] == " ✓ " and line[0] in "abc")
         after = text(pilot).splitlines()[text(pilot).splitlines().index(remark) + 1]
         assert after.startswith("    ") and len(remark) <= 76
-
-
-async def test_who_walks_through_a_run_leads_those_who_watch_it(tmp_path):
-    run = tmp_path / "mine.ddenv"
-    shutil.copy(LESSONS / "delivery.ddenv", run)
-    async with Workbench(first=ShowLesson(run)).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
-        await pilot.press("right_curly_bracket")
-        assert json.loads(place_file(run).read_text()) == pilot.app.screen.course.at
-    assert not place_file(run).exists()
-    async with Workbench(first=ShowLessons(bundled()[0])).run_test(size=(120, 36)) as pilot:
-        await pilot.pause()
-        await pilot.press("right")
-        assert not place_file(LESSONS / "delivery.ddenv").exists()
 
 
 async def test_a_lesson_goes_on_where_it_was_left():

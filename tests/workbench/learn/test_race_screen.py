@@ -10,9 +10,8 @@ from ddenv.learn.score import Score
 from ddenv.learn.shelf import LESSONS, bundled, open_lesson
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.race_screen import RaceScreen
-from ddenv.workbench.learn.racer_pane import RacerPane
-from ddenv.workbench.messages import ShowLessons, ShowRace
+from ddenv.workbench.learn.race_screen import RacerPane, RaceScreen
+from ddenv.workbench.shared.messages import ShowLessons, ShowRace
 from tests.command import in_process
 from tests.tiers import slow
 from tests.waiting import eventually

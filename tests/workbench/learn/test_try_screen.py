@@ -10,7 +10,7 @@ from ddenv.workbench.learn.kept_scores import all_scores, keep_score
 from ddenv.workbench.learn.lesson_screen import LessonScreen
 from ddenv.workbench.learn.try_screen import TryScreen
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import ShowLessons
+from ddenv.workbench.shared.messages import ShowLessons
 from tests.tiers import slow
 from tests.waiting import eventually
 

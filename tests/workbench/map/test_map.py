@@ -20,7 +20,7 @@ from ddenv.runs.subject import read_parts
 from ddenv.workbench.map import map_drawing
 from ddenv.workbench.map.place import LAYERS, Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll, Snapshot
 
 
 class Screen(App):

@@ -10,9 +10,8 @@ from ddenv.errors import UserError
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run.run_screen import RunScreen
 from ddenv.workbench.runs.compare_runs import CompareRuns, differences, lines
-from ddenv.workbench.runs.deleted_runs import FOLDER, KEPT, bring_back, delete_run
 from ddenv.workbench.runs.recent_runs import RunsFolder
-from ddenv.workbench.runs.runs_screen import RunsScreen
+from ddenv.workbench.runs.runs_screen import FOLDER, KEPT, RunsScreen, bring_back, delete_run
 from ddenv.workbench.runs.runs_table import RunTable
 from ddenv.workbench.setup.setup_screen import SetupScreen
 

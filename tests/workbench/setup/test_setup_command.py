@@ -9,7 +9,7 @@ import yaml
 from ddenv.cli.command_line import app as command_line
 from ddenv.settings import OPTIONS
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.equivalent_command import command, source_of
+from ddenv.workbench.setup.start_run import command, source_of
 from tests.workbench.setup.setup_session import Opened
 
 

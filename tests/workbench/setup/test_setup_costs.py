@@ -5,7 +5,7 @@ import pytest
 
 from ddenv.workbench.setup import form
 from ddenv.workbench.setup.costs import Past, past_of, whole_cost
-from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
+from ddenv.workbench.setup.fields import Circumstances, cost, not_used
 from ddenv.world.scenario import Scenario
 
 FIELDS = {field.id: field for field in form.ALL}

@@ -4,7 +4,7 @@ import fake_run
 import pytest
 import yaml
 
-from ddenv.workbench.setup.start_notes import StartNotes
+from ddenv.workbench.setup.preview import StartNotes
 from tests.waiting import eventually
 from tests.workbench.setup.setup_session import Opened
 

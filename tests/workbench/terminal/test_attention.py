@@ -4,8 +4,7 @@ import fake_moments
 import pytest
 from attached import Attached
 
-from ddenv.workbench.app import Config, Workbench
-from ddenv.workbench.terminal.attention import BELL, attention
+from ddenv.workbench.app import BELL, Config, Workbench, attention
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,11 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Checkbox, Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import call_if_open, is_open
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.background import call_if_open, is_open
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import count, plain
 
 # What can be written: its id, its label, and the endings that its name may have.
 KINDS = (
@@ -253,9 +254,9 @@ def files_of(wanted: Wanted) -> Iterator[Path]:
 
 def write(run: Path, wanted: Wanted) -> Iterator[str]:
     """Writes the files; yields a line for each. Raises UserError for the first that cannot be written."""
-    from ddenv.map.names import shortened
     from ddenv.report.report import write_report
     from ddenv.runs.export import export_world
+    from ddenv.text import shortened
 
     if wanted.world is not None:
         exported = export_world(run, wanted.world, wanted.scenario)

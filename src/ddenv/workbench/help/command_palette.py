@@ -9,10 +9,10 @@ from itertools import islice
 from textual.command import DiscoveryHit, Hit, Hits, Provider
 from textual.content import Content
 
+from ddenv.text import plain, shortened
 from ddenv.workbench.help.shortcuts import Shortcut, commands
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.terminal.themes import theme_names
-from ddenv.workbench.wording import plain, shorten
 
 # The maximum number of models that are offered: typing more letters finds others.
 MOST_MODELS = 12
@@ -39,7 +39,7 @@ class Commands(Provider):
             if score > ENOUGH:
                 yield Hit(score, Content(f"theme: {name}"), partial(setattr, self.app, "theme", name), f"theme {name}")
         for name in self._models(query):
-            words = f"go to {shorten(plain(name), LONGEST_NAME)} on the map"
+            words = f"go to {shortened(plain(name), LONGEST_NAME)} on the map"
             yield Hit(1.0, Content(words), partial(self._go_to, name), words)
 
     def _run(self, shortcut: Shortcut) -> Callable[[], Awaitable[bool]]:

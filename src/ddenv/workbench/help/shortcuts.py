@@ -15,9 +15,9 @@ from textual.dom import DOMNode
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Static
 
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.key_names import shown
-from ddenv.workbench.wording import plain
 
 _FOCUS = "to the next or previous pane, field or button"
 _LINE, _PAGE, _END = "one line up or down", "one page up or down", "to the first or the last line"

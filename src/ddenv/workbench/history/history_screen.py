@@ -1,17 +1,17 @@
-"""The history of a run: the tree of its reductions, and the user's decisions beside it."""
+"""The history of a run: the tree of its reductions, the user's decisions, and two environments side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Horizontal
-from textual.screen import Screen
+from textual.containers import Horizontal, Vertical
+from textual.screen import ModalScreen, Screen
 from textual.widgets import DataTable, Static
 
 from ddenv.evidence.claims import of_runs, seen
@@ -20,16 +20,19 @@ from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.progress import Decision, Node
+from ddenv.runfile.state import RunState
+from ddenv.text import plain, shortened
 from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.history import branches
-from ddenv.workbench.history.compare import Compare
 from ddenv.workbench.map.place import Place
-from ddenv.workbench.run.log import NOTHING_DECIDED, as_it_is, decision_line
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.shared import branches
+from ddenv.workbench.shared.log import NOTHING_DECIDED, as_it_is, decision_line
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.question import Question
-from ddenv.workbench.wording import count, plain, shorten
 
 # Time between two looks at the run, s.
 PERIOD = 0.5
@@ -41,6 +44,15 @@ TREE = 15
 MARK = "marked"
 # Where the words of a decision begin, after its time.
 INDENT = 10
+HOW = {
+    "start": "where the run began",
+    "reduced": "reduced to what shows f",
+    "adopted": "a try by hand that showed f",
+    "accepted": "another failure, accepted as f, too",
+    "instead": "a branch: the failure of this test is f here",
+    "certified": "reduced by a certificate: fresh runs show f as often",
+    "sliced": "reduced without a test to what took part",
+}
 
 
 class Tree(DataTable[Text]):
@@ -168,7 +180,7 @@ class History(Screen[int | None]):
         node = self.under_cursor
         if node is None:
             return
-        names = first_of([plain(shorten(name, 40)) for name in node.environment], 12)
+        names = first_of([plain(shortened(name, 40)) for name in node.environment], 12)
         how = HOW.get(node.how, node.how)
         text = Text(f"{place(node)}: {how}", "bold")
         text.append(f", f in {of_runs(node.shown, len(node.runs))}" if node.runs else "")
@@ -231,12 +243,78 @@ def _side(name: str) -> Literal["left", "right"]:
     return "right" if name in ("#", "tests", "f shown") else "left"
 
 
-HOW = {
-    "start": "where the run began",
-    "reduced": "reduced to what shows f",
-    "adopted": "a try by hand that showed f",
-    "accepted": "another failure, accepted as f, too",
-    "instead": "a branch: the failure of this test is f here",
-    "certified": "reduced by a certificate: fresh runs show f as often",
-    "sliced": "reduced without a test to what took part",
-}
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Models' names in the order of the world file."""
+
+    common: tuple[str, ...]
+    only_first: tuple[str, ...]
+    only_second: tuple[str, ...]
+
+
+def compare(first: Node, second: Node) -> Comparison:
+    """Both environments, model by model."""
+    left, right = frozenset(first.environment), frozenset(second.environment)
+    return Comparison(
+        common=tuple(name for name in first.environment if name in right),
+        only_first=tuple(name for name in first.environment if name not in right),
+        only_second=tuple(name for name in second.environment if name not in left),
+    )
+
+
+class Compare(ModalScreen[None]):
+    """Facts, maps if there is room, and the models: those in both, and those in only one."""
+
+    CSS_PATH = "history.tcss"
+    HORIZONTAL_BREAKPOINTS = [(0, "-small"), (110, "-large")]
+    AUTO_FOCUS = "Lines"
+    BINDINGS: ClassVar = [
+        Binding("escape,c,q,enter", "dismiss", "close", id="compare.close", tooltip="back to the history"),
+    ]
+
+    def __init__(self, first: Node, second: Node, state: RunState, place: Place) -> None:
+        super().__init__()
+        self._sides = (first, second)
+        self._state, self._place = state, place
+
+    def compose(self) -> ComposeResult:
+        found = compare(*self._sides)
+        with Framed("Two environments side by side", "tab to the lists   escape closes"):
+            with Horizontal(classes="sides"):
+                for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+                    with Vertical(classes="side"):
+                        yield Static(self._facts(name, node), classes="facts", markup=False)
+                        yield WorldMap(id=f"map-{name}")
+                        yield Static(_heading(f"only in {name}", alone), classes="facts", markup=False)
+                        yield Lines(_name, nothing="none", id=f"only-{name}")
+            yield Static(_heading("in both", found.common), classes="facts", markup=False)
+            yield Lines(_name, nothing="none", id="common")
+
+    def on_mount(self) -> None:
+        found = compare(*self._sides)
+        for name, node, alone in zip("AB", self._sides, (found.only_first, found.only_second), strict=True):
+            self.query_one(f"#only-{name}", Lines).show(alone)
+            world = self.query_one(f"#map-{name}", WorldMap)
+            world.set_place(self._place)
+            world.show(Snapshot(self._state.changed(environment=node.environment, round=None, trials=())), None)
+        self.query_one("#common", Lines).show(found.common)
+
+    def on_resize(self) -> None:
+        # Of one size, so that both maps have one scale and one frame.
+        both = self.query_one(".sides").content_size.width or self.size.width
+        for side in self.query(".side"):
+            side.styles.width = both // 2
+
+    def _facts(self, name: str, node: Node) -> Text:
+        words = branches.words(node, self._state.node)
+        text = Text(f"{name}  {place(node)}", "bold").append(f"\n{plain(node.method)}", "not bold")
+        after = f"\n{count(node.own_tests, 'own test')}"
+        return text.append(after + (f"; {words}" if words else ""), "not bold dim")
+
+
+def _heading(what: str, names: Sequence[str]) -> Text:
+    return Text(f"{what}: {count(len(names), 'model')}", "bold")
+
+
+def _name(name: str, width: int) -> Text:
+    return Text(f"  {shortened(name, max(4, width - 2))}", no_wrap=True)

@@ -23,21 +23,19 @@ from ddenv.runfile.position import Position, Step
 from ddenv.runfile.state import Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.runfile.tested import told
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.kept_scores import all_scores, keep_score
-from ddenv.workbench.learn.lesson_pane import LessonPane
+from ddenv.workbench.learn.lesson_pane import LessonPane, Variables
 from ddenv.workbench.learn.race_screen import RaceScreen
 from ddenv.workbench.learn.try_screen import TryScreen
-from ddenv.workbench.learn.variables_pane import Variables
 from ddenv.workbench.learn.world_maps import read_world
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments, what_happened
-from ddenv.workbench.run.guide_place import GuidePlace
 from ddenv.workbench.run.happening import Happening
-from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.observed import Observed
+from ddenv.workbench.shared.poll import Snapshot
 
 SMALLEST = (64, 20)
 
@@ -150,8 +148,6 @@ class LessonScreen(Screen[bool]):
             position, score = opened.position, all_scores().get(opened.lesson.name)
         self.course = Course(position, opened, score)
         self._kept = self.course.score
-        # Many may have the same lesson open: only a run that is walked through freely leads those who watch it.
-        self._guide = GuidePlace(run, position) if opened is None else None
         self._map, self._legend = WorldMap(id="lesson-map"), MapLines(id="lesson-legend")
 
     def compose(self) -> ComposeResult:
@@ -176,8 +172,6 @@ class LessonScreen(Screen[bool]):
 
     def on_unmount(self) -> None:
         self._file.close()
-        if self._guide is not None:
-            self._guide.close()
 
     # What is shown.
 
@@ -340,8 +334,6 @@ class LessonScreen(Screen[bool]):
         """After a move: what was said before it would only hide the text."""
         self.app.clear_notifications()
         self._show()
-        if self._guide is not None:
-            self._guide.browsed()
 
     def _say(self, why: str) -> None:
         self.notify(why, timeout=3, markup=False)

@@ -16,10 +16,10 @@ from ddenv.errors import UserError
 from ddenv.learn.lesson import Lesson
 from ddenv.learn.score import Score
 from ddenv.learn.shelf import bundled, glance, open_lesson
+from ddenv.text import plain, truncated
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.learn.kept_scores import all_scores, in_words
-from ddenv.workbench.wording import plain, shorten
 
 SHOWN = ("lessons.open", "lessons.help", "lessons.back")
 
@@ -80,7 +80,7 @@ class LessonsScreen(Screen[None]):
         width = max(30, self.size.width - 40)
         options.clear_options()
         for number, lesson in enumerate(self._lessons, 1):
-            row = f"{number}  {shorten(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name))}"
+            row = f"{number}  {truncated(plain(lesson.title), width):<{width}} {in_words(scores.get(lesson.name))}"
             options.add_option(Text(row, no_wrap=True))
         if self._lessons:
             options.highlighted = min(at, len(self._lessons) - 1)

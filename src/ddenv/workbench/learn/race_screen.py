@@ -9,30 +9,94 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Container, VerticalScroll
+from textual.containers import Container, Vertical, VerticalScroll
 from textual.screen import Screen
 from textual.widgets import Static
 
-from ddenv.learn.plays import Play, plays_of_runs
+from ddenv.learn.plays import Play, Turn, plays_of_runs
 from ddenv.learn.race import Race, result, tally
+from ddenv.learn.variables import SIGNS
 from ddenv.runfile.position import position_in
+from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
-from ddenv.workbench.learn.racer_pane import RacerPane
-from ddenv.workbench.learn.world_maps import read_world
+from ddenv.workbench.learn.world_maps import read_world, snapshot_of
+from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.browsing import Moments
-from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain, shorten
+from ddenv.workbench.shared.observed import Observed
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count
 
+IN, OUT, GONE = "■", "□", "·"
 SMALLEST = (64, 20)
 # Time between two tests while the race runs, s.
 PACE = 0.7
 # Rows: a racer without a map, the fewest with one, the panel below besides its line for each racer, header and footer.
 BARE, WITH_MAP, SAID, AROUND = 5, 11, 6, 2
-SIGNS = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
+LEGEND = "■ there  □ left out  · gone   ● f  ◇ other  ○ goal   ✓ done"
 # What the tests were good for; the rest is rare.
 COLUMNS = {"f showed": "f showed", "part without f": "part alone", "rest without f": "without a part", "again": "again"}
 NAME = 24
+
+
+class RacerPane(Vertical):
+    """The search `play`, drawn over the run of `base`."""
+
+    def __init__(self, play: Play, base: Snapshot) -> None:
+        super().__init__(classes="panel")
+        self.play, self._base = play, base
+        self.map = WorldMap()
+        self.map.can_focus = False
+        self._said = Static("", markup=False)
+
+    def compose(self) -> ComposeResult:
+        yield self.map
+        yield self._said
+
+    def show(self, race: Race) -> None:
+        """The search as far as the race is."""
+        play, turn, tests = self.play, race.now(self.play), min(race.at, self.play.tests)
+        left, room = play.after(tests), max(8, self.size.width - 2)
+        # The map says itself what a panel's lower border has, so the figures stand above.
+        done = race.is_done(play)
+        stopped, ended = done and not play.ended, done and play.ended
+        figures = f" · {count(tests, 'test')}{', stopped' if stopped else ''} · {len(left)} left{' ✓' if ended else ''}"
+        # As text: a name may look like markup.
+        self.border_title = Text(shortened(plain(play.name), max(6, room - 4 - len(figures))) + figures)
+        self.map.show(snapshot_of(self._base, left, turn), None if turn is None else turn.candidate)
+        self._said.update(Text("\n").join(_lines(play, turn, tests, room)))
+
+
+def _lines(play: Play, turn: Turn | None, tests: int, room: int) -> list[Text]:
+    left = play.after(tests)
+    there = frozenset(left if turn is None else turn.candidate.models)
+    return [
+        Text(truncated(_what(play, turn), room)),
+        _bar(play.begins, frozenset(left), there, room),
+        _signs(play.turns[:tests], room),
+    ]
+
+
+def _what(play: Play, turn: Turn | None) -> str:
+    if turn is None:
+        return plain(play.method) or f"{count(len(play.begins), 'model')}, no test yet"
+    again = ", again" if turn.again else ""
+    return f"{turn.candidate.label}{again}: {count(turn.candidate.size, 'model')} {SIGNS.get(turn.outcome, '?')}"
+
+
+def _bar(models: tuple[str, ...], left: frozenset[str], there: frozenset[str], room: int) -> Text:
+    """A cell for each model in the world's order; of more models than there is room, by their shares."""
+    if len(models) <= room:
+        return Text("".join(GONE if name not in left else IN if name in there else OUT for name in models))
+    kept = max(bool(left), round(room * len(left) / len(models)))
+    tested = min(kept, max(bool(there & left), round(room * len(there & left) / len(models))))
+    return Text(IN * tested + OUT * (kept - tested) + GONE * (room - kept))
+
+
+def _signs(turns: tuple[Turn, ...], room: int) -> Text:
+    """How the tests ended, the last ones if there are many."""
+    cut = len(turns) > room
+    shown = turns[-(room - 1) :] if cut else turns
+    return Text(("…" if cut else "") + "".join(SIGNS.get(turn.outcome, "?") for turn in shown), no_wrap=True)
 
 
 def _ids(names: str) -> tuple[str, ...]:
@@ -110,7 +174,7 @@ class RaceScreen(Screen[None]):
         self.query_one("#race-header", Static).update(header)
         panel = self.query_one("#race-panel", VerticalScroll)
         panel.border_title = "Who won, and why" if race.over else "Tests that showed f, and tests that did not"
-        panel.border_subtitle = SIGNS
+        panel.border_subtitle = LEGEND
         said = _table(race)
         if race.over:
             said.append("\n").append("\n".join(map(plain, result(race.plays))), "bold not dim")
@@ -175,7 +239,7 @@ def _table(race: Race) -> Text:
     for play in race.plays:
         spent = tally(play, race.at).spent
         cells = "".join(f"{spent[kind] or '':>{_wide(head)}}" for kind, head in COLUMNS.items())
-        name = shorten(plain(play.name), width)
+        name = shortened(plain(play.name), width)
         text.append(f"\n{name:<{width}}{min(race.at, play.tests):>7}{cells}", "not dim")
     return text
 

@@ -17,11 +17,12 @@ from ddenv.errors import UserError
 from ddenv.learn.attempt import BOUND, Attempt, Line, Tried, comparison, in_one_sentence
 from ddenv.learn.plays import Play
 from ddenv.learn.variables import SIGNS
+from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.learn.world_maps import read_world, snapshot_of
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count
 
 SMALLEST = (64, 20)
 NAME = 16
@@ -132,7 +133,7 @@ class TryScreen(Screen[None]):
         models = Text("Held: ")
         for name in self.attempt.held:
             sign = "*" if name in marked else ""
-            word = Text(f"{sign}{shorten(plain(name), NAME)}", "bold reverse" if sign else "bold")
+            word = Text(f"{sign}{shortened(plain(name), NAME)}", "bold reverse" if sign else "bold")
             word.apply_meta({"@click": f"screen.mark_one({self.attempt.oracle.models.index(name)})"})
             models.append_text(word).append("  ")
         if not self.attempt.tests_left:
@@ -209,7 +210,7 @@ def _row(number: int, tried: Tried) -> Text:
     text = Text(f"{number:>2} ", no_wrap=True, overflow="ellipsis")
     text.append(f"{SIGNS[tried.outcome]} ", "bold")
     # The shorter list says it best.
-    kept, out = (", ".join(shorten(plain(name), NAME) for name in names) for names in (tried.kept, tried.out))
+    kept, out = (", ".join(shortened(plain(name), NAME) for name in names) for names in (tried.kept, tried.out))
     words = f"without {out}" if len(tried.out) <= len(tried.kept) else f"only {kept or 'no model'}"
     return text.append(words, "bold" if tried.outcome == "similar" else "")
 
@@ -218,7 +219,7 @@ def _last(attempt: Attempt) -> Text:
     if not attempt.tried:
         return Text("You hold the whole world, and it shows f. Which models does f need?")
     last = attempt.tried[-1]
-    out = ", ".join(shorten(plain(name), NAME) for name in last.out)
+    out = ", ".join(shortened(plain(name), NAME) for name in last.out)
     said = SAID[last.outcome].format(out=out, held=count(len(attempt.held), "model"))
     return Text(f"Test {len(attempt.tried)}: {SIGNS[last.outcome]} {said}", "bold")
 
@@ -230,7 +231,7 @@ def _side_by_side(lines: list[Line], room: int) -> Text:
     for line in lines:
         left = "" if line.left is None else f"{len(line.left):>6}{' ✗' if line.can_go else '  '}"
         row = f"{plain(line.name):<{width}} {line.tests:>6}{left}"
-        names = shorten(", ".join(map(plain, line.left or ())), max(0, room - len(row) - 1))
+        names = truncated(", ".join(map(plain, line.left or ())), max(0, room - len(row) - 1))
         row += f" {names}" if len(names) > 8 else ""
         text.append(f"{row}\n", "bold not dim" if line.name == "you" else "not dim")
     if any(line.can_go for line in lines):

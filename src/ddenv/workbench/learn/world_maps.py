@@ -12,10 +12,10 @@ from ddenv.errors import UserError
 from ddenv.learn.plays import Turn
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.state import Round
-from ddenv.workbench.background import call_if_open
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.poll import Snapshot
 
 
 def read_world(screen: Screen[None], run: Path, maps: Sequence[WorldMap]) -> None:

@@ -1,4 +1,4 @@
-"""`ddenv open RUN --lines`: what happens in a run, a line for each thing, and what the user types is done."""
+"""`ddenv open RUN --lines`: a line for each thing that happens; what the user types is answered, or done."""
 
 from __future__ import annotations
 
@@ -7,27 +7,159 @@ import select
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
 from ddenv import processor
-from ddenv.errors import UserError, printable
+from ddenv.amounts import rounded
+from ddenv.errors import UserError
+from ddenv.evidence.claims import drift
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
+from ddenv.guiding.offers import Offer, Pointed, offer
 from ddenv.guiding.pace import StartEngine
-from ddenv.guiding.situation import Situation
-from ddenv.runfile.state import RunState
-from ddenv.words import news
-from ddenv.workbench.lines.said import QUESTIONS
-from ddenv.workbench.lines.typed import GUIDES, meaning
-from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.processes import Engine
-from ddenv.workbench.wording import plain
+from ddenv.guiding.situation import Row, Situation
+from ddenv.runfile.state import Candidate, RunState, Trial
+from ddenv.runs.fresh_runs import fresh_runs
+from ddenv.runs.tests_left import remaining
+from ddenv.text import plain, printable
+from ddenv.words import first_of, headline, news
+from ddenv.workbench.run.candidate_rows import name_of
+from ddenv.workbench.run.explain import explain
+from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.processes import Engine
+from ddenv.workbench.shared.wording import about, count, percent
 
+# The maximum number of models that a line names.
+NAMED = 50
+# The tries that are listed, the latest ones.
+TRIES = 5
+# By the words that are typed: the action of `ddenv.guiding.offers`, the screen's key for it, and what it does.
+GUIDES = {
+    "pause": ("pause", "space", "start no new test; again to go on"),
+    "step": ("step", "s", "run one test, then pause"),
+    "round": ("step_round", "S", "run to the end of the round, then pause"),
+    "accept": ("accept", "a", "accept the reduction that waits; 'accept try 1' adopts a try that shows f"),
+    "reject": ("reject", "x", "reject the reduction that waits"),
+    "veto": ("veto", "v", "leave out a candidate: 'veto part B'; again takes that back"),
+    "pin": ("pin", "p", "keep models: 'pin crate_01, crate_02'; again unpins them"),
+    "without": ("without", "w", "try the environment without models: 'without crate_01'"),
+    "only": ("only", "o", "try models alone: 'only crate_01, crate_02'"),
+    "undo": ("undo", "u", "take back the last reduction"),
+    "ask": ("mode", "t", "accept reductions automatically, or ask before each one"),
+    "resume": ("resume", "r", "start the engine again"),
+}
+_KEYS = {key: words for words, (_, key, _) in GUIDES.items()}
 # How often the run file is read, s, and how many lines of what happened before are said first.
 PERIOD, BEFORE = 0.2, 10
 YES = ("y", "yes")
 WATCHING = "watching only: nothing that you type changes the run"
+
+
+def status(snapshot: Snapshot) -> Iterator[str]:
+    """Where the run is."""
+    state = snapshot.state
+    yield headline(state)
+    if forms := drift(state):
+        yield forms[0]
+    left = remaining(state, snapshot.engine == "alive")
+    if left is not None:
+        time = f", about {about(*left.seconds)}" if left.seconds else ""
+        yield f"about {count(rounded(left.tests[1]), 'test')} left{time}"
+    yield {"alive": "an engine is at work", "starting": "the engine starts"}.get(
+        snapshot.engine, "no engine is running"
+    )
+
+
+def why(snapshot: Snapshot) -> Iterator[str]:
+    """What is happening."""
+    yield from explain(snapshot).sentences
+
+
+def table(snapshot: Snapshot) -> Iterator[str]:
+    """The tries and the candidates of the round, or the rows of the certificate."""
+    state = snapshot.state
+    for trial in state.trials[-TRIES:]:
+        yield _said_of(state, trial)
+    if state.certificate is not None:
+        for fresh in fresh_runs(state):
+            yield f"{plain(name_of(fresh))}: f in {fresh.shown} of {count(fresh.runs, 'run')}"
+    elif state.round is not None:
+        yield from (_said_of(state, candidate) for candidate in state.round.candidates)
+    else:
+        yield "there is no round yet"
+
+
+def _said_of(state: RunState, row: Candidate | Trial) -> str:
+    running = any(state.tests[id - 1].outcome == "running" for id in row.tests if 0 < id <= len(state.tests))
+    verdict = row.verdict or ("in test" if running else "not judged yet")
+    distance = row.distance if isinstance(row, Candidate) else None
+    away = "" if distance is None else f", ranked by {distance:.1f}"
+    return f"{row.label}: {count(row.size, 'model')}, {verdict}, {count(len(row.tests), 'test')}{away}"
+
+
+def models(snapshot: Snapshot) -> Iterator[str]:
+    """The models that are left."""
+    state = snapshot.state
+    names = [f"{plain(name)}{' (pinned)' if name in state.pinned else ''}" for name in state.environment]
+    yield f"{count(len(names), 'model')} left: {first_of(names, NAMED) or 'none'}"
+
+
+def decisions(snapshot: Snapshot) -> Iterator[str]:
+    """What the user decided."""
+    yield from (plain(each.words) for each in snapshot.state.decisions)
+    if not snapshot.state.decisions:
+        yield "you decided nothing yet"
+
+
+def baseline(snapshot: Snapshot) -> Iterator[str]:
+    """How often the whole world fails."""
+    base = snapshot.state.baseline
+    yield (
+        "the baseline is not finished"
+        if base is None
+        else f"f in {base.failures} of {base.runs} runs, {percent(base.rate)}"
+    )
+
+
+QUESTIONS: dict[str, tuple[Callable[[Snapshot], Iterator[str]], str]] = {
+    "status": (status, "where the run is"),
+    "why": (why, "what is happening, and why"),
+    "table": (table, "the candidates of this round with their verdicts"),
+    "models": (models, "the models that are left"),
+    "baseline": (baseline, "how often the whole world fails"),
+    "decisions": (decisions, "what you decided"),
+}
+
+
+def meaning(line: str, now: Situation) -> Offer | None:
+    """What a line asks for now; None if it guides nothing. Raises UserError for a row or a model that there is not."""
+    first, _, rest = line.strip().partition(" ")
+    word = first if first in GUIDES else _KEYS.get(first)
+    if word is None:
+        return None
+    action, rest = GUIDES[word][0], rest.strip()
+    if action in ("pin", "without", "only"):
+        if not rest:
+            raise UserError(f"{word}: which models? Type their names after it, separated by commas")
+        return offer(action, now, Pointed(models=_models(rest, now.state)))
+    return offer(action, now, Pointed(row=_row(rest, now.state) if rest else None))
+
+
+def _models(typed: str, state: RunState) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in typed.split(",") if name.strip())
+    unknown = next((name for name in names if name not in state.environment), None)
+    if unknown is not None:
+        raise UserError(f"there is no model '{unknown}' in what is left; 'models' lists them")
+    return names
+
+
+def _row(typed: str, state: RunState) -> Row:
+    rows: list[Row] = [*state.trials, *(state.round.candidates if state.round is not None else ())]
+    found = next((row for row in rows if row.label.casefold() == typed.casefold()), None)
+    if found is None:
+        raise UserError(f"there is no '{typed}' in this round; 'table' lists the candidates and tries")
+    return found
 
 
 def follow_in_lines(path: Path, watch: bool, typed: TextIO, out: TextIO) -> None:
@@ -46,7 +178,7 @@ class LineMode:
         self._news: deque[str] = deque(maxlen=BEFORE)
         self._engine = Engine(path)
         self._poll = Poll(path, starting=lambda: self._engine.starting, watch=watch, on_event=self._happened)
-        self._revision, self._error = 0, ""
+        self._error = ""
         # What a yes would send.
         self._asked: Command | None = None
 
@@ -67,9 +199,6 @@ class LineMode:
         self._poll.close()
 
     def _happened(self, kind: str, before: RunState, after: RunState) -> None:
-        if after.revision <= self._revision:
-            return
-        self._revision = after.revision
         if words := news(kind, before, after, attached=True):
             self._news.append(words)
 

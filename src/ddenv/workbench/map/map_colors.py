@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from textual.color import Color, ColorParseError
 
-from ddenv.map.paint import HUES, NUMBERED, PLAIN, RGB, blend, luminance, packed
+from ddenv.map.colors import HUES, NUMBERED, PLAIN, RGB, blend, luminance, packed
 
 if TYPE_CHECKING:
     from textual.app import App
@@ -17,7 +17,7 @@ KEPT, FLOOR, LEFT_OUT, FLOOR_OUT, PROTECTED, REMOVED, PINNED, SELECTED = range(8
 MANY, SIXTEEN, NONE = 24, 4, 0
 # A full cell of each kind. Where there are many colours, all but the protected ones look solid.
 SOLID = "█░▓░▒ ██"
-# If hues repeat: a full cell of parts 1 to 8, 9 to 16 and so on.
+# A full cell of parts 1, 2, ... where there are no colours to tell them apart.
 PATTERNS = "█╱─╲│╳"
 # The strength of a part's hue on the background.
 STRENGTH = {KEPT: 0.74, FLOOR: 0.24, LEFT_OUT: 0.25, FLOOR_OUT: 0.10, PINNED: 0.62, REMOVED: 0.0}
@@ -61,14 +61,9 @@ class Palette:
     native: bool = False
 
     @property
-    def hues(self) -> int:
-        """The number of parts with their own colour."""
-        return {MANY: len(HUES), SIXTEEN: len(NUMBERS)}.get(self.colors, 1)
-
-    @property
     def tones(self) -> int:
         """The number of parts with different looks."""
-        return self.hues * len(PATTERNS)
+        return {MANY: len(HUES), SIXTEEN: len(NUMBERS), NONE: len(PATTERNS)}[self.colors]
 
     def tone(self, kind: int, part: int) -> Tone:
         """The looks of a model of part number `part`, or of none: -1."""
@@ -89,10 +84,7 @@ class Palette:
         if luminance(self.back) > 128:
             hue, strength = blend(hue, (0, 0, 0), 0.4), LIGHT_STRENGTH[kind]
         fill = packed(blend(back, hue, strength))
-        pattern = PATTERNS[part // len(HUES) % len(PATTERNS)] if part >= 0 and kind in (KEPT, LEFT_OUT) else "█"
-        if pattern == "█":
-            return Tone(SOLID[kind], fill, fill, self._seam(fill))
-        return Tone(pattern, fill, packed(blend(unpacked(fill), back, 0.55)), self._seam(fill))
+        return Tone(SOLID[kind], fill, fill, self._seam(fill))
 
     def _seam(self, fill: int) -> int:
         return packed(blend(unpacked(fill), unpacked(self.back), 0.5))
@@ -114,7 +106,7 @@ class Palette:
             return Tone(":", self.back, color, self.back, False)
         if kind == LEFT_OUT:
             return Tone("▒", self.back, color, self.back, False)
-        pattern = PATTERNS[max(part, 0) // self.hues % len(PATTERNS)]
+        pattern = PATTERNS[max(part, 0) % len(PATTERNS)] if self.colors == NONE else "█"
         if pattern == "█":
             return Tone(pattern, color, color, self.back)
         return Tone(pattern, self.back, color, self.back, False)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
+
+import numpy as np
 
 from ddenv.evidence.took_part import in_last
-from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell
 from ddenv.map.paint import Canvas
 from ddenv.map.raster import Outlines, View, fit, pack
@@ -17,6 +18,7 @@ from ddenv.runfile.store import COLUMNS
 from ddenv.workbench.map.map_colors import Palette, unpacked
 from ddenv.workbench.map.map_words import PARTING, sensed_order
 from ddenv.workbench.map.model_looks import Kept, Looks, kept, looks
+from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.picture import (
     Line,
     Mark,
@@ -31,10 +33,8 @@ from ddenv.workbench.map.picture import (
     seen,
 )
 from ddenv.workbench.map.place import Point, Shown
-from ddenv.workbench.run.poll import Snapshot
-
-if TYPE_CHECKING:
-    from ddenv.workbench.map.moved_prints import MovedPrints
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.world.pose import pose_of
 
 T = TypeVar("T")
 # Dots of the original path, or of the second way, and of the gaps in it.
@@ -73,7 +73,6 @@ class MapDrawing:
         # Each is reused until its inputs change.
         self._evidence: Remembered[np.ndarray] = Remembered()
         self._original: Remembered[np.ndarray] = Remembered()
-        self._same_paths: Remembered[bool] = Remembered()
         self._outlines: Remembered[Outlines] = Remembered()
         self._seen: Remembered[Seen] = Remembered()
         self._kept: Remembered[Kept] = Remembered()
@@ -95,11 +94,6 @@ class MapDrawing:
         """Adds to the paths behind the robots that drive now."""
         self._trails = follow(self._trails, snapshot)
 
-    def same_paths(self, snapshot: Snapshot) -> bool:
-        """Whether the last similar run has the same path as f: before the first reduction it is f."""
-        original, evidence = snapshot.original, snapshot.evidence
-        return self._same_paths.get((original, evidence), lambda: original is None or original == evidence)
-
     def frame(self, shown: Shown, view: View, palette: Palette, cursor: Cell | None) -> tuple[Canvas, Picture]:
         """A new frame, and its picture without robots and crosshair. Without a `cursor` it has no crosshair."""
         shown = self._with_live(shown)
@@ -118,10 +112,6 @@ class MapDrawing:
         live = None if shown.ways else foremost(shown.snapshot)
         if (live is None or not live.models) and self._moved is None:
             return shown
-        # NumPy is not loaded before something moves.
-        from ddenv.workbench.map.moved_prints import MovedPrints
-        from ddenv.world.pose import pose_of
-
         if self._moved is None or self._moved.place is not shown.place:
             self._moved = MovedPrints(shown.place)
         poses = {} if live is None else {name: pose_of(values) for name, values in live.models.items()}
@@ -140,7 +130,7 @@ class MapDrawing:
 
         def draw() -> Picture:
             lines = [Line(evidence, palette.path)] if "path" in layers else []
-            if "original" in layers and not self.same_paths(snapshot):
+            if "original" in layers and not shown.same_paths:
                 lines.insert(0, Line(original, palette.original, DASH))
             if shown.ways:
                 both = zip(shown.ways, (palette.path, palette.original), (0, DASH), strict=False)

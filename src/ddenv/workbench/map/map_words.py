@@ -10,11 +10,11 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.evidence.took_part import in_last
-from ddenv.map.names import shortened
 from ddenv.runfile.state import RunState, partition_letter
 from ddenv.runfile.supports import Names, drops
+from ddenv.text import shortened
 from ddenv.workbench.map.place import Shown
-from ddenv.workbench.wording import DROPS, count, dropping
+from ddenv.workbench.shared.wording import DROPS, count, dropping
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint
@@ -50,11 +50,8 @@ SOLID, DASHED, ROBOTS, PARTED = OF_WAYS = (
 LONGEST_NAME, LONGEST_DROPPED, SHORT_DROPPED = 40, 16, 10
 
 
-def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
-    """One line with the meanings of the signs on the map, as many as fit in `width`.
-
-    With `same_paths`, the last similar run has the same path as f.
-    """
+def legend(shown: Shown, width: int) -> Text:
+    """One line with the meanings of the signs on the map, as many as fit in `width`."""
     state, layers = shown.snapshot.state, shown.layers
     meanings = {
         PARTS: bool(state.elements) and "partitions" in layers,
@@ -63,7 +60,7 @@ def legend(shown: Shown, width: int, *, same_paths: bool) -> Text:
         FALLING: shown.candidate is not None and bool(drops(state, shown.candidate)),
         SENSED: "sensed" in layers and state.evidence_test is not None,
         NO_PART: "took part" in layers and in_last(state) is not None,
-        FIRST_PATH: "original" in layers and not same_paths,
+        FIRST_PATH: "original" in layers and not shown.same_paths,
     }
     signs = [sign for sign, there in meanings.items() if there]
     usual = LEGEND if state.elements else LEGEND[:2]

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from ddenv.map import lazy_numpy as np
+import numpy as np
+
 from ddenv.map.cells import Signs
-from ddenv.map.paint import RGB, Canvas
+from ddenv.map.colors import RGB
+from ddenv.map.paint import Canvas
 from ddenv.map.raster import EMPTY
 from ddenv.runfile.state import Candidate, RunState, Trial, partition_letter
 from ddenv.runfile.supports import drops
@@ -29,7 +31,7 @@ from ddenv.workbench.map.map_colors import (
     Tone,
     mixed,
 )
-from ddenv.workbench.wording import DROPS
+from ddenv.workbench.shared.wording import DROPS
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Footprint

@@ -6,20 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
 from rich.color import Color
 from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from ddenv.map import lazy_numpy as np
 from ddenv.map.cells import Cell, place_signs
-from ddenv.map.paint import NUMBERED, Canvas, readable
-from ddenv.map.raster import ARROWS, HOLLOW, Outlines, Spans, View, arrow, braille, owners, spans
+from ddenv.map.colors import NUMBERED, readable
+from ddenv.map.paint import Canvas
+from ddenv.map.raster import ARROWS, EMPTY, HOLLOW, Outlines, Spans, View, arrow, braille, owners, spans
 from ddenv.runfile.store import Live
 from ddenv.workbench.map.map_colors import REMOVED, Palette
 from ddenv.workbench.map.model_looks import Looks, fill, ghosts
 from ddenv.workbench.map.place import Point, Way
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import heading
 
 ARMS = (((0, -1), "─"), ((0, 1), "─"), ((-1, 0), "│"), ((1, 0), "│"))
@@ -74,11 +75,12 @@ class Picture:
         rows, columns = self.canvas.chars.shape
         return cell[0] < int(rows) and cell[1] < int(columns)
 
-    def owner(self, cell: Cell) -> int:
-        """The model that is seen in a cell, a removed one if there are dots, or EMPTY."""
+    def owner(self, cell: Cell) -> int | None:
+        """The number of the model that is seen in a cell, a removed one if there are dots; None if there is none."""
         row, column = cell
         grid = self.gone if self.dotted[cell] else self.grid
-        return int(grid[2 * row : 2 * row + 2, column].max())
+        owner = int(grid[2 * row : 2 * row + 2, column].max())
+        return None if owner == EMPTY else owner
 
 
 def seen(outlines: Outlines, view: View) -> Seen:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ddenv.workbench.run.observed import Busy, Observed
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.observed import Busy, Observed
+from ddenv.workbench.shared.poll import Snapshot
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,6 +80,12 @@ class Shown:
         """Where the robot ended in f, m."""
         position = self.snapshot.state.f_position
         return None if position is None else position[:2]
+
+    @property
+    def same_paths(self) -> bool:
+        """Whether the last similar run has the same path as f: before the first reduction it is f."""
+        original, evidence = self.snapshot.original, self.snapshot.evidence
+        return original is None or original == evidence
 
 
 def place_of(world: World, scenario: Scenario | None = None) -> Place:

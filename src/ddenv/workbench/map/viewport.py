@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from ddenv.map.cells import Cell
-from ddenv.map.raster import View
+if TYPE_CHECKING:
+    from ddenv.map.cells import Cell
+    from ddenv.map.raster import View
 
 
 class Viewport:
@@ -28,7 +31,7 @@ class Viewport:
         else:
             self.cursor = min(self.cursor[0], rows - 1), min(self.cursor[1], columns - 1)
         keep = view if not self.fitted else None
-        new = View(keep.x, keep.y, keep.scale, columns, rows) if keep else fitting(columns, rows)
+        new = replace(keep, columns=columns, rows=rows) if keep else fitting(columns, rows)
         # Drawings are reused for a view, so an equal view stays the same object.
         self.view = view if new == view else new
 

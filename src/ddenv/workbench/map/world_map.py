@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.segment import Segment
@@ -15,21 +16,22 @@ from textual.message import Message
 from textual.strip import Strip
 from textual.widget import Widget
 
-from ddenv.map.cells import Cell
-from ddenv.map.paint import Canvas
-from ddenv.map.raster import EMPTY, View
+from ddenv.text import plain
 from ddenv.workbench.map.map_colors import Palette, palette_of
-from ddenv.workbench.map.map_drawing import MapDrawing
 from ddenv.workbench.map.map_words import describe, legend
-from ddenv.workbench.map.picture import Picture, strip
 from ddenv.workbench.map.place import Place, Point, Shown, Way
 from ddenv.workbench.map.viewport import Viewport
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.poll import Snapshot
 
+# What needs NumPy is loaded with the first world: the first paint of a run comes before.
 if TYPE_CHECKING:
+    from ddenv.map.cells import Cell
     from ddenv.map.footprints import Footprint
+    from ddenv.map.paint import Canvas
+    from ddenv.map.raster import View
     from ddenv.runfile.state import Candidate, Trial
+    from ddenv.workbench.map.map_drawing import MapDrawing
+    from ddenv.workbench.map.picture import Picture
 
 # One step of the wheel zooms by this factor.
 WHEEL = 1.25
@@ -79,7 +81,6 @@ class WorldMap(Widget, can_focus=True):
         self.shown = Shown()
         self.notice = "reading the world ..."
         self.viewport = Viewport()
-        self._drawing = MapDrawing()
         self._palette: Palette | None = None
         self.picture: Picture | None = None
         self._canvas: Canvas | None = None
@@ -94,6 +95,12 @@ class WorldMap(Widget, can_focus=True):
         self._aim: tuple[str, Cell, View] | None = None
         self._pointed: str | None = None
         self._subtitle_of: tuple[object, ...] = ()
+
+    @cached_property
+    def _drawing(self) -> MapDrawing:
+        from ddenv.workbench.map.map_drawing import MapDrawing
+
+        return MapDrawing()
 
     # The content.
 
@@ -154,7 +161,8 @@ class WorldMap(Widget, can_focus=True):
         if self.selection and snapshot.state.environment is not before.state.environment:
             self.select(self.selection.intersection(snapshot.state.environment))
         self.shown = replace(self.shown, snapshot=snapshot, candidate=candidate)
-        self._drawing.follow(snapshot)
+        if self._has_world:
+            self._drawing.follow(snapshot)
         if snapshot.evidence is not before.evidence and self.viewport.fitted:
             self._refit()
         else:
@@ -177,7 +185,7 @@ class WorldMap(Widget, can_focus=True):
 
     def legend(self, width: int) -> Text:
         """One line with the meanings of the signs on the map, as many as fit."""
-        return legend(self.shown, width, same_paths=self._drawing.same_paths(self.snapshot))
+        return legend(self.shown, width)
 
     # Models.
 
@@ -190,7 +198,7 @@ class WorldMap(Widget, can_focus=True):
         if self.picture is None or not self.picture.holds(cursor):
             return None
         owner = self.picture.owner(cursor)
-        return None if owner == EMPTY else self.place.prints[owner].name
+        return None if owner is None else self.place.prints[owner].name
 
     def describe(self, name: str, columns: int = 0) -> Text:
         """A description of a model in one line of at most `columns`; empty for an unknown name."""
@@ -261,10 +269,14 @@ class WorldMap(Widget, can_focus=True):
     def _refit(self) -> None:
         """Changes the size or the important places."""
         columns, rows = self.size
-        # Without a world there is nothing to draw, and the drawing code is not loaded.
-        if columns and rows and (not self.notice or self.place.prints):
+        if columns and rows and self._has_world:
             self.viewport.resize(columns, rows, lambda *size: self._drawing.fitting(self.shown, *size))
             self.draw()
+
+    @property
+    def _has_world(self) -> bool:
+        """Whether there is something to draw."""
+        return not self.notice or bool(self.place.prints)
 
     def on_resize(self) -> None:
         self._refit()
@@ -369,6 +381,8 @@ class WorldMap(Widget, can_focus=True):
         if self._canvas is None or y >= self._canvas.chars.shape[0]:
             return Strip.blank(width, self.rich_style)
         if y not in self._strips:
+            from ddenv.workbench.map.picture import strip
+
             self._strips[y] = strip(self._canvas, y)
         return self._strips[y]
 

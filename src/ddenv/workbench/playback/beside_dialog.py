@@ -13,11 +13,11 @@ from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
+from ddenv.text import padded, shortened
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.wording import outcome
+from ddenv.workbench.shared.wording import outcome
 
 # The maximum number of tests in the list.
 LISTED = 200

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from rich.text import Text
 from textual.widget import Widget
 
-from ddenv.map.names import shortened
 from ddenv.runfile.state import Test
+from ddenv.text import plain, shortened
 from ddenv.workbench.playback.timeline import ROBOTS
-from ddenv.workbench.run.facts import log
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.wording import OUTCOME
 
 HERE = "▸"
+# The maximum number of lines of a test.
+LOGGED = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +27,31 @@ class Line:
     words: str
 
 
+def met(test: Test) -> tuple[tuple[float, str], ...]:
+    """What the robot met in a test, and when, simulated s."""
+    said = [(at, 0, f"senses {plain(name)}") for name, at in test.first_sensed]
+    said += [(at, 1, f"touches {plain(name)}") for name, at in test.first_touched]
+    lines = [(at, words) for at, _, words in sorted(said)]
+    if len(lines) > LOGGED:
+        lines = [*lines[:LOGGED], (lines[LOGGED][0], f"and {len(lines) - LOGGED} more such lines")]
+    if test.is_finished:
+        lines.append((test.simulated_seconds, how_it_ended(test)))
+    return ((0.0, "starts"), *lines)
+
+
+def how_it_ended(test: Test) -> str:
+    """Its outcome, with the failure."""
+    if test.outcome == "running":
+        return "▶ it runs"
+    why = f": {plain(test.failure)}" if test.failure else ""
+    early = ", ended early: it was stuck for good" if test.cut else ""
+    return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
+
+
 def lines_of(tests: tuple[Test, ...]) -> list[Line]:
     """What happened in one or two tests, in order."""
     signs = ROBOTS if len(tests) > 1 else ("",)
-    found = [Line(at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in log(test)]
+    found = [Line(at, sign, words) for sign, test in zip(signs, tests, strict=False) for at, words in met(test)]
     return sorted(found, key=lambda line: line.time)
 
 

@@ -13,7 +13,7 @@ from ddenv.runfile.supports import Names
 from ddenv.runs.playback import Played
 from ddenv.workbench.map.moved_prints import MovedPrints
 from ddenv.workbench.map.place import Place, Way
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 from ddenv.world.pose import pose_at
 
 

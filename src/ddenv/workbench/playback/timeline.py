@@ -11,7 +11,7 @@ from textual.widget import Widget
 
 from ddenv.runfile.state import Test
 from ddenv.workbench.map.map_words import PARTING
-from ddenv.workbench.wording import outcome
+from ddenv.workbench.shared.wording import outcome
 
 GONE, COMING, NOW, END, TOUCH = "━", "─", "●", "┤", "▾"
 ROBOTS = "→⇒"

@@ -19,9 +19,10 @@ from ddenv.guiding.commands import Command, data_of, question, refusal, said, st
 from ddenv.guiding.pace import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
-from ddenv.workbench.run.poll import Poll, Snapshot
-from ddenv.workbench.run.processes import Engine
-from ddenv.workbench.wording import attach_name, count, duration, plain
+from ddenv.text import plain
+from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.processes import Engine
+from ddenv.workbench.shared.wording import attach_name, count, duration
 
 # After this time without an answer the screen says that there is none, s.
 PATIENCE = 5

@@ -12,9 +12,10 @@ from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import pointed, purpose
+from ddenv.text import plain
 from ddenv.words import news
-from ddenv.workbench.run.poll import Poll, Snapshot
-from ddenv.workbench.wording import count, outcome, plain
+from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.wording import count, outcome
 
 # Why no key guides the run meanwhile.
 NOT_NOW = "this is an earlier moment of the run: escape comes back to now"

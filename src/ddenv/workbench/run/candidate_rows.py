@@ -9,14 +9,27 @@ from itertools import takewhile
 
 from rich.cells import cell_len
 
+from ddenv.evidence.claims import fresh_runs_made, in_the_making, made_of_usual, short
 from ddenv.evidence.took_part import implied_words
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.supports import drops
 from ddenv.runs.fresh_runs import FreshRuns, fresh_runs
-from ddenv.workbench.run import certificate_rows
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import DROPS, VERDICT, brief, dropping, metres, outcome, plain, signs, simulated
+from ddenv.text import plain, shortened
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import (
+    CLAIM,
+    DROPS,
+    VERDICT,
+    brief,
+    count,
+    dropping,
+    metres,
+    outcome,
+    percent,
+    signs,
+    simulated,
+)
 
 # Maximum width of a model's name, in cells.
 NAME = 8
@@ -27,6 +40,27 @@ IN_SHORT = "in short"
 
 Item = Trial | Candidate | Test | FreshRuns
 Words = Mapping[str, str]
+# What the columns mean, for tooltips.
+MEANINGS = {
+    "#": "the order in which the candidates are tested",
+    "candidate": "a part of the environment, or the environment without a part; a try is your own selection",
+    "models": "how many models it has",
+    "distance": "what the prioritization ranked it by",
+    "tests": "how many of the possible tests were made",
+    "evidence": "how its tests ended; k explains the signs",
+    "to f": "how near to the end of f the nearest of its tests came",
+    "real": "how long its tests took by the clock, or how far the running one is",
+    "verdict": "what its tests add up to; k explains the signs",
+    "environment": "what was run with fresh seeds: what is left, that without one model, or the whole world",
+    "runs": "the runs that did not break",
+    "ended": "how the runs ended; k explains the signs",
+    "f": "the share of the runs that showed f",
+    "95 %": "the interval of that share, in per cent",
+}
+# Columns that only candidates fill.
+OF_CANDIDATES = ("distance", "evidence")
+# Maximum width of a model's name, in cells.
+MODEL_WIDTH = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,25 +92,6 @@ FRESH_COLUMNS = (
     Column("95 %", 11, right=True),
     Column("verdict", 14),
 )
-# What the columns mean, for tooltips.
-MEANINGS = {
-    "#": "the order in which the candidates are tested",
-    "candidate": "a part of the environment, or the environment without a part; a try is your own selection",
-    "models": "how many models it has",
-    "distance": "what the prioritization ranked it by",
-    "tests": "how many of the possible tests were made",
-    "evidence": "how its tests ended; k explains the signs",
-    "to f": "how near to the end of f the nearest of its tests came",
-    "real": "how long its tests took by the clock, or how far the running one is",
-    "verdict": "what its tests add up to; k explains the signs",
-    "environment": "what was run with fresh seeds: what is left, that without one model, or the whole world",
-    "runs": "the runs that did not break",
-    "ended": "how the runs ended; k explains the signs",
-    "f": "the share of the runs that showed f",
-    "95 %": "the interval of that share, in per cent",
-}
-# Columns that only candidates fill.
-OF_CANDIDATES = ("distance", "evidence")
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +135,7 @@ def listed(snapshot: Snapshot) -> Listed:
 def round_title(state: RunState) -> tuple[str, str]:
     """The table's title, and how much of it is done."""
     if state.certificate is not None:
-        return certificate_rows.certificate_title(state)
+        return certificate_title(state)
     if state.round is None:
         return "Baseline: the whole world", ""
     candidates = state.round.candidates
@@ -137,7 +152,7 @@ def fitting(listing: Listed, width: int, narrow: bool = False) -> tuple[Column, 
     """The columns that fit into `width` cells, each with its width; `narrow` leaves out all that can be spared."""
     first = listing.rest[0] if listing.rest else None
     if isinstance(first, FreshRuns):
-        names = (certificate_rows.name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
+        names = (name_of(each) for each in listing.rest if isinstance(each, FreshRuns))
         longest = Column("environment", max(13, *(cell_len(name) + 1 for name in names)))
         rest = (each for each in FRESH_COLUMNS if not (narrow and each.name == "ended"))
         # How often f showed goes only where there is no room for it.
@@ -169,7 +184,7 @@ def words(snapshot: Snapshot, listing: Listed, row: int) -> Words:
     if isinstance(item, Test):
         return _run(snapshot, item, row + 1 - len(listing.trials))
     if isinstance(item, FreshRuns):
-        return certificate_rows.words(snapshot, item)
+        return certificate_words(snapshot, item)
     tests = [snapshot.state.tests[id - 1] for id in item.tests if 0 < id <= len(snapshot.state.tests)]
     done = [test for test in tests if test.is_finished]
     running = len(done) < len(tests) and any(test.outcome == "running" for test in tests)
@@ -242,3 +257,47 @@ def _run(snapshot: Snapshot, test: Test, number: int) -> Words:
         "real": brief(test.wall_seconds) if test.is_finished else "",
         "verdict": f"▶{_seconds(snapshot, test)}" if running else outcome(test),
     }
+
+
+def name_of(one: FreshRuns) -> str:
+    """What ran, in a few words."""
+    if one.without is not None:
+        return f"- {shortened(one.without, MODEL_WIDTH)}"
+    if one.is_left:
+        return "what is left"
+    return "whole world" if one.node == 0 else f"step {one.node}"
+
+
+def certificate_title(state: RunState) -> tuple[str, str]:
+    """The table's title, and how much of it is done."""
+    certificate = state.certificate
+    if certificate is None:
+        return "", ""
+    number = f" {certificate.number}" if certificate.number > 1 else ""
+    keeps = f"has to keep {percent(certificate.keep_rate)}"
+    far = (
+        made_of_usual(state, certificate) if in_the_making(state) else count(fresh_runs_made(state, certificate), "run")
+    )
+    return f"Certificate{number}: {keeps}", far
+
+
+def certificate_words(snapshot: Snapshot, one: FreshRuns) -> Mapping[str, str]:
+    """The words of a row by column."""
+    return {
+        "environment": name_of(one),
+        "runs": str(one.runs) if one.runs else "",
+        "ended": signs(dict(one.outcomes)),
+        "f": percent(one.shown / one.runs) if one.runs else "",
+        "95 %": f"{percent(one.low)[:-2]} to {percent(one.high)[:-2]}" if one.runs else "",
+        "verdict": _claim(snapshot, one),
+    }
+
+
+def _claim(snapshot: Snapshot, one: FreshRuns) -> str:
+    if one.claim is not None:
+        return f"{CLAIM.get(one.claim.verdict, '?')} {short(one.claim)}"
+    running = one.running if snapshot.engine == "alive" else ()
+    if not running:
+        return ""
+    seconds = snapshot.seconds(running[0].id)
+    return "▶" * min(3, len(running)) + simulated(seconds, settings(snapshot.state).timeout)

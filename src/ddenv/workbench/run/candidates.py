@@ -18,10 +18,10 @@ from textual.strip import Strip
 
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
+from ddenv.text import plain
 from ddenv.words import first_of
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import plain
+from ddenv.workbench.shared.poll import Snapshot
 
 # The maximum number of models that a tooltip names.
 NAMED = 12

@@ -20,10 +20,10 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import Kind, names
 from ddenv.settings import Value
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.run.methods import KINDS, note, paragraph
 from ddenv.workbench.widgets.entry import Entry
-from ddenv.workbench.wording import plain
 
 # Beside the pair and the algorithm, which have lists.
 NUMBERS = tuple(one for one in course.CHANGEABLE.values() if one.shown != "method")

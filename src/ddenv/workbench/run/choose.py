@@ -13,10 +13,10 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ddenv.map.names import shortened
+from ddenv.text import plain, shortened, truncated
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.wording import count, plain, shorten
+from ddenv.workbench.shared.wording import count
 
 # Maximum number of names listed at once, and the maximum width of each in cells; typing finds others.
 LISTED, WIDTH = 100, 58
@@ -211,5 +211,5 @@ class Copy(ModalScreen[None]):
 def _prompt(what: str, text: str) -> Text:
     lines = text.splitlines()
     more = f" and {len(lines) - 1} more lines" if len(lines) > 1 else ""
-    shown = shorten(plain(lines[0]), 40) if lines else ""
+    shown = truncated(plain(lines[0]), 40) if lines else ""
     return Text(f"{what:<24} ", no_wrap=True).append(f"{shown}{more}", "dim")

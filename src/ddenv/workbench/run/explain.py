@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ddenv.evidence.claims import current, ended, missed, of_runs, promise
+from ddenv.evidence.claims import current, ended, fresh_runs_made, missed, of_runs, promise, terms, usual_runs
+from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words
 from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
+from ddenv.runfile.progress import Certificate
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.words import failed_in, other_failures
-from ddenv.workbench.run.explain_certificate import certifying
+from ddenv.runs.fresh_runs import fresh_runs
+from ddenv.text import plain
+from ddenv.words import failed_in, isolating, other_failures
 from ddenv.workbench.run.explain_decisions import (
     arrival,
     by_hand,
@@ -21,10 +24,9 @@ from ddenv.workbench.run.explain_decisions import (
     rarer,
     to_adopt,
 )
-from ddenv.workbench.run.explain_slices import implied, refuted, sliced
 from ddenv.workbench.run.methods import DDENV, GROUPS, Lines, Step, beginning, follows, fruitless, is_sweep, listing
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, metres, percent, plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count, metres, percent
 
 # Maximum number of kept models that a sentence names.
 NAMED = 8
@@ -354,3 +356,90 @@ def _last(state: RunState, candidate: Candidate, outcome: str | None = None) -> 
         if test.outcome == outcome or (outcome is None and test.is_finished):
             return test
     return None
+
+
+def sliced(state: RunState) -> tuple[str, ...]:
+    """How the environment was cut down to its slice, until the next test is made."""
+    here = state.here
+    if here is None or here.how != "sliced" or here.tests != state.tests_done:
+        return ()
+    words = plain(slice_words(state, here))
+    return (TEACHING, f"{words}. u takes it back.")
+
+
+def implied(state: RunState) -> tuple[str, ...]:
+    """That the last test that ended was not simulated."""
+    last = next((test for test in reversed(state.tests) if test.is_finished), None)
+    if last is None or last.implied_by is None or state.ended:
+        return ()
+    return (f"Test {last.id} is implied by test {last.implied_by}: nothing that it lacks took part there.",)
+
+
+def refuted(state: RunState) -> tuple[str, ...]:
+    """That slices are wrong here."""
+    words = refuted_words(state)
+    return (f"{words[:1].upper()}{words[1:]}.",) if words else ()
+
+
+def certifying(snapshot: Snapshot) -> tuple[str, ...]:
+    """Fresh runs show what the result of the rounds is worth."""
+    state = snapshot.state
+    if state.isolating is not None:
+        now = plain(isolating(state))
+        return (
+            "Isolation: as few models as can be are removed from the whole world so that the robot reaches its goal.",
+            f"Now {now}. The result of the reduction stays as it is.",
+        )
+    certificate = state.certificate
+    if certificate is None:
+        return ("The rounds are over.",)
+    if certificate.claims:
+        return (_after(certificate), *_now(snapshot, certificate))
+    made = fresh_runs_made(state, certificate)
+    return (
+        f"Full runs with fresh seeds check the result: {terms(certificate, len(state.pinned.intersection(state.environment)))}.",
+        f"By the runs so far that takes about {usual_runs(state, certificate)}; {made} {'is' if made == 1 else 'are'} made.",
+        *_so_far(state),
+        *_now(snapshot, certificate),
+    )
+
+
+def _so_far(state: RunState) -> tuple[str, ...]:
+    """How often f showed in what is left and in the whole world."""
+    rows = fresh_runs(state)
+    if not rows or not rows[0].runs:
+        return ()
+    left, whole = rows[0], rows[-1]
+    beside = (
+        f", and in {of_runs(whole.shown, whole.runs)} of {named(whole.node)}"
+        if whole.without is None and whole.runs and len(rows) > 1
+        else ""
+    )
+    return (f"So far f shows in {of_runs(left.shown, left.runs)} of what is left{beside}.",)
+
+
+def _now(snapshot: Snapshot, certificate: Certificate) -> tuple[str, ...]:
+    # A test of the certificate before may still run.
+    running = [test for test in snapshot.running if test.phase == "certify" and test.run >= certificate.first_run]
+    if not running:
+        return ()
+    return (f"Now run {running[0].run - certificate.first_run + 1} of {_what(running[0], certificate)}.",)
+
+
+def _what(test: Test, certificate: Certificate) -> str:
+    if test.without is not None:
+        return f"all that is left except {plain(test.without)}"
+    if test.node == certificate.node:
+        return "all that is left"
+    return named(test.node)
+
+
+def _after(certificate: Certificate) -> str:
+    if certificate.claims[0].verdict == "lost":
+        return "f is rarer in what is left. Earlier environments run, to find the last one that seems to keep the rate."
+    return "The certificate is finished."
+
+
+def named(node: int) -> str:
+    """An environment by its number in the history."""
+    return "the whole world" if node == 0 else f"the environment of step {node}"

@@ -7,8 +7,9 @@ from ddenv.guiding.situation import named
 from ddenv.runfile.progress import Node
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Trial
-from ddenv.workbench.run.poll import Snapshot
-from ddenv.workbench.wording import count, plain
+from ddenv.text import plain
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import count
 
 HOW = {
     "adopted": "You adopted {what}",

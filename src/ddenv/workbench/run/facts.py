@@ -1,18 +1,32 @@
-"""The raw facts of one test, in words."""
+"""The raw facts of one test, and the dialog with them: its log, contacts, end and seed, and the command that makes it again."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from ddenv.errors import UserError
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
+from ddenv.text import plain
 from ddenv.words import first_of
-from ddenv.workbench.wording import OUTCOME, count, metres, plain
+from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.playback.met import how_it_ended, met
+from ddenv.workbench.shared.wording import count, metres
 
-# The maximum number of models to name, and of lines of a test's log.
-NAMED, LOGGED = 12, 400
+# The maximum number of models to name.
+NAMED = 12
+WIDTH = 11
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +51,7 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     models = state.models_of(test)
     again = f" · re-run {test.run}" if test.phase == "round" and test.run else ""
     said = (
-        ("end", _end(test)),
+        ("end", how_it_ended(test)),
         ("place", _place(test)),
         ("seed", f"{test.seed} (run {test.run})"),
         ("time", _took(test)),
@@ -48,27 +62,7 @@ def facts(position: Position, number: int, run: str) -> Facts | None:
     )
     title = f"Test {number} of {len(state.tests)} · {purpose(start.after, test)}{again}"
     command = f"ddenv test {run} --test {number}"
-    return Facts(title, tuple((name, words) for name, words in said if words), log(test), command)
-
-
-def log(test: Test) -> tuple[tuple[float, str], ...]:
-    """What the robot met in a test, and when, simulated s."""
-    met = [(at, 0, f"senses {plain(name)}") for name, at in test.first_sensed]
-    met += [(at, 1, f"touches {plain(name)}") for name, at in test.first_touched]
-    lines = [(at, words) for at, _, words in sorted(met)]
-    if len(lines) > LOGGED:
-        lines = [*lines[:LOGGED], (lines[LOGGED][0], f"and {len(lines) - LOGGED} more such lines")]
-    if test.is_finished:
-        lines.append((test.simulated_seconds, _end(test)))
-    return ((0.0, "starts"), *lines)
-
-
-def _end(test: Test) -> str:
-    if test.outcome == "running":
-        return "▶ it runs"
-    why = f": {plain(test.failure)}" if test.failure else ""
-    early = ", ended early: it was stuck for good" if test.cut else ""
-    return f"{OUTCOME.get(test.outcome, test.outcome)}{why}{early}"
+    return Facts(title, tuple((name, words) for name, words in said if words), met(test), command)
 
 
 def _place(test: Test) -> str:
@@ -106,3 +100,64 @@ def _counts(position: Position, state: RunState, test: Test) -> str:
     one = round.candidates[test.candidate]
     numbers = ", ".join(map(str, one.tests[:NAMED]))
     return f"{one.label} of round {round.number}: {one.verdict or 'not judged yet'}, tests {numbers}"
+
+
+class FactsDialog(ModalScreen[None]):
+    """Starts at a test; the arrows go to the tests before and after it."""
+
+    CSS_PATH = "run_dialogs.tcss"
+    BINDINGS: ClassVar = [
+        Binding("left", "step(-1)", "test before", id="facts.before", tooltip="the test before this one"),
+        Binding("right", "step(1)", "next test", id="facts.next", tooltip="the next test"),
+        Binding("p,P", "play", "play", id="facts.play", tooltip="play this test back on the map"),
+        Binding("c", "copy", "copy", id="facts.copy", tooltip="copy the command that makes it again (OSC 52)"),
+        Binding("escape,i,q,enter", "dismiss", "close", id="facts.close", tooltip="back to the run"),
+    ]
+
+    def __init__(self, position: Position, test: int, run: str, play: Callable[[int], str]) -> None:
+        """`run` is what a shell calls the run. `play` plays a test back, or returns why it cannot."""
+        super().__init__()
+        self._position, self._test, self._run, self._play = position, test, run, play
+        self._facts: Facts | None = None
+
+    def compose(self) -> ComposeResult:
+        hints = "← → other tests   p plays it   c copies the command   escape closes"
+        with Framed("", hints, classes="dialog reading"), VerticalScroll():
+            yield Static("", id="facts", markup=False)
+
+    def on_mount(self) -> None:
+        self._show(self._test)
+
+    def _show(self, test: int) -> None:
+        try:
+            found = facts(self._position, test, self._run)
+        except UserError as error:
+            self.query_one(Framed).say(plain(str(error)))
+            return
+        if found is not None:
+            self._test, self._facts = test, found
+            self.query_one(".dialog").border_title = Text(found.title)
+            self.query_one("#facts", Static).update(_text(found))
+            self.query_one(VerticalScroll).scroll_home(animate=False)
+
+    def action_step(self, by: int) -> None:
+        self._show(self._test + by)
+
+    def action_play(self) -> None:
+        if why := self._play(self._test):
+            self.query_one(Framed).say(plain(why))
+
+    def action_copy(self) -> None:
+        if self._facts is not None:
+            self.app.copy_to_clipboard(self._facts.command)
+            self.query_one(Framed).say("command copied, if the terminal allows it")
+
+
+def _text(found: Facts) -> Text:
+    text = Text()
+    for name, words in found.facts:
+        text.append(f"{name:<{WIDTH}}", "dim").append(f"{words}\n")
+    text.append("\nlog\n", "bold")
+    for at, words in found.log:
+        text.append(f"{at:>8.1f} s  ", "dim").append(f"{words}\n")
+    return text.append("\nto make it again\n", "bold").append(f"  {found.command}")

@@ -20,10 +20,11 @@ from ddenv.guiding.situation import Situation
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
+from ddenv.text import plain, shortened
 from ddenv.words import first_of
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.question import Question
-from ddenv.workbench.wording import count, plain, shorten
 
 # Time between two looks at the run, s.
 PERIOD = 0.5
@@ -95,7 +96,7 @@ class FailuresMet(ModalScreen[int | None]):
         if one is None:
             words = Text("No test shows a failure other than f.\n").append_text(words)
         else:
-            names = [plain(shorten(name, 40)) for name in state.models_of(state.tests[one.smallest - 1])]
+            names = [plain(shortened(name, 40)) for name in state.models_of(state.tests[one.smallest - 1])]
             words = Text(f"{_smallest(one)}: {first_of(names, NAMED) or 'no models'}\n").append_text(words)
         self.query_one("#failure", Static).update(words)
 

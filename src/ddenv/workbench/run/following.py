@@ -9,7 +9,7 @@ from typing import Any
 from textual.screen import Screen
 
 from ddenv.runfile.state import Candidate
-from ddenv.workbench.run.poll import Poll, Snapshot
+from ddenv.workbench.shared.poll import Poll, Snapshot
 
 # How often the run file is read, s.
 PERIOD = 0.1

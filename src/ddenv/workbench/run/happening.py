@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.workbench.run.explain import Explanation, explain
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.poll import Snapshot
 from ddenv.workbench.widgets.lines import changed_lines
 
 # Minimum time between two updates within a round, s.

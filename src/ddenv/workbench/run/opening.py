@@ -15,16 +15,17 @@ from ddenv.guiding.pace import Stop
 from ddenv.guiding.selections import AcceptOther
 from ddenv.runfile.position import Position
 from ddenv.runfile.run_settings import settings
-from ddenv.workbench.background import is_open
+from ddenv.runfile.state import CERTIFY, RunState, Test
+from ddenv.runs.fresh_runs import FreshRuns
 from ddenv.workbench.map.place import LAYERS
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.candidate_rows import Item
 from ddenv.workbench.run.dialogs import Method, Quit, SceneDialog
-from ddenv.workbench.run.poll import Poll
-from ddenv.workbench.run.processes import Scene
-from ddenv.workbench.run.tests_of_row import of_row
-from ddenv.workbench.wording import attach_name
+from ddenv.workbench.shared.background import is_open
+from ddenv.workbench.shared.poll import Poll
+from ddenv.workbench.shared.processes import Scene
+from ddenv.workbench.shared.wording import attach_name
 
 
 class Opening:
@@ -80,14 +81,14 @@ class Opening:
 
     def rounds(self, position: Position, then: Callable[[int], None]) -> None:
         """Lists the rounds so far; `then` takes the event that ends the chosen one."""
-        from ddenv.workbench.run.rounds_dialog import Rounds
+        from ddenv.workbench.run.dialogs import Rounds
 
         dialog = Rounds(tuple(position.chapters), position.at)
         self._screen.app.push_screen(dialog, lambda chapter: then(chapter.last) if chapter else None)
 
     def facts(self, position: Position, item: Item | None) -> None:
         """Shows the raw facts of the test that tells most of a row, or of the last one of all."""
-        from ddenv.workbench.run.facts_dialog import FactsDialog
+        from ddenv.workbench.run.facts import FactsDialog
 
         test, _ = of_row(position.now, item)
         if test is None:
@@ -216,3 +217,38 @@ class Opening:
 
     def _exit(self, words: str) -> None:
         self._screen.app.exit(0, message=Text(words))
+
+
+def of_row(state: RunState, item: Item | None, *, finished: bool = False) -> tuple[int | None, int | None]:
+    """The test that tells most of a row, by its number, and one to compare it with: both None without tests.
+
+    The last test of the row that showed f, else its last one, else the last one of all. Of the runs without a model: the first one
+    whose partner with the same seed, in what is left, showed f where it did not, and before it that partner. With `finished`, only
+    finished tests count.
+    """
+    tests = [test for test in _tests(state, item) if test.is_finished or not finished]
+    if isinstance(item, FreshRuns) and item.without is not None:
+        left = {test.run: test for test in _fresh(state, item.node, None) if test.outcome == "similar"}
+        pairs = ((left[test.run], test) for test in tests if test.run in left and test.outcome != "similar")
+        for partner, test in pairs:
+            if test.is_finished:
+                return partner.id, test.id
+    similar = [test for test in tests if test.outcome == "similar"]
+    if similar or tests:
+        return (similar or tests)[-1].id, None
+    last = (test.id for test in reversed(state.tests) if test.is_finished or not finished)
+    return next(last, None), None
+
+
+def _tests(state: RunState, item: Item | None) -> list[Test]:
+    if isinstance(item, Test):
+        return [item]
+    if isinstance(item, FreshRuns):
+        return _fresh(state, item.node, item.without)
+    return [] if item is None else [state.tests[id - 1] for id in item.tests if 0 < id <= len(state.tests)]
+
+
+def _fresh(state: RunState, node: int, without: str | None) -> list[Test]:
+    first = 0 if state.certificate is None else state.certificate.first_run
+    own = (test for test in state.confirm_tests if test.phase == CERTIFY and test.run >= first)
+    return [test for test in own if test.node == node and test.without == without]

@@ -5,7 +5,91 @@ A key that guides the run has the action `guide`, with its name in `ddenv.guidin
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from functools import partial
+from typing import Any
+
 from textual.binding import Binding, BindingType
+from textual.screen import Screen
+
+from ddenv.guiding.offers import Offer, Pointed, offer
+from ddenv.workbench.help.footer import KeyFooter
+from ddenv.workbench.map.world_map import WorldMap
+from ddenv.workbench.run.asking import Asking
+from ddenv.workbench.run.browsing import NOT_NOW, Browsing
+from ddenv.workbench.run.candidates import Candidates
+from ddenv.workbench.run.opening import Opening
+from ddenv.workbench.shared.poll import Poll
+
+# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
+MORE = (
+    "run.signs",
+    "run.facts",
+    "run.play",
+    "run.rounds",
+    "run.find",
+    "run.layers",
+    "run.copy",
+    "run.scene",
+    "run.runs",
+)
+FIRST = (
+    "run.help",
+    "run.quit",
+    "run.pause",
+    "run.accept",
+    "run.reject",
+    "run.step",
+    "run.veto",
+    "run.pin",
+    "run.without",
+    "run.undo",
+    "run.history",
+    "run.export",
+    "run.why",
+    "run.change",
+    "run.only",
+    *MORE,
+)
+# While an earlier moment is shown, and while the map has the focus.
+BROWSING = (
+    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
+    *("run.quit", "run.play", "run.signs"),
+)
+ON_MAP = (
+    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
+    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
+)
+# The footer of a screen that only watches.
+LOOKING = (
+    *(
+        "run.history",
+        "run.rounds",
+        "run.facts",
+        "run.play",
+        "run.why",
+        "run.export",
+        "run.find",
+        "run.copy",
+        "run.layers",
+        "run.signs",
+        "run.help",
+    ),
+    "run.quit",
+)
+# What the pointer shows over the parts that take no keys, by their ids.
+TOOLTIPS = {
+    "header": "scenario and method; the round, and how many models are left",
+    "status": "the state of the run, its tests by outcome, how often f shows, time, and what is left",
+    "map-lines": "the signs on the map; k explains all of them",
+    "chart": "how many models were left after each test; the dashed line: how many seem to be needed",
+}
+# These ask for models if none are selected. A pin always asks: it ends the search.
+TITLES = {
+    "pin": "Pin or unpin models (+): pinned ones stay; a new search begins",
+    "without": "Try without these models",
+    "only": "Try only these models",
+}
 
 
 def _hidden(key: str, action: str, words: str, id: str, tooltip: str, display: str | None = None) -> Binding:
@@ -170,72 +254,75 @@ KEYS: list[BindingType] = [*_KEYS]
 # The names of the actions that guide the run, and their bindings by these names.
 GUIDES = {each.action: each.action[7:-2] for each in _KEYS if each.action.startswith("guide(")}
 GUIDING = {GUIDES[each.action]: each for each in _KEYS if each.action in GUIDES}
-# The footer's keys in the order of the screen, then by priority; `MORE` of them fit on wide screens only.
-MORE = (
-    "run.signs",
-    "run.facts",
-    "run.play",
-    "run.rounds",
-    "run.find",
-    "run.layers",
-    "run.copy",
-    "run.scene",
-    "run.runs",
-)
 SHOWN = tuple(
     id
     for binding in _KEYS
     if binding.show
     for id in ((*MORE, "run.help") if binding.id == "run.help" else (binding.id or "",))
 )
-FIRST = (
-    "run.help",
-    "run.quit",
-    "run.pause",
-    "run.accept",
-    "run.reject",
-    "run.step",
-    "run.veto",
-    "run.pin",
-    "run.without",
-    "run.undo",
-    "run.history",
-    "run.export",
-    "run.why",
-    "run.change",
-    "run.only",
-    *MORE,
-)
-# While an earlier moment is shown, and while the map has the focus.
-BROWSING = (
-    *("run.back", "run.on", "run.round_before", "run.next_round", "run.rounds", "run.facts", "run.follow", "run.help"),
-    *("run.quit", "run.play", "run.signs"),
-)
-ON_MAP = (
-    *("run.help", "map.pick", "map.next", "run.closer", "run.farther", "run.fit", "run.find", "run.layers", "run.pin"),
-    *("run.without", "run.only", "run.signs", "run.pause", "run.quit"),
-)
-# The footer of a screen that only watches.
-LOOKING = (
-    *(
-        "run.history",
-        "run.rounds",
-        "run.facts",
-        "run.play",
-        "run.why",
-        "run.export",
-        "run.find",
-        "run.copy",
-        "run.layers",
-        "run.signs",
-        "run.help",
-    ),
-    "run.quit",
-)
-# What the pointer shows over the parts that take no keys, by their ids.
-TOOLTIPS = {
-    "header": "scenario and method; the round, and how many models are left",
-    "status": "the state of the run, its tests by outcome, how often f shows, time, and what is left",
-    "map-lines": "the signs on the map; k explains all of them",
-    "chart": "how many models were left after each test; the dashed line: how many seem to be needed",
-}
+
+
+class KeyOffers:
+    """The keys by the names in `ddenv.guiding.offers.ACTIONS`, for what the user points at in `table` and `world`."""
+
+    def __init__(
+        self, browsing: Browsing, poll: Poll, table: Candidates, world: WorldMap, asking: Asking, opening: Opening
+    ) -> None:
+        self._browsing = browsing
+        self._poll, self._table, self._world, self._asking, self._opening = poll, table, world, asking, opening
+
+    def offer(self, name: str) -> Offer:
+        """What a key does now."""
+        return Offer(why_not=NOT_NOW) if self._browsing.is_past else offer(name, self._asking.situation, self.pointed)
+
+    @property
+    def pointed(self) -> Pointed:
+        """The row under the cursor, if it is in sight, and the selected models in the order of the world."""
+        names, elements = self._selection(), self._poll.snapshot.state.elements
+        known = tuple(name for name in elements if name in names) if names else ()
+        models = (*known, *sorted(names.difference(known)))
+        row = self._table.under_cursor if self._table.is_attached and self._table.is_on_screen else None
+        return Pointed(row, self._table.following, models)
+
+    def _selection(self) -> frozenset[str]:
+        """The models that were selected by hand, or the one that the crosshair is on."""
+        if self._world.selection:
+            return frozenset(self._world.selection)
+        name = self._world.model_at_cursor if self._world.has_focus else None
+        return frozenset() if name is None else frozenset((name,))
+
+    def show(self, footer: KeyFooter) -> None:
+        """Shows in the footer what is possible."""
+        now, pointed = self._asking.situation, self.pointed
+        for name, binding in GUIDING.items():
+            offered = offer(name, now, pointed)
+            footer.say(binding.id or "", "" if offered.why_not else offered.words or binding.description)
+
+    def pressed(self, screen: Screen[Any], key: str) -> None:
+        """Shows why a key does nothing, if it guides the run on `screen` and is not possible now."""
+        # To list what all keys do now takes longer than most keys take.
+        if any(each.action in GUIDES for each in screen._bindings.key_to_bindings.get(key, ())):
+            active = screen.active_bindings.get(key)
+            if active is not None and not active.enabled and active.node is screen:
+                self._asking.refuse(self.offer(GUIDES[active.binding.action]).why_not)
+
+    def use(self, name: str) -> None:
+        """Does what a key means now; it asks for models if none are selected but some are needed, and always for pins."""
+        if self._browsing.is_past:
+            self._asking.refuse(NOT_NOW)
+            return
+        command = self.offer(name).command
+        if command is not None and name != "pin":
+            self._asking.ask(command)
+        elif name == "change":
+            self._opening.change()
+        elif name in TITLES:
+            environment = self._poll.snapshot.state.environment
+            self._opening.choose(TITLES[name], environment, True, partial(self._chosen, name), self.pointed.models)
+
+    def _chosen(self, name: str, models: Collection[str]) -> None:
+        now = offer(name, self._asking.situation, Pointed(models=tuple(models)))
+        if now.command is None:
+            self._asking.refuse(now.why_not)
+        else:
+            self._asking.ask(now.command)

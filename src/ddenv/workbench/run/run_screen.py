@@ -20,37 +20,34 @@ from ddenv.runfile.position import Step
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runfile.supports import drops, drops_without
 from ddenv.runs.wanted import Wanted
-from ddenv.workbench.background import call_if_open
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.map.map_words import MapLines
 from ddenv.workbench.map.place import Place, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
-from ddenv.workbench.messages import Attention
 from ddenv.workbench.run.asking import Asking
 from ddenv.workbench.run.browsing import Browsing
 from ddenv.workbench.run.candidate_rows import round_title
 from ddenv.workbench.run.candidates import Candidates
 from ddenv.workbench.run.following import Following
-from ddenv.workbench.run.guide_place import FOLLOWS, GuidePlace
 from ddenv.workbench.run.happening import Happening
-from ddenv.workbench.run.key_offers import KeyOffers
-from ddenv.workbench.run.log import NOTHING_DECIDED, Log, as_it_is, decision_line
-from ddenv.workbench.run.models_chart import Chart
-from ddenv.workbench.run.models_left import ModelsLeft
-from ddenv.workbench.run.noteworthy import title, worth_a_look
+from ddenv.workbench.run.models import Chart, ModelsLeft
 from ddenv.workbench.run.opening import Opening
-from ddenv.workbench.run.poll import Poll, Snapshot
-from ddenv.workbench.run.processes import Engine, Scene
-from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS
-from ddenv.workbench.run.status import Header, Status
+from ddenv.workbench.run.run_keys import BROWSING, FIRST, KEYS, LOOKING, ON_MAP, SHOWN, TOOLTIPS, KeyOffers
+from ddenv.workbench.run.status import Header, Status, title, worth_a_look
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.log import NOTHING_DECIDED, Log, as_it_is, decision_line
+from ddenv.workbench.shared.messages import Attention
+from ddenv.workbench.shared.poll import Poll, Snapshot
+from ddenv.workbench.shared.processes import Engine, Scene
 from ddenv.workbench.widgets.lines import Lines
 from ddenv.workbench.widgets.panes import Panes
-from ddenv.workbench.wording import plain
 
 # The time until all that has the focus, or had it, asked to be drawn, s.
 TOGETHER = 0.004
 SMALLEST = (64, 18)
+WATCHING = "watching only: no key changes anything"
 # The panes and their words, in the order of the keys 1 to 5.
 PANES = {"map": "map", "round": "round", "chart": "chart", "now": "what is happening", "log": "log"}
 # Where map, table and chart stand side by side, and where models and decisions do too.
@@ -83,7 +80,6 @@ class RunScreen(Screen[None]):
         self._footer = KeyFooter(shown, first, self._keys_here)
         self.asking = Asking(self, self.poll, self.engine, self._show_asked)
         self.following = Following(self, self.poll, self._seen, self._show)
-        self._guide = GuidePlace(run, self.browsing.position, self._browse if watch else None)
         self._opening = Opening(self, self.poll, self.asking, self._map, self.scene)
         self._keys = KeyOffers(self.browsing, self.poll, self._table, self._map, self.asking, self._opening)
         self._pane = "map"
@@ -117,7 +113,7 @@ class RunScreen(Screen[None]):
                 with _panel("decisions-panel", "What you decided"):
                     yield Lines(decision_line, nothing=NOTHING_DECIDED, tail=True, id="decisions")
         if self.poll.watch:
-            yield Static(FOLLOWS, id="watching", markup=False)
+            yield Static(WATCHING, id="watching", markup=False)
         yield Status(id="status")
         yield self._footer
         yield Static("", id="small", markup=False)
@@ -131,7 +127,6 @@ class RunScreen(Screen[None]):
         self.call_after_refresh(self._read_world)
 
     def on_unmount(self) -> None:
-        self._guide.close()
         self.scene.stop()
         self.asking.close()
         self.poll.close()
@@ -179,7 +174,6 @@ class RunScreen(Screen[None]):
                 self.post_message(Attention(plain(self.run.stem), why))
 
     def _show(self, changed: bool) -> None:
-        self._guide.look()
         if changed:
             self._show_run()
             self.asking.go_on()
@@ -288,8 +282,6 @@ class RunScreen(Screen[None]):
         except UserError as error:
             self.browsing.go(None)
             self.asking.refuse(str(error))
-        if self._guide.browsed():
-            self.query_one("#watching", Static).update(self._guide.words)
         self._table.follow()
         self._show(True)
         self._footer.say("run.follow", "now" if self.browsing.is_past else "follow")

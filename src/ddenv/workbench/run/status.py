@@ -10,17 +10,18 @@ from rich.text import Text
 from textual.widget import Widget
 
 from ddenv.amounts import between, percent, rounded
-from ddenv.evidence.claims import drift, has_dropped
+from ddenv.evidence.claims import drift, ended, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
+from ddenv.text import plain, shortened, truncated
 from ddenv.version import __version__
-from ddenv.workbench.history.branches import path
 from ddenv.workbench.run.methods import GROUPS, labels
-from ddenv.workbench.run.poll import Snapshot
+from ddenv.workbench.shared.branches import path
+from ddenv.workbench.shared.poll import Snapshot
+from ddenv.workbench.shared.wording import STATUS, about, count, duration
 from ddenv.workbench.terminal.themes import ink
-from ddenv.workbench.wording import STATUS, about, count, duration, plain, shorten
 
 OUTCOME_ORDER = ("similar", "pass", "other", "failed", "timeout", "error")
 # What is shortened or left out until the rest fits, the least important first.
@@ -28,6 +29,10 @@ SHRINK = (
     *("cut", "time", "engine", "left", "scene", "tests", "drift", "left", "mode", "tests", "drift"),
     *("asked", "engine", "tests", "drift", "state"),
 )
+# Which states end with a notification: the first one of these that follows another state.
+WORTH = ("finished", "failed", "lost", "waiting", "stopped")
+# The title goes in steps of so many per cent: each change is sent to the terminal.
+STEP = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +72,7 @@ class Header(Widget):
         right = next((each for each in rights if len(name) + shortest + len(each) + 6 <= width), rights[-1])
         room = max(0, width - 2 - len(name) - len(right) - 4)
         left = next((each for each in self._heading.lefts if len(each) <= room), "")
-        left = left or shorten(next(reversed(self._heading.lefts), ""), room)
+        left = left or truncated(next(reversed(self._heading.lefts), ""), room)
         space = max(1, width - 4 - len(name) - len(left) - len(right))
         text = Text(" ", no_wrap=True).append(name, ink(self.app.theme_variables, "primary", bold=True))
         return text.append(f"  {left}", "bold").append(" " * space).append(right)
@@ -110,8 +115,7 @@ class Status(Widget):
         if name == "state":
             colors = {"waiting": "text-warning", "lost": "text-error", "failed": "text-error", "paused": "text-warning"}
             status = self._snapshot.status if self._snapshot else ""
-            warns = self._besides[2] or (self._snapshot and self._snapshot.suspended is not None)
-            variable = "text-warning" if warns else colors.get(status, "text-success")
+            variable = "text-warning" if self._besides[2] else colors.get(status, "text-success")
             return ink(self.app.theme_variables, variable, bold=True)
         if name == "scene":
             # An OSC 8 link: terminals that know it open the page with a click.
@@ -168,8 +172,6 @@ def facts(
         sign, word = "✗", "the run file is gone"
     elif status == "lost":
         way_on = ": r resumes"
-    elif snapshot.suspended is not None and not state.ended:
-        sign, word, way_on = "!", "engine suspended", f": kill -CONT {snapshot.suspended} wakes it"
     elif state.needs_room and not state.ended:
         sign, word = "!", "no room on the disk"
     mode = "accept: ask" if state.accept_mode == "ask" and not state.ended else ""
@@ -180,7 +182,7 @@ def facts(
         Fact("drift", drift_said(state)),
         Fact("cut", (f"{cut} ended early" if cut else "", "")),
         Fact("time", (duration(snapshot.spent) if snapshot.spent else "", "")),
-        Fact("left", left_said(remaining(state, snapshot.engine == "alive" and snapshot.suspended is None))),
+        Fact("left", left_said(remaining(state, snapshot.engine == "alive"))),
         Fact("mode", (mode, "")),
         Fact("engine", engine_said(snapshot)),
         Fact("scene", (f"scene {scene}" if scene else "", "scene" if scene else "")),
@@ -267,8 +269,43 @@ def engine_said(snapshot: Snapshot) -> tuple[str, ...]:
     if version in ("", __version__):
         return ("engine ●", "")
     age = "older" if _numbers(version) < _numbers(__version__) else "newer"
-    return (f"engine ● {shorten(version, 12)}, {age}", f"engine {age}")
+    return (f"engine ● {shortened(version, 12)}, {age}", f"engine {age}")
 
 
 def _numbers(version: str) -> list[int]:
     return [int("".join(filter(str.isdigit, part)) or 0) for part in version.split(".")]
+
+
+def title(snapshot: Snapshot) -> str:
+    """The run, its state and how far it is, as short as a tab's title has to be."""
+    state = snapshot.state
+    name = shortened(plain(state.scenario.get("name", "")), 40)
+    if not state.elements:
+        return f"ddenv {name}"
+    sign, word = STATUS.get(snapshot.status, ("·", snapshot.status))
+    models = f"{len(state.environment)} of {count(len(state.elements), 'model')}"
+    said = "" if snapshot.status in ("running", "baseline") else f", {word}"
+    return f"{sign} {_done(snapshot)}{name}: {models}{said}"
+
+
+def _done(snapshot: Snapshot) -> str:
+    left = remaining(snapshot.state, snapshot.engine == "alive")
+    if left is None:
+        return ""
+    done = snapshot.state.tests_done
+    part = 100 * done / max(1, done + left.tests[1])
+    return f"{STEP * int(part / STEP)} % "
+
+
+def worth_a_look(before: Snapshot, now: Snapshot) -> str:
+    """Why the user should look at the run now, if that is new since `before`; or ""."""
+    status = now.status
+    if status == before.status or status not in WORTH or before.behind or now.behind:
+        return ""
+    state = now.state
+    models = f"{len(state.environment)} of {count(len(state.elements), 'model')} left"
+    if status == "finished":
+        return f"{models}; {plain(ended(state))}"
+    if status == "waiting":
+        return "a reduction waits for you: accept or reject it"
+    return f"{STATUS[status][1]}{f', {plain(state.reason)}' if state.reason else ''}; {models}"

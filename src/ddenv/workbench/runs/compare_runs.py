@@ -14,10 +14,11 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from ddenv.text import plain, truncated
 from ddenv.words import first_of
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
-from ddenv.workbench.wording import brief, count, plain
+from ddenv.workbench.shared.wording import brief, count
 
 # The maximum number of models to name, and width of a value.
 NAMED, LONGEST = 20, 60
@@ -100,8 +101,7 @@ def _of_key(key: str, value: Any) -> Any:
 
 
 def _value(value: Any) -> str:
-    words = NONE if value is None else plain(value)
-    return words if len(words) <= LONGEST else f"{words[: LONGEST - 1]}…"
+    return NONE if value is None else truncated(plain(value), LONGEST)
 
 
 def _names(names: tuple[str, ...]) -> str:

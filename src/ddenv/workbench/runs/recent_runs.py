@@ -9,19 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.errors import UserError
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import fold
 from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
-from ddenv.workbench.run.observed import Busy, Observed
-from ddenv.workbench.wording import STATUS
+from ddenv.workbench.shared.observed import Busy, Observed
+from ddenv.workbench.shared.wording import STATUS
 
 # The maximum number of runs in the list of the setup screen.
 SHOWN = 40
 # What SQLite says about a file that another program has locked.
 LOCKED = "database is locked"
-# The number of events read at a time, before other threads get their turn.
-BATCH = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +158,7 @@ def _read(path: Path, stamp: tuple[int, ...], state: RunState | None) -> _Read:
         return _unread(path, stamp, error)
     try:
         first = file.events(0, 1)
-        state = _caught_up(file, state or RunState())
+        state = fold(file.events(state.revision if state else 0), state)
     except UserError as error:
         return _unread(path, stamp, error)
     finally:
@@ -191,15 +189,6 @@ def _unread(path: Path, stamp: tuple[int, ...], error: UserError) -> _Read:
     """A run that cannot be read. A file locked by another program is read again at the next call."""
     locked = isinstance(error, Busy) or LOCKED in str(error)
     return _Read(() if locked else stamp, Recent(path, stamp[0] / 1e9, stamp[1] + stamp[3], trouble=str(error)))
-
-
-def _caught_up(file: Observed, state: RunState) -> RunState:
-    while True:
-        events = file.events(state.revision, BATCH)
-        for event in events:
-            state = apply(state, event)
-        if len(events) < BATCH:
-            return state
 
 
 def computed(state: RunState) -> float:

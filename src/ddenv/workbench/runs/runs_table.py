@@ -13,12 +13,12 @@ from textual.binding import Binding
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
-from ddenv.map.names import shortened
+from ddenv.text import plain, shortened
 from ddenv.words import first_of
-from ddenv.workbench.background import call_if_open
-from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder
-from ddenv.workbench.wording import brief, count, plain
+from ddenv.workbench.shared import poll
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.wording import brief, count
 
 # The maximum number of models to name.
 MOST_NAMES = 40

@@ -14,7 +14,7 @@ from ddenv.errors import UserError
 from ddenv.runfile.events import BaselineFinished, TestFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.tests_left import rough_run
-from ddenv.workbench.wording import count
+from ddenv.workbench.shared.wording import count
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.text import Text
@@ -18,15 +19,70 @@ from textual.widgets import Button, Input, Label, OptionList, Select, Static
 from ddenv import processor
 from ddenv.errors import UserError
 from ddenv.schemas import Kind, names, uses
+from ddenv.text import plain
 from ddenv.workbench.run.methods import chosen, note, paragraph
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.meanings import Circumstances, cost, not_used
+from ddenv.workbench.setup.form import Field
 from ddenv.workbench.setup.places import remembered_jobs
+from ddenv.workbench.shared.wording import count
 from ddenv.workbench.widgets.entry import Entry
-from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
+
+OURS = ("ddenv", "ddmin", "probdd", "splitting")
+MARK = "✗ "
+METHOD: dict[Kind, str] = {
+    "algorithm": "how the environment is searched",
+    "partitioning": "how the environment is split",
+    "prioritization": "in which order the parts are tried",
+}
+MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
+FIELDS = {field.id: field for field in form.ALL}
+
+
+@dataclass(frozen=True, slots=True)
+class Circumstances:
+    """What a cost depends on: the chosen `algorithm` and `pair`, `seconds` of real time a test, if known, and `processors`."""
+
+    algorithm: str = "ddenv"
+    pair: str = ""
+    seconds: float | None = None
+    processors: int = 1
+
+
+def not_used(field: Field, now: Circumstances) -> str:
+    """Why a field has no effect, or ""."""
+    only = field.setting.used_by if field.setting else ()
+    if only and now.algorithm in OURS and now.algorithm not in only:
+        return f"Not used by {plain(now.algorithm)}."
+    return ""
+
+
+def cost(field: Field, texts: Mapping[str, str], now: Circumstances) -> str:
+    """The cost of a field's value, or ""."""
+    number = _number(texts.get(field.id, ""))
+    match field.id:
+        case "iterations" if number is not None:
+            return f"A candidate without f costs at most {count(1 + int(number), 'test')}."
+        case "baseline_runs" if number is not None:
+            return f"Costs {count(int(number), 'test')}; more make the failure rate more certain."
+        case "timeout" if number is not None:
+            real = f", here about {now.seconds:.1f} s of real time" if now.seconds else ""
+            return f"A test without success takes {number:g} simulated s{real}."
+        case "jobs":
+            return f"This machine has {count(now.processors, 'processor')}; more jobs save no time."
+        case "accept":
+            return "Asking costs your time, and no tests."
+    return field.setting.cost if field.setting else ""
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if 0 <= number < 1e6 else None
 
 
 class SchemaSelect(Select[str]):
@@ -87,16 +143,6 @@ class Explained(VerticalScroll):
             text.append(warning, f"bold {self.app.theme_variables['text-warning']}").append(" ")
         self.query_one(Static).update(text.append(words, "not bold"))
         self.scroll_home(animate=False)
-
-
-MARK = "✗ "
-METHOD: dict[Kind, str] = {
-    "algorithm": "how the environment is searched",
-    "partitioning": "how the environment is split",
-    "prioritization": "in which order the parts are tried",
-}
-MORE = f"▸ more settings (f9): {', '.join(field.label for field in form.ADVANCED)}"
-FIELDS = {field.id: field for field in form.ALL}
 
 
 class OptionsForm(Vertical):

@@ -11,7 +11,7 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from ddenv.runs.remembered import read_state, write_state
-from ddenv.workbench.wording import plain
+from ddenv.text import plain
 
 # The maximum number of recent files: in a longer list files are hard to find.
 KEPT = 12

@@ -14,11 +14,11 @@ from textual.binding import Binding
 from textual.screen import ModalScreen
 from textual.widgets import DirectoryTree, Input, Static
 
-from ddenv.errors import shortened
+from ddenv.errors import UserError
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.setup.file_list import is_file
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import plain
 
 SUFFIXES = (".yaml", ".yml", ".sdf", ".world")
 
@@ -79,7 +79,7 @@ class OpenFile(ModalScreen[Path | None]):
 
     def _take(self, path: Path) -> None:
         wrong = complain_about(path)
-        self.query_one("#wrong", Static).update(Text(shortened(plain(wrong))))
+        self.query_one("#wrong", Static).update(Text(str(UserError(wrong))))
         if not wrong:
             self.dismiss(path)
 

@@ -13,10 +13,10 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import call_if_open
+from ddenv.text import plain
 from ddenv.workbench.help.hints import Framed
+from ddenv.workbench.shared.background import call_if_open
 from ddenv.workbench.widgets.path_entry import PathEntry
-from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

@@ -17,13 +17,11 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Static
 
 from ddenv.errors import UserError
-from ddenv.workbench.background import call_if_open
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
-from ddenv.workbench.messages import ShowRun
 from ddenv.workbench.runs.runs_table import RunList
 from ddenv.workbench.setup import form
-from ddenv.workbench.setup.arrangement import HEADS, PANES, ROOMY, SMALLEST, VAST, arrange
 from ddenv.workbench.setup.choice import Choice
 from ddenv.workbench.setup.costs import Past, whole_cost
 from ddenv.workbench.setup.fields import Explained, OptionsForm
@@ -31,11 +29,40 @@ from ddenv.workbench.setup.file_list import FileList, recent_files, remember
 from ddenv.workbench.setup.preview import Preview
 from ddenv.workbench.setup.setup_keys import KEYS, SHOWN, keys_at
 from ddenv.workbench.setup.start_run import NO_COMMAND, NewRun, Saved, ask_trust, command_words, create, run_file
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.messages import ShowRun
 from ddenv.workbench.widgets.panes import Panes
-from ddenv.workbench.wording import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario
+
+SMALLEST = (64, 18)
+# From this size on all panes are shown at once.
+ROOMY = (110, 32)
+# From this size on the rarely used settings are shown, too.
+VAST = (160, 48)
+PANES = {"choose": "f2 choose", "map": "f3 map", "settings": "f4 settings"}
+# Where the focus goes in each pane.
+HEADS = {"choose": "#scenario-list", "map": "#map", "settings": "#algorithm"}
+
+
+def arrange(screen: Screen[None], pane: str) -> None:
+    """Shows all panes of the setup screen, or only `pane`."""
+    form, preview = screen.query_one(OptionsForm), screen.query_one(Preview)
+    # Not by classes of the screen: these would compute all styles again.
+    width, height = screen.size
+    all = width >= ROOMY[0] and height >= ROOMY[1]
+    fits = width >= SMALLEST[0] and height >= SMALLEST[1]
+    form.display = fits
+    screen.query_one("#body").display = fits and (all or pane != "settings")
+    screen.query_one("#choice").display = all or pane == "choose"
+    form.show_fields(all or pane == "settings")
+    form.set_class(not all and pane == "settings", "-alone")
+    preview.set_class(not all and pane == "map", "-alone")
+    form.set_class(not all, "-frameless")
+    panes = screen.query_one(Panes)
+    panes.display = not all
+    panes.mark(pane)
 
 
 class SetupScreen(Screen[None]):

@@ -121,7 +121,7 @@ def _policy(response: Any, sources: str) -> str:
 
 
 def _existing(run: Path) -> Path:
-    from ddenv.workbench.run.observed import Observed
+    from ddenv.workbench.shared.observed import Observed
 
     Observed(run).close()
     return run.resolve()

@@ -22,7 +22,7 @@ from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import RunFile
 from ddenv.runs.playback import played
-from ddenv.workbench.background import call_if_open
+from ddenv.text import plain
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.help.signs import SignsDialog
@@ -30,10 +30,10 @@ from ddenv.workbench.map.place import Place, Way, place_of_run
 from ddenv.workbench.map.world_map import WorldMap
 from ddenv.workbench.playback.moving import RobotWay, without
 from ddenv.workbench.playback.playback_screen import Playback
-from ddenv.workbench.run.observed import Observed
-from ddenv.workbench.why.entries import Entry, entries
-from ddenv.workbench.why.why_words import head, head_of, nothing_yet, remedy, row, said
-from ddenv.workbench.wording import attach_name, plain
+from ddenv.workbench.shared.background import call_if_open
+from ddenv.workbench.shared.observed import Observed
+from ddenv.workbench.shared.wording import attach_name
+from ddenv.workbench.why.entries import Entry, entries, head, head_of, nothing_yet, remedy, row, said
 
 SMALLEST = (64, 18)
 # Time between two looks at the run, s.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from textual.app import App
 
-from ddenv.workbench.wording import plain
+from ddenv.text import plain
 
 if TYPE_CHECKING:
     from ddenv.world.scenario import Scenario

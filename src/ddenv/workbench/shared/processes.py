@@ -10,7 +10,7 @@ from threading import Thread
 
 from ddenv.errors import UserError
 from ddenv.runs.wanted import Wanted, written
-from ddenv.workbench.wording import plain
+from ddenv.text import plain
 
 # Exit codes of an engine that has finished or was stopped.
 GOOD_ENDS = (0, 1)

@@ -1,10 +1,18 @@
-"""The width of names on a terminal, and names shortened or padded to a width."""
+"""Text for a terminal or a page: what is safe to print, how wide it is, and as much of it as fits."""
 
 from __future__ import annotations
 
 import unicodedata
 
-from ddenv.errors import printable
+
+def printable(text: str) -> str:
+    """`text` with control characters replaced, since parts of it may come from untrusted files."""
+    return "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text)
+
+
+def plain(text: object) -> str:
+    """`text` on one line without control characters: names come from files, and must not control the terminal."""
+    return printable(" ".join(str(text).split()))
 
 
 def width(text: str) -> int:
@@ -30,6 +38,11 @@ def shortened(name: str, columns: int) -> str:
         if width(head) + width(tail) + _width(char) + 1 > columns:
             return f"{head}…{tail}" if columns > 0 else ""
         head, tail = (head + char, tail) if take_head else (head, char + tail)
+
+
+def truncated(line: str, columns: int) -> str:
+    """A maximum of `columns` characters of a line, with an ellipsis at its end if it is longer."""
+    return line if len(line) <= columns else f"{line[: max(0, columns - 1)]}…"
 
 
 def padded(text: str, columns: int) -> str:

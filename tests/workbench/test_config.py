@@ -13,8 +13,7 @@ from textual.color import Color
 from ddenv.cli.command_line import app as command_line
 from ddenv.errors import UserError
 from ddenv.workbench.app import Config
-from ddenv.workbench.help.catalogue import actions, checked
-from ddenv.workbench.help.config import config_path, read_config
+from ddenv.workbench.config import actions, checked, config_path, read_config
 from ddenv.workbench.help.key_names import shown_key, written
 from ddenv.workbench.terminal.themes import ANSI, DARK, LIGHT, OURS, fitting, for_rich
 from tests.waiting import PATIENCE

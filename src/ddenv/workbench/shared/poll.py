@@ -12,12 +12,13 @@ from pathlib import Path
 
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
-from ddenv.runfile.fold import apply, spent
-from ddenv.runfile.lock import engine_is_alive, suspended_engine
+from ddenv.runfile.fold import spent
+from ddenv.runfile.follow import Follower
+from ddenv.runfile.lock import engine_is_alive
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
 from ddenv.version import __version__
-from ddenv.workbench.run.observed import Busy, Gone, Observed
+from ddenv.workbench.shared.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.
 LOCK_PERIOD = 0.5
@@ -37,10 +38,9 @@ def now() -> float:
 class Snapshot:
     """All that the run screen shows at one moment.
 
-    `engine` is "alive", "starting" or "absent"; `suspended` is its process while that stands still (SIGSTOP). `evidence` is the
-    robot's path on the last similar run, `original` its path in f itself: flat rows of `COLUMNS` floats. `spent` is the time
-    engines have worked on the run, s. `error` says why the run file cannot be read. `gone` says that it was deleted or replaced:
-    the rest is what was read last.
+    `engine` is "alive", "starting" or "absent". `evidence` is the robot's path on the last similar run, `original` its path in f
+    itself: flat rows of `COLUMNS` floats. `spent` is the time engines have worked on the run, s. `error` says why the run file
+    cannot be read. `gone` says that it was deleted or replaced: the rest is what was read last.
     `behind` says that not all of it was read yet. `past`: it is an earlier moment of the run, `pointed` the candidate of that
     moment, and `happened` says what happened there.
     """
@@ -57,7 +57,6 @@ class Snapshot:
     past: bool = False
     pointed: Candidate | None = None
     happened: str = ""
-    suspended: int | None = None
 
     @property
     def older_engine(self) -> str:
@@ -105,7 +104,7 @@ class Poll:
     """One open run file, which is only ever read.
 
     `starting` says whether an engine was started that may not hold the lock yet. With `watch` nothing is written.
-    `on_event` is called with each event's kind and the states before and after it; twice with the same if a look was cut short.
+    `on_event` is called once with each event's kind and the states before and after it.
     """
 
     def __init__(
@@ -121,12 +120,12 @@ class Poll:
         self.watch = watch
         self._on_event = on_event
         self.file = Observed(path, strictly=watch)
+        self._follower = Follower(self.file)
         self._starting = starting
         self._snapshot: Snapshot | None = None
         self._behind = self._catching_up = True
         self._looked = -math.inf
         self._alive = False
-        self._suspended: int | None = None
         self._posed = -math.inf
         self._evidence: tuple[int | None, array[float] | None] = (None, None)
         self._original: tuple[int | None, array[float] | None] = (None, None)
@@ -172,10 +171,11 @@ class Poll:
         engine, last = self._engine(), self._snapshot
         if last is not None and not self._behind:
             spent = self._spent(last.state, engine)
-            if (engine, spent, self._suspended) == (last.engine, last.spent, last.suspended):
+            if (engine, spent) == (last.engine, last.spent):
                 return last
-            return replace(last, engine=engine, spent=spent, suspended=self._suspended)
-        state, error, more = self._fold(last.state if last else RunState())
+            return replace(last, engine=engine, spent=spent)
+        error, more = self._follow()
+        state = self._follower.state
         spent = self._spent(state, engine)
         try:
             live, due = self._poses(state) if engine == "alive" else ((), True)
@@ -186,30 +186,29 @@ class Poll:
             snapshot, due = Snapshot(state, (), engine, None, spent, error or str(trouble)), True
         self._behind = more or not due
         self._catching_up = more
-        return replace(snapshot, behind=more, suspended=self._suspended)
+        return replace(snapshot, behind=more)
 
     def _left(self, why: str) -> Snapshot:
         """What was read last of a file that is gone."""
         error = f"{why}; what you see is what was read last"
         return replace(self._snapshot or Snapshot(), engine="absent", live=(), error=error, gone=True)
 
-    def _fold(self, state: RunState) -> tuple[RunState, str, bool]:
-        """The state after the new events, up to the first invalid one; what is wrong with that; whether there are more."""
+    def _follow(self) -> tuple[str, bool]:
+        """Reads new events up to the first invalid one; what is wrong with that, and whether there are more. Raises Busy."""
         begun, more = time.monotonic(), True
         try:
             while more:
-                room = SOME_EVENTS
-                for event in self.file.read(state.revision, room):
-                    before, state, room = state, apply(state, event), room - 1
-                    self._on_event(event.kind, before, state)
-                more = not room
+                more = False
+                for event, before, after in self._follower.new(SOME_EVENTS):
+                    self._on_event(event.kind, before, after)
+                    more = True
                 if time.monotonic() - begun > PATIENCE:
                     break
         except Busy:
             raise
         except UserError as error:
-            return state, str(error), False
-        return state, "", more
+            return str(error), False
+        return "", more
 
     def _engine(self) -> EngineIs:
         moment = time.monotonic()
@@ -218,7 +217,6 @@ class Poll:
             # Rows of running tests are read only while an engine is there.
             self._behind = self._behind or alive != self._alive
             self._looked, self._alive = moment, alive
-            self._suspended = suspended_engine(self.path) if alive else None
         if self._alive:
             return "alive"
         return "starting" if self._starting() else "absent"

@@ -1,18 +1,111 @@
-"""The user's own theme, keys and notifications, from a file in the folder for settings; and the lines of `ddenv config`."""
+"""The user's own theme, keys and notifications, from a file; all actions that have keys; the lines of `ddenv config`."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 from typing import Any
 
+from textual.binding import Binding
+from textual.dom import DOMNode
+from textual.screen import Screen
+
 from ddenv.errors import UserError
-from ddenv.workbench.app import Config
-from ddenv.workbench.help.catalogue import Action, actions, checked
-from ddenv.workbench.help.key_names import written
+from ddenv.workbench.app import Config, Workbench
+from ddenv.workbench.help.key_names import shown_key, textual_keys, written
 from ddenv.workbench.terminal.themes import DARK, nearest, theme_called, theme_names
 
 KNOWN = ("theme", "notify", "keys")
+# The head of the example.
+INTRODUCTION = """# Settings of the ddenv workbench: {path}
+# Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
+
+# {themes}
+# theme: {theme}
+
+# Whether the terminal rings and shows a notification when a run ends, or waits for you.
+# notify: yes
+
+# The key of each action. Several keys are separated by commas.
+keys:"""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """An action with its `keys` (Textual's names); `owner` is the name of its screen or widget."""
+
+    id: str
+    keys: tuple[str, ...]
+    words: str
+    owner: str
+
+
+@cache
+def actions() -> dict[str, Action]:
+    """All actions by their ids, in the order of their screens."""
+    found: dict[str, Action] = {}
+    for owner in _owners():
+        for binding in _bindings(owner):
+            if binding.id and binding.id not in found:
+                words = binding.tooltip or binding.description
+                found[binding.id] = Action(binding.id, _keys_of(owner, binding.id), words, owner.__name__)
+    return found
+
+
+def checked(wanted: Mapping[str, str], where: str) -> dict[str, str]:
+    """Textual's keymap with these keys for the actions. Raises UserError with a message that begins with `where`."""
+    keymap = {id: textual_keys(keys, f"{where}: keys: {id}") for id, keys in wanted.items()}
+    known = actions()
+    for id in keymap:
+        if id not in known:
+            raise UserError(f"{where}: keys: there is no action '{id}'{nearest(id, known)}; 'ddenv config' lists them")
+    for owner in _owners():
+        _check_clashes(owner, keymap, where)
+    return keymap
+
+
+def _check_clashes(owner: type[DOMNode], keymap: Mapping[str, str], where: str) -> None:
+    """Raises UserError if a key of the user's belongs to two actions of one screen."""
+    holders: dict[str, str] = {}
+    everywhere = _bindings(Workbench) if issubclass(owner, Screen) else ()
+    for id in dict.fromkeys(binding.id for binding in (*_bindings(owner), *everywhere) if binding.id):
+        usual = actions()[id].keys
+        for key in keymap[id].split(",") if id in keymap else usual:
+            other = holders.setdefault(key, id)
+            moved = [each for each in (other, id) if key not in actions()[each].keys]
+            if other != id and moved:
+                raise UserError(
+                    f"{where}: keys: {moved[0]}: '{shown_key(key)}' is the key of "
+                    f"{id if moved[0] == other else other} already; give one of the two another key"
+                )
+
+
+def _keys_of(owner: type[DOMNode], id: str) -> tuple[str, ...]:
+    bindings = (binding for binding in _bindings(owner) if binding.id == id)
+    return tuple(dict.fromkeys(single.key for binding in bindings for single in Binding.make_bindings([binding])))
+
+
+@cache
+def _owners() -> tuple[type[DOMNode], ...]:
+    """The app, and all screens and widgets with keys."""
+    home = import_module("ddenv.workbench")
+    names = [module.name for module in walk_packages(home.__path__, f"{home.__name__}.") if not module.ispkg]
+    classes = (value for name in names for value in vars(import_module(name)).values())
+    ours = (value for value in classes if isinstance(value, type) and value.__module__ in names)
+    with_keys = (each for each in ours if issubclass(each, DOMNode) and "BINDINGS" in vars(each))
+    return tuple(dict.fromkeys((Workbench, *with_keys)))
+
+
+def _bindings(owner: type[DOMNode]) -> Iterator[Binding]:
+    """The owner's own bindings, and those of its base classes in ddenv."""
+    for each in owner.__mro__:
+        if each.__module__.startswith("ddenv."):
+            yield from (binding for binding in vars(each).get("BINDINGS", ()) if isinstance(binding, Binding))
 
 
 def config_path() -> Path:
@@ -86,20 +179,6 @@ def _wanted(keys: Any, path: Path) -> dict[str, str]:
                 f"{path}: keys: {id}: expected a key such as p, in quotes if it is punctuation; found {value!r}"
             )
     return {str(id): str(value) for id, value in keys.items()}
-
-
-# The head of the example.
-INTRODUCTION = """# Settings of the ddenv workbench: {path}
-# Remove the '# ' in front of a line to change it. '?' and other punctuation needs quotes.
-
-# {themes}
-# theme: {theme}
-
-# Whether the terminal rings and shows a notification when a run ends, or waits for you.
-# notify: yes
-
-# The key of each action. Several keys are separated by commas.
-keys:"""
 
 
 def lines() -> list[str]:

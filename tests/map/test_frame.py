@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ddenv.map.frame import tick_step, tick_text, ticks
-from ddenv.map.names import padded, shortened, width
+from ddenv.text import padded, shortened, width
 
 
 @given(st.text(max_size=60), st.integers(0, 40))

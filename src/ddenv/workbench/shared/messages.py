@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from textual.message import Message
 
 if TYPE_CHECKING:
-    from ddenv.workbench.run.processes import Engine
+    from ddenv.workbench.shared.processes import Engine
 
 
 @dataclass

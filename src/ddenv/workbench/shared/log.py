@@ -11,8 +11,8 @@ from rich.text import Text
 
 from ddenv.runfile.progress import Decision
 from ddenv.runfile.state import RunState
+from ddenv.text import plain
 from ddenv.words import news
-from ddenv.workbench.wording import plain
 
 # Where the words begin, after the time.
 BEGIN = " " * 10
@@ -33,7 +33,6 @@ class Log:
 
     def __init__(self) -> None:
         self._entries: list[Entry] = []
-        self._revision = 0
 
     def until(self, event: int | None) -> list[Entry]:
         """The entries of an event and of all before it; all there are for None."""
@@ -42,10 +41,7 @@ class Log:
         return self._entries[: bisect_right(self._entries, event, key=lambda entry: entry.event)]
 
     def add(self, kind: str, before: RunState, after: RunState) -> None:
-        """One more event; the same event again changes nothing."""
-        if after.revision <= self._revision:
-            return
-        self._revision = after.revision
+        """One more event."""
         try:
             words = news(kind, before, after, attached=True)
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):

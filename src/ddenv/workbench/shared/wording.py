@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import about as about
-from ddenv.map.names import shortened
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
+from ddenv.text import plain, shortened
 from ddenv.words import SETTLING
 from ddenv.words import count as count
 from ddenv.words import duration as duration
@@ -69,16 +69,6 @@ def outcome(test: Test) -> str:
     """How a test ended, with the kind of failure if known."""
     words = OUTCOME.get(test.outcome, "")
     return f"{words[0]} {test.failure}" if words and test.failure in DEEDS else words
-
-
-def plain(text: Any) -> str:
-    """`text` on one line without control characters: names come from files, and must not control the terminal."""
-    return "".join(char if char.isprintable() else "�" for char in " ".join(str(text).split()))
-
-
-def shorten(text: str, width: int) -> str:
-    """A maximum of `width` characters, with an ellipsis at the end if `text` is longer."""
-    return text if len(text) <= width else f"{text[: max(0, width - 1)]}…"
 
 
 def brief(seconds: float) -> str:

@@ -1,0 +1,1 @@
+"""What several screens share: the run as it is read, its programs, words, and messages to the app."""
