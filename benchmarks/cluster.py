@@ -3,15 +3,13 @@
 python benchmarks/cluster.py [--models 200] [--workers 1,8,64,512]
 
 Time is simulated: a test takes 20 to 60 s of it, its start and its way back nothing. What the engine itself takes is real, and
-shown. The last row is what any number of workers could reach without a look ahead: all tests of a round at once, one round after
-the other, and then all of a certificate at once.
+shown.
 """
 
 from __future__ import annotations
 
 import argparse
 import heapq
-import math
 import random
 import tempfile
 import threading
@@ -20,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ddenv.engine import ahead
 from ddenv.engine.__main__ import _begin
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control
@@ -29,15 +26,12 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.worker import Start
 from ddenv.robot.result import RunResult
 from ddenv.robot.settled import Settled
-from ddenv.runfile.events import CandidateJudged, CertificateFinished
 from ddenv.runfile.store import RunFile
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts, scenario_for_world
 
-SHORTEST, LONGEST_TEST = 20.0, 60.0  # s
+SHORTEST, LONGEST = 20.0, 60.0  # s
 NEEDED = 3
-# Simulated time stands still while the engine thinks.
-ahead.LONGEST = 60.0
 BOX = """<model name="box_{0}"><static>true</static><pose>{1} {2} 0.5 0 0 0</pose><link name="link">
 <collision name="c"><geometry><box><size>0.4 0.4 1</size></box></geometry></collision></link></model>"""
 GROUND = """<model name="ground_plane"><static>true</static><link name="link"><collision name="c"><geometry><plane>
@@ -55,7 +49,7 @@ def world(folder: Path, models: int) -> Path:
 
 def duration(keep: frozenset[str], seed: int) -> float:
     """How long a test takes, simulated s."""
-    return random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST_TEST)
+    return random.Random(f"{len(keep)} {seed}").uniform(SHORTEST, LONGEST)
 
 
 class Simulated:
@@ -97,21 +91,9 @@ class Simulated:
         return []
 
 
-def without_a_look_ahead(journal: Journal) -> float:
-    """The simulated s that the run would have taken if all tests of each round had been made at once."""
-    stages: dict[object, list[int]] = {
-        "baseline": [test.id for test in journal.state.tests if test.phase == "baseline"]
-    }
-    for event in journal.file.events():
-        if isinstance(event.event, CandidateJudged | CertificateFinished):
-            stages.setdefault((event.kind, getattr(event.event, "round", None)), []).extend(event.event.tests)
-    made = {test.id: duration(journal.keep_of_test(test.id), test.seed) for test in journal.state.tests}
-    return sum(max(map(made.__getitem__, tests)) for tests in stages.values() if tests)
-
-
-def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int, float, int]:
-    """A reduction with so many workers: its pool, the real s that it took, how many models are left, how long it would take without
-    a look ahead (simulated s), and how many tests nobody needed.
+def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, int, int]:
+    """A reduction with so many workers: its pool, the real s that it took, how many models are left, and how many tests no verdict
+    rests on.
     """
     path = folder / f"{models}-{workers}.ddenv"
     create_run(scenario_for_world(world(folder, models), (0, 0, 0.2, 0), (100, 0)), path)
@@ -125,7 +107,7 @@ def reduce(folder: Path, models: int, workers: int) -> tuple[Simulated, float, i
         control = Control(journal, threading.Event(), time.time())
         Driver(scenario, parsed, journal, Bench(journal, pool, control), control).reduce()
         state, real = journal.state, time.perf_counter() - began
-        return pool, real, len(state.environment), without_a_look_ahead(journal), state.ahead
+        return pool, real, len(state.environment), state.ahead
 
 
 def main() -> None:
@@ -135,13 +117,12 @@ def main() -> None:
     options = parser.parse_args()
     print("| workers | tests | for nothing | simulated h | times as fast | busy | engine, ms a test |")
     print("|---|---|---|---|---|---|---|")
-    first, bound = math.nan, math.nan
+    first = 0.0
     with tempfile.TemporaryDirectory() as folder:
         for workers in map(int, options.workers.split(",")):
-            pool, real, left, stages, vain = reduce(Path(folder), options.models, workers)
+            pool, real, left, vain = reduce(Path(folder), options.models, workers)
             assert left == NEEDED, left
-            if math.isnan(first):
-                first, bound = pool.clock, stages
+            first = first or pool.clock
             row = (
                 f"{workers}",
                 f"{pool.made}",
@@ -152,7 +133,6 @@ def main() -> None:
                 f"{1000 * real / pool.made:.0f}",
             )
             print(f"| {' | '.join(row)} |", flush=True)
-    print(f"| any, no look ahead | | | {bound / 3600:.2f} | {first / bound:.1f} | | |")
 
 
 if __name__ == "__main__":

@@ -56,7 +56,11 @@ class Environment:
         return self.bits.bit_count()
 
     def __iter__(self) -> Iterator[int]:
-        return (model for model, bit in enumerate(f"{self.bits:b}"[::-1]) if bit == "1")
+        digits = f"{self.bits:b}"[::-1]
+        model = digits.find("1")
+        while model >= 0:
+            yield model
+            model = digits.find("1", model + 1)
 
     def names(self, elements: Sequence[str]) -> tuple[str, ...]:
         """The names of its models, in the order of `elements`, the names of all models."""
