@@ -7,7 +7,7 @@ import pytest
 
 from ddenv.errors import UserError
 from ddenv.runfile.events import KINDS, NAMES
-from ddenv.runfile.fold import apply
+from ddenv.runfile.fold import _HANDLERS, apply
 from ddenv.runfile.reading import plain
 from ddenv.runfile.state import RunState
 from ddenv.runfile.store import recorded
@@ -58,6 +58,10 @@ def test_kinds_are_in_a_file_what_they_are_called_here():
     assert len(KINDS) == len(NAMES) > 50
     assert KINDS["candidate_judged"].__name__ == "CandidateJudged"
     assert all(name == name.lower() and name.isidentifier() for name in KINDS)
+
+
+def test_every_event_has_a_function_that_says_what_it_changes():
+    assert set(_HANDLERS) == set(NAMES)
 
 
 def test_a_field_that_is_missing_is_named(written):
