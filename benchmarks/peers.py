@@ -34,6 +34,7 @@ import psutil
 from peers_reducers import REDUCERS, reduce_in_process
 from peers_tests import Counts, counts
 
+from ddenv.amounts import first_of
 from ddenv.engine.pool import DrakeContext
 from ddenv.errors import UserError
 from ddenv.runfile.fold import fold
@@ -41,7 +42,6 @@ from ddenv.runfile.state import CERTIFY
 from ddenv.runfile.store import RunFile
 from ddenv.runs.subject import with_options
 from ddenv.study.plan import PAIRS
-from ddenv.words import first_of
 from ddenv.world.load import find_scenario, load_scenario
 from ddenv.world.scenario import Scenario
 

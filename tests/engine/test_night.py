@@ -25,7 +25,7 @@ from ddenv.runfile.integrity import faults, whole
 from ddenv.runfile.lock import engine_is_alive, engine_lock
 from ddenv.runfile.store import LOGS, NoRoom, RunFile
 from ddenv.runs.subject import read_parts
-from ddenv.words import news
+from ddenv.words.news import news
 from tests.engine.fake import FakePool, drive, new_run
 from tests.engine.killing import story
 from tests.engine.oracles import needs

@@ -18,7 +18,7 @@ from ddenv.runfile.store import RunFile
 from ddenv.runfile.supports import stacks
 from ddenv.runs.creation import create_run
 from ddenv.runs.subject import read_parts
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.world.load import load_scenario
 from ddenv.world.pose import Pose
 from ddenv.world.sdf.read import read_world

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ddenv.amounts import count, first_of
 from ddenv.cli.wrapping import cut, wrapped
 from ddenv.errors import printable
 from ddenv.map.names import padded, shortened, width
-from ddenv.words import count, first_of
 from ddenv.world.extent import center, model_bounds
 from ddenv.world.model import (
     Box,

@@ -163,10 +163,10 @@ def _settle(world: World, reading: Reading, output: Path) -> list[str]:
     from ddenv.robot import check_drake
 
     check_drake()
+    from ddenv.amounts import count, first_of
     from ddenv.robot.settled import moved, notes_on
     from ddenv.robot.simulation.template import Variants
     from ddenv.runs.subject import scenario_for_world
-    from ddenv.words import count, first_of
     from ddenv.world.access import write_file
     from ddenv.world.placement import note_inside
     from ddenv.world.sdf.moved import with_places

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ddenv.amounts import count
 from ddenv.map.cells import FAINT, picture, signs
 from ddenv.map.footprints import Drawn, plan
 from ddenv.map.frame import tick_step, tick_text, ticks
 from ddenv.map.names import padded, shortened, width
 from ddenv.map.paint import PLAIN, Canvas, Run
 from ddenv.map.raster import FINEST, View, arrow, extent
-from ddenv.words import count
 from ddenv.world.model import World
 
 # Columns for numbers and frame beside the picture, and lines above and below it: title, frame, frame, numbers.

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.amounts import count
 from ddenv.doctor.finding import Finding
 from ddenv.errors import UserError
@@ -16,7 +17,6 @@ from ddenv.runfile.lock import engine_is_alive, mode_beside, suspended_engine
 from ddenv.runfile.store import RunFile
 from ddenv.runs.programs import last_words
 from ddenv.runs.subject import read_parts
-from ddenv.version import __version__
 
 GROUP = "run"
 

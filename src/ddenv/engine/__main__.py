@@ -13,7 +13,7 @@ import threading
 from pathlib import Path
 from typing import Literal
 
-from ddenv import processor
+from ddenv import __version__
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
 from ddenv.engine.crash_loop import check_crash_loop
@@ -37,11 +37,11 @@ from ddenv.runfile.events import (
 )
 from ddenv.runfile.lock import engine_lock
 from ddenv.runfile.store import RunFile
+from ddenv.runs import processor
 from ddenv.runs.clusters import HERE, check_cluster, made_here
 from ddenv.runs.programs import ENGINE_SAYS, ENGINE_STARTED
 from ddenv.runs.subject import read_parts
 from ddenv.runs.trust import check_trusted
-from ddenv.version import __version__
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ddenv import processor
+from ddenv import __version__
 from ddenv.engine.pool import Broken, Pace
 from ddenv.engine.worker import Start
 from ddenv.engine.workers import Workers
@@ -25,8 +25,8 @@ from ddenv.runfile.events import Created, EngineStarted
 from ddenv.runfile.fold import fold
 from ddenv.runfile.state import CERTIFY, Test
 from ddenv.runfile.store import COLUMNS, ROBOT, Live, RunFile
+from ddenv.runs import processor
 from ddenv.runs.folder import SUFFIX
-from ddenv.version import __version__
 from ddenv.world.scenario import Scenario
 
 OURS = ("straight", "costmap")

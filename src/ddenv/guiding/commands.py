@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, get_args
 
+from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.guiding.course import CHANGEABLE, ONLY_CHANGEABLE, Change, GoBack, Undo
@@ -17,7 +18,6 @@ from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
 from ddenv.guiding.situation import NO_MODELS, Situation
 from ddenv.runfile.state import RunState
-from ddenv.words import count
 
 Command = (
     Pause

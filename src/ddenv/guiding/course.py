@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from ddenv.amounts import count
 from ddenv.errors import UserError, printable
 from ddenv.guiding.situation import NO_FAILURE, Situation, Words, new_search
 from ddenv.runfile.progress import Node
@@ -13,7 +14,6 @@ from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState
 from ddenv.schemas import check, split_pair
 from ddenv.settings import SETTINGS, Value
-from ddenv.words import count
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ddenv.amounts import count
 from ddenv.guiding.situation import ROUND_OVER, Situation, Words, next_candidate
 from ddenv.runfile.state import REFUSED, Candidate, RunState
-from ddenv.words import count
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ddenv.amounts import count
 from ddenv.errors import printable
 from ddenv.guiding.situation import (
     LONGEST,
@@ -24,7 +25,6 @@ from ddenv.guiding.situation import (
 from ddenv.map.names import shortened
 from ddenv.runfile.events import deed
 from ddenv.runfile.state import RunState, Test, Trial
-from ddenv.words import count
 
 
 @dataclass(frozen=True, slots=True)

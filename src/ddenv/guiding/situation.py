@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from ddenv.amounts import count, first_of
 from ddenv.evidence.claims import fresh_runs_made, in_the_making
 from ddenv.map.names import shortened
 from ddenv.runfile.state import Candidate, RunState, Test, Trial
 from ddenv.runfile.tested import made_for, purpose
-from ddenv.words import count, first_of
 
 EngineIs = Literal["alive", "starting", "absent"]
 Row = Candidate | Trial

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from ddenv.amounts import duration as duration
+from ddenv.amounts import percent as percent
 from ddenv.errors import printable
-from ddenv.words import duration as duration
-from ddenv.words import percent as percent
 
 
 @dataclass(frozen=True, slots=True)

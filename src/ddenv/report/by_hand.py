@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from ddenv.amounts import count
 from ddenv.evidence.claims import seen
 from ddenv.page.blocks import Block, Cell, Section, Table, moment, plain, say
 from ddenv.report.run_data import Record
 from ddenv.runfile.progress import Node
 from ddenv.runfile.state import RunState, Trial
-from ddenv.words import count
 
 # Longer tables of decisions, trials or nodes show only the first and the last rows.
 MOST = 120

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ddenv.amounts import count
 from ddenv.evidence.claims import current, for_everyone
 from ddenv.page.blocks import Name, Paragraph, Part, Strong, duration, plain, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.events import deed
 from ddenv.runfile.fold import spent
 from ddenv.runfile.state import RunState
-from ddenv.words import count
 
 # Models are named up to this number.
 MOST_NAMES = 6

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from ddenv.amounts import count
 from ddenv.page.blocks import Cell, Name, Part, Section, Table, say, thousands
 from ddenv.report.run_data import Record
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.state import RunState
-from ddenv.words import count
 
 # The maximum number of failures in the table, and of models by name.
 MOST, MOST_NAMES = 30, 6

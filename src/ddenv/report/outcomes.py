@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+from ddenv.amounts import count
 from ddenv.evidence.claims import missed
 from ddenv.evidence.took_part import TEACHING, refuted_words, slice_words, why_sliced
 from ddenv.page.blocks import (
@@ -24,7 +25,7 @@ from ddenv.report.run_data import Record
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.failures import Baseline
 from ddenv.runfile.state import BROKEN, RunState
-from ddenv.words import count, failed_in
+from ddenv.words.news import failed_in
 
 # The maximum number of models with a row each.
 MOST_ROWS = 200

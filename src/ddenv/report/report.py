@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from ddenv import __version__
+from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.evidence.claims import ended
 from ddenv.page.blocks import (
@@ -37,8 +39,6 @@ from ddenv.runfile.failures import Place
 from ddenv.runfile.fold import spent
 from ddenv.runfile.reading import Invalid, vector
 from ddenv.runfile.state import RunState
-from ddenv.version import __version__
-from ddenv.words import count
 from ddenv.world.access import write_file
 
 

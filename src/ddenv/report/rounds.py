@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ddenv.amounts import count
 from ddenv.page.blocks import Block, Cell, Picture, Section, Strong, Table, say
 from ddenv.page.step_chart import chart
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import REFUSED, Candidate, Round, RunState
-from ddenv.words import count
 
 # The maximum number of rounds in the table, rounds that reduced come first; the others are summed up.
 MOST_ROUNDS = 60

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ddenv.amounts import count
 from ddenv.page.blocks import Block, Cell, Name, Part, Picture, Section, Strong, Table, place, plain, say
 from ddenv.report.report_map import CORNERS, close_up, picture
 from ddenv.report.run_data import Record
 from ddenv.runfile.state import RunState
 from ddenv.runfile.supports import drops_without
-from ddenv.words import count
 from ddenv.world.model import is_ground
 
 if TYPE_CHECKING:

@@ -7,13 +7,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ddenv.amounts import count, first_of
 from ddenv.evidence.claims import current, rate
 from ddenv.page.blocks import Block, Picture, Section, Table, plain, say
 from ddenv.report.report_map import CORNERS, two_ways
 from ddenv.report.run_data import Record
 from ddenv.runs.nearest import Nearest
 from ddenv.runs.reasons import Reason, no_reasons, parting_sentence, sentence
-from ddenv.words import count, first_of
 
 if TYPE_CHECKING:
     from ddenv.map.footprints import Drawn

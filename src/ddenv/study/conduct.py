@@ -15,6 +15,7 @@ from typing import TextIO
 
 from rich.cells import cell_len, set_cell_size
 
+from ddenv.amounts import count, duration
 from ddenv.errors import printable
 from ddenv.runfile.state import RunState
 from ddenv.runs.tests_left import remaining, rough_run
@@ -23,7 +24,6 @@ from ddenv.study.results import read_cell
 from ddenv.study.study_folder import Sitting, machine, opened, sittings, versions, write_sittings
 from ddenv.study.study_page import write_study
 from ddenv.study.work import PER_CELL, Work, is_done, tests_made, work
-from ddenv.words import count, duration
 
 
 def seconds_left(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 
+from ddenv.amounts import count
 from ddenv.errors import UserError
 from ddenv.page.blocks import Block, Name, Part, Picture, plain, say
 from ddenv.page.step_chart import BOTTOM, LEFT, RIGHT, TOP, WIDTH, At, axes, steps
@@ -14,7 +15,6 @@ from ddenv.report.run_data import read_run
 from ddenv.study.results import Found
 from ddenv.study.rows import Group, Row, theirs
 from ddenv.study.study_folder import run_path
-from ddenv.words import count
 
 HEIGHT = 320.0
 LINE, SAMPLE = 22.0, 30.0

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
+from ddenv import __version__
+from ddenv.amounts import count
 from ddenv.page.blocks import Paragraph, Report, duration, percent, say, thousands
 from ddenv.page.html import html
 from ddenv.page.markdown import markdown, pictures
@@ -17,8 +19,6 @@ from ddenv.study.results import Found, read_cell
 from ddenv.study.rows import groups, least_of, least_to_find, least_to_show, theirs
 from ddenv.study.study_folder import Sitting, run_path
 from ddenv.study.tables import best, section
-from ddenv.version import __version__
-from ddenv.words import count
 from ddenv.world.access import write_file
 
 

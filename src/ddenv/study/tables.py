@@ -7,13 +7,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from ddenv.amounts import count
 from ddenv.evidence.rates import wilson_interval
 from ddenv.page.blocks import Block, Cell, Name, Paragraph, Part, Picture, Section, Strong, Table, percent, plain, say
 from ddenv.study.figures import chart, worlds
 from ddenv.study.plan import Method, file_name
 from ddenv.study.results import Found
 from ddenv.study.rows import TABLES, Group, Row, least_of, least_to_find, least_to_show, spread, theirs
-from ddenv.words import count
 
 # The maximum number of models that are named.
 MOST_NAMES = 8

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from ddenv.amounts import about as about
+from ddenv.amounts import count as count
+from ddenv.amounts import duration as duration
+from ddenv.amounts import percent as percent
 from ddenv.map.names import shortened
 from ddenv.runfile.events import DEEDS
 from ddenv.runfile.state import Test
-from ddenv.words import SETTLING
-from ddenv.words import count as count
-from ddenv.words import duration as duration
-from ddenv.words import percent as percent
+from ddenv.words.news import SETTLING
 
 # Every status and verdict has its own sign, so that nothing depends on colour alone.
 STATUS = {

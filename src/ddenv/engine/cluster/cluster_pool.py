@@ -20,6 +20,7 @@ from typing import Any
 
 from distributed import Client, Future, KilledWorker
 
+from ddenv import __version__
 from ddenv.amounts import count
 from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, Parts, forget, greet, make
@@ -29,7 +30,6 @@ from ddenv.engine.worker import Start
 from ddenv.errors import UserError, printable
 from ddenv.robot.result import RunResult
 from ddenv.runfile.store import Live
-from ddenv.version import __version__
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario
 

@@ -18,10 +18,10 @@ from typing import Any
 
 from distributed import Worker, get_worker
 
+from ddenv import __version__
 from ddenv.engine.pool import Broken, Pool
 from ddenv.engine.shared import machine, simulator
 from ddenv.robot.result import RunResult
-from ddenv.version import __version__
 from ddenv.world.command import command_words
 from ddenv.world.model import Model, World
 from ddenv.world.scenario import Scenario

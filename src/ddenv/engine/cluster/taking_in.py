@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ddenv import __version__
 from ddenv.arrays import Floats
 from ddenv.engine.cluster.made_there import Hello
 from ddenv.engine.pool import Broken
 from ddenv.engine.shared import machine, simulator
 from ddenv.robot.result import RunResult
-from ddenv.version import __version__
 
 
 def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | None) -> str:

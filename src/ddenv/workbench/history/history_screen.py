@@ -14,13 +14,13 @@ from textual.containers import Horizontal
 from textual.screen import Screen
 from textual.widgets import DataTable, Static
 
+from ddenv.amounts import first_of
 from ddenv.evidence.claims import of_runs, seen
 from ddenv.evidence.took_part import slice_in_short
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.course import GoBack, place
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.progress import Decision, Node
-from ddenv.words import first_of
 from ddenv.workbench.help.footer import KeyFooter
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.history import branches

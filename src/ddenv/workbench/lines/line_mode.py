@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from ddenv import processor
 from ddenv.errors import UserError, printable
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
 from ddenv.guiding.pace import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import RunState
-from ddenv.words import news
+from ddenv.runs import processor
+from ddenv.words.news import news
 from ddenv.workbench.lines.said import QUESTIONS
 from ddenv.workbench.lines.typed import GUIDES, meaning
 from ddenv.workbench.run.poll import Poll

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from ddenv.amounts import rounded
+from ddenv.amounts import first_of, rounded
 from ddenv.evidence.claims import drift
 from ddenv.runfile.state import Candidate, RunState, Trial
 from ddenv.runs.fresh_runs import fresh_runs
 from ddenv.runs.tests_left import remaining
-from ddenv.words import first_of, headline
+from ddenv.words.news import headline
 from ddenv.workbench.run.certificate_rows import name_of
 from ddenv.workbench.run.explain import explain
 from ddenv.workbench.run.poll import Snapshot

@@ -12,7 +12,7 @@ from ddenv.runfile.position import Moment, Position, Step
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.store import RunFile
 from ddenv.runfile.tested import pointed, purpose
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.workbench.run.poll import Poll, Snapshot
 from ddenv.workbench.wording import count, outcome, plain
 

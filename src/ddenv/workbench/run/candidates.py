@@ -16,9 +16,9 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from ddenv.amounts import first_of
 from ddenv.runfile.state import Candidate, Test, Trial
 from ddenv.runs.fresh_runs import FreshRuns
-from ddenv.words import first_of
 from ddenv.workbench.run.candidate_rows import IN_SHORT, MEANINGS, Column, Item, Listed, Words, fitting, listed, words
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain

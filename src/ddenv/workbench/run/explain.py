@@ -10,7 +10,7 @@ from ddenv.runfile.events import DEEDS, deed
 from ddenv.runfile.fold_tests import seen
 from ddenv.runfile.run_settings import Settings, settings
 from ddenv.runfile.state import Candidate, Round, RunState, Test
-from ddenv.words import failed_in, other_failures
+from ddenv.words.news import failed_in, other_failures
 from ddenv.workbench.run.explain_certificate import certifying
 from ddenv.workbench.run.explain_decisions import (
     arrival,

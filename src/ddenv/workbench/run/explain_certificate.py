@@ -6,7 +6,7 @@ from ddenv.evidence.claims import fresh_runs_made, of_runs, terms, usual_runs
 from ddenv.runfile.progress import Certificate
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.fresh_runs import fresh_runs
-from ddenv.words import isolating
+from ddenv.words.news import isolating
 from ddenv.workbench.run.poll import Snapshot
 from ddenv.workbench.wording import plain
 

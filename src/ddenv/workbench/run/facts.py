@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from ddenv.amounts import first_of
 from ddenv.runfile.position import Position
 from ddenv.runfile.state import RunState, Test
 from ddenv.runfile.tested import purpose
-from ddenv.words import first_of
 from ddenv.workbench.wording import OUTCOME, count, metres, plain
 
 # The maximum number of models to name, and of lines of a test's log.

@@ -14,13 +14,13 @@ from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
+from ddenv.amounts import first_of
 from ddenv.guiding.commands import question, refusal
 from ddenv.guiding.selections import AcceptOther
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.atlas import OtherFailure, atlas
 from ddenv.runfile.failures import named
 from ddenv.runfile.state import RunState
-from ddenv.words import first_of
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.widgets.question import Question
 from ddenv.workbench.wording import count, plain, shorten

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ddenv.runfile.progress import Decision
 from ddenv.runfile.state import RunState
-from ddenv.words import news
+from ddenv.words.news import news
 from ddenv.workbench.wording import plain
 
 # Where the words begin, after the time.

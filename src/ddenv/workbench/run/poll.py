@@ -10,13 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ddenv import __version__
 from ddenv.errors import UserError
 from ddenv.guiding.situation import EngineIs
 from ddenv.runfile.fold import apply, spent
 from ddenv.runfile.lock import engine_is_alive, suspended_engine
 from ddenv.runfile.state import Candidate, RunState, Test
 from ddenv.runfile.store import COLUMNS, Live
-from ddenv.version import __version__
 from ddenv.workbench.run.observed import Busy, Gone, Observed
 
 # How often the lock is tried: a look holds it for an instant, so not at every tick, s.

@@ -9,13 +9,13 @@ from rich.style import Style
 from rich.text import Text
 from textual.widget import Widget
 
+from ddenv import __version__
 from ddenv.amounts import between, percent, rounded
 from ddenv.evidence.claims import drift, has_dropped
 from ddenv.runfile.persistent import PersistentTuple
 from ddenv.runfile.run_settings import settings
 from ddenv.runfile.state import RunState, Test
 from ddenv.runs.tests_left import Remaining, remaining
-from ddenv.version import __version__
 from ddenv.workbench.history.branches import path
 from ddenv.workbench.run.methods import GROUPS, labels
 from ddenv.workbench.run.poll import Snapshot

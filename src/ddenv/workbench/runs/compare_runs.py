@@ -14,7 +14,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from ddenv.words import first_of
+from ddenv.amounts import first_of
 from ddenv.workbench.help.hints import Framed
 from ddenv.workbench.runs.recent_runs import Recent
 from ddenv.workbench.wording import brief, count, plain

@@ -13,8 +13,8 @@ from textual.binding import Binding
 from textual.widgets import DataTable, OptionList
 from textual.widgets.option_list import Option
 
+from ddenv.amounts import first_of
 from ddenv.map.names import shortened
-from ddenv.words import first_of
 from ddenv.workbench.background import call_if_open
 from ddenv.workbench.run import poll
 from ddenv.workbench.runs.recent_runs import SHOWN, Recent, RunsFolder

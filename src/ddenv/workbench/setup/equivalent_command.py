@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddenv import processor
+from ddenv.runs import processor
 from ddenv.settings import OPTIONS, PRINTED, number_text, read
 from ddenv.workbench.setup.form import read_key
 

@@ -10,7 +10,7 @@ from ddenv.evidence.claims import current, in_the_making, made_of_usual, rate
 from ddenv.map.names import padded, shortened
 from ddenv.runfile.state import RunState
 from ddenv.runs.reasons import no_reasons
-from ddenv.words import isolating
+from ddenv.words.news import isolating
 from ddenv.workbench.why.entries import NEAREST, Entry
 from ddenv.workbench.wording import CLAIM, percent, plain
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 import shutil
 from collections import Counter
 
-from ddenv.amounts import count as count
-from ddenv.amounts import duration as duration
-from ddenv.amounts import first_of as first_of
-from ddenv.amounts import percent as percent
+from ddenv.amounts import count, first_of
 from ddenv.evidence.claims import (
     in_the_making,
     made_of_usual,
