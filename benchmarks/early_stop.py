@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.judging import fix_failure
 from ddenv.evidence.rates import wilson_interval
 from ddenv.robot.oracle import Failure, judge
 from ddenv.robot.result import RunResult

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddenv.engine.baseline import fix_failure
+from ddenv.engine.judging import fix_failure
 from ddenv.reduction.verdict import FEWEST_SHOWN, LONGEST_BASELINE
 from ddenv.runfile.events import BaselineFinished
 from ddenv.runfile.fold import fold
@@ -82,13 +82,13 @@ def test_another_failure_can_be_chosen_by_its_number():
     ]
     second = ran(*runs, wanted=2)
     assert (second.failure_test, second.failures, second.position) == (1, 2, (5.0, 0.0, 0.0))
-    assert second["outcomes"] == {
-        "1": "similar",
-        "2": "other",
-        "3": "other",
-        "5": "other",
-        "6": "similar",
-        "7": "other",
+    assert second.judged.outcomes == {
+        1: "similar",
+        2: "other",
+        3: "other",
+        5: "other",
+        6: "similar",
+        7: "other",
     }
     assert ran(*runs, wanted=4) == (
         "there is no failure number 4; 7 runs of the whole world showed these: 1. stuck or out of time at (1.00, 0.00) in 3 runs; "

@@ -10,11 +10,10 @@ from dataclasses import asdict
 
 import pytest
 
-from ddenv.engine import disk_space
+from ddenv.engine import disturbances
 from ddenv.engine.bench import Bench
-from ddenv.engine.clock_jumps import ClockJumps
 from ddenv.engine.control import Control
-from ddenv.engine.disk_space import NEEDED, DiskSpace
+from ddenv.engine.disturbances import NEEDED, ClockJumps, DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.journal import Journal
 from ddenv.errors import UserError
@@ -62,8 +61,8 @@ def undisturbed(tmp_path):
 
 
 def disk(monkeypatch, free):
-    monkeypatch.setattr(disk_space, "PERIOD", 0.0)
-    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(free()))
+    monkeypatch.setattr(disturbances, "PERIOD", 0.0)
+    monkeypatch.setattr(disturbances.shutil, "disk_usage", lambda _: Usage(free()))
 
 
 def told(path):
@@ -86,7 +85,7 @@ def test_no_test_starts_on_a_disk_that_is_nearly_full_and_the_run_goes_on_when_t
     path = new_run(tmp_path)
     assert story(watched(path)) == undisturbed
     lines, kinds = told(path)
-    first, last = (number for number, kind in enumerate(kinds) if kind == "room")
+    first, last = (number for number, kind in enumerate(kinds) if kind == "disk_space")
     assert "test_started" not in kinds[first:last] and "test_started" in kinds[:first]
     assert "no room on the disk: waits until 32 MB are free" in lines and "there is room on the disk again" in lines
 

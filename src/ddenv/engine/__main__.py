@@ -14,18 +14,15 @@ from pathlib import Path
 from typing import Literal
 
 from ddenv import __version__
+from ddenv.engine.beginning import check_crash_loop, check_repeats, note_start
 from ddenv.engine.bench import Bench
 from ddenv.engine.control import Control, Stopped
-from ddenv.engine.crash_loop import check_crash_loop
-from ddenv.engine.disk_space import DiskSpace
+from ddenv.engine.disturbances import DiskSpace
 from ddenv.engine.driver import Driver
 from ddenv.engine.isolate import isolate
 from ddenv.engine.journal import Journal
-from ddenv.engine.pool import Pool
-from ddenv.engine.repeating import check_repeats
-from ddenv.engine.settle import note_start
+from ddenv.engine.pool import Pool, Workers
 from ddenv.engine.shared import SharingPool, machine, simulator, tests_of_others
-from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.runfile.events import (
     AcceptModeChanged,

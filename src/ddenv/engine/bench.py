@@ -19,10 +19,9 @@ from ddenv.engine.journal import Journal
 from ddenv.engine.judging import failures_of, result_data
 from ddenv.engine.limits import wall_limit
 from ddenv.engine.noting import give_up_if_late, note_slow
-from ddenv.engine.pool import Broken
+from ddenv.engine.pool import Broken, Workers
 from ddenv.engine.slicing import audit_is_due, compare
 from ddenv.engine.worker import Start
-from ddenv.engine.workers import Workers
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.reduction.procedure import Test

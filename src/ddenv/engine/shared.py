@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from ddenv import __version__
-from ddenv.engine.pool import Broken, Pace
+from ddenv.engine.pool import Broken, Pace, Workers
 from ddenv.engine.worker import Start
-from ddenv.engine.workers import Workers
 from ddenv.errors import UserError
 from ddenv.robot.result import RunResult
 from ddenv.runfile.events import Created, EngineStarted

@@ -34,13 +34,8 @@ PERIOD = 0.5
 UNUSED = 600.0
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What a test needs. They are sent once to each worker, as bytes."""
-
-    scenario: Scenario
-    world: World
-    robot: Model
+# What a test needs. It is sent once to each worker, as bytes.
+Parts = tuple[Scenario, World, Model]
 
 
 @dataclass(frozen=True)
@@ -86,18 +81,14 @@ def greet(parts: bytes, asked: Asked) -> tuple[Hello, RunResult | Broken | None]
     """
     _engines.add(asked.topic)
     hello = Hello(platform.node(), os.getpid(), __version__, simulator(), machine())
-    if hello.version != asked_version(asked.run):
+    # The name of the run begins with the engine's version: another one may understand nothing else.
+    if hello.version != asked.run.partition(" ")[0]:
         return hello, None
     known: Parts = pickle.loads(parts)
-    if known.scenario.oracle is not None:
-        command_words(known.scenario)
+    if known[0].oracle is not None:
+        command_words(known[0])
         return hello, None
     return hello, make(parts, asked)
-
-
-def asked_version(run: str) -> str:
-    """The engine's version of ddenv, from its name of the run: another one may understand nothing else."""
-    return run.partition(" ")[0]
 
 
 def make(parts: bytes, asked: Asked) -> RunResult | Broken:
@@ -178,7 +169,7 @@ def _new(parts: bytes) -> Pool:
     # Dask's nanny starts workers as daemons, which may have no children. Ours follow their parent's end by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # there is no public way
     known: Parts = pickle.loads(parts)
-    return Pool(known.scenario, known.world, known.robot, 1, at_a_time=get_worker().state.nthreads)
+    return Pool(*known, 1, at_a_time=get_worker().state.nthreads)
 
 
 def _end_unused() -> None:
