@@ -15,7 +15,7 @@ from attached import Attached
 from ddenv import __version__
 from ddenv.doctor.run_health import run_health
 from ddenv.errors import UserError
-from ddenv.guiding.pace import Pause, Resume, Stop
+from ddenv.guiding.course import Pause, Resume, Stop
 from ddenv.runfile.events import EngineStarted
 from ddenv.workbench.app import Workbench
 from ddenv.workbench.run import poll as polling

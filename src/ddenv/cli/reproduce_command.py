@@ -35,7 +35,7 @@ def reproduce_command(run: str, most: int, folder: Path | None, jobs: int, trust
     from ddenv.amounts import percent
     from ddenv.cli.test_summary import line
     from ddenv.cli.trusting import allow
-    from ddenv.engine.reproducing import expected, reproduce, subject_in
+    from ddenv.engine.single_test import expected, reproduce, subject_in
     from ddenv.runs.folder import find_run
 
     path = find_run(run)

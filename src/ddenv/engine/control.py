@@ -14,8 +14,7 @@ from ddenv.engine.judging import failure_of, rejudged
 from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, parse, refusal
-from ddenv.guiding.course import Change, GoBack, Undo
-from ddenv.guiding.pace import AcceptMode, Pause, Resume, Step, Stop
+from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
 from ddenv.guiding.situation import Situation, label_of, numbers_of

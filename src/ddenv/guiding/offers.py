@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
-from ddenv.guiding.course import Change, Undo
-from ddenv.guiding.pace import AcceptMode, Pause, Resume, StartEngine, Step
+from ddenv.guiding.course import AcceptMode, Change, Pause, Resume, StartEngine, Step, Undo
 from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
 from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of

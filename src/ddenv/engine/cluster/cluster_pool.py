@@ -23,7 +23,6 @@ from distributed import Client, Future, KilledWorker
 
 from ddenv import __version__
 from ddenv.amounts import count
-from ddenv.arrays import Floats
 from ddenv.engine.cluster.link import GOODBYE, Attached, Link, Lost, There, in_a_line
 from ddenv.engine.cluster.made_there import Asked, Hello, NotGreeted, NotWanted, forget, greet, make
 from ddenv.engine.pool import Broken, Pace, Pool
@@ -396,7 +395,7 @@ def refusal(hello: Hello, there: RunResult | Broken | None, here: RunResult | No
         return ""
     if isinstance(there, Broken):
         return f"its first run of the whole world broke: {there.failure}"
-    if there is None or not same_bits(there, here):
+    if there is None or not _same_bits(there, here):
         return f"its first run of the whole world has other bits than here; {_difference(hello)}"
     return ""
 
@@ -411,18 +410,12 @@ def _difference(hello: Hello) -> str:
     )
 
 
-def same_bits(one: RunResult, other: RunResult) -> bool:
+def _same_bits(one: RunResult, other: RunResult) -> bool:
     """Whether two runs of the same models with the same seed are the same to the last bit."""
-    first, second = ((each.outcome, each.failure, each.cut, each.took_part) for each in (one, other))
-    return first == second and _equal(_motions(one), _motions(other))
-
-
-def _motions(run: RunResult) -> Mapping[str, Floats]:
-    return {**run.motions, "": run.trajectory}
-
-
-def _equal(one: Mapping[str, Floats], other: Mapping[str, Floats]) -> bool:
-    return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
+    first, second = ((run.outcome, run.failure, run.cut, run.took_part) for run in (one, other))
+    ours, theirs = ({**run.motions, "": run.trajectory} for run in (one, other))
+    same_models = ours.keys() == theirs.keys()
+    return first == second and same_models and all(np.array_equal(ours[name], theirs[name]) for name in ours)
 
 
 _HANDLED: dict[type, Callable[[ClusterPool, Any], None]] = {

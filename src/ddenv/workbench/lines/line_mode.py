@@ -13,7 +13,7 @@ from typing import TextIO
 
 from ddenv.errors import UserError, printable
 from ddenv.guiding.commands import Command, data_of, question, said, starts_engine
-from ddenv.guiding.pace import StartEngine
+from ddenv.guiding.course import StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import RunState
 from ddenv.runs import processor

@@ -15,7 +15,7 @@ from textual.screen import Screen
 
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, data_of, question, refusal, said, starts_engine
-from ddenv.guiding.pace import Isolate, StartEngine
+from ddenv.guiding.course import Isolate, StartEngine
 from ddenv.guiding.situation import Situation
 from ddenv.runfile.state import Trial
 from ddenv.runs import processor
