@@ -157,10 +157,7 @@ def _workers(scenario: Scenario, world: World, robot: Model, jobs: int, cluster:
     # Only who asks for a cluster needs Dask.
     from ddenv.engine.cluster.cluster_pool import ClusterPool
 
-    def tell(tests: int, words: str) -> None:
-        journal.record(Cluster(tests, words))
-
-    return ClusterPool(scenario, world, robot, cluster, tell)
+    return ClusterPool(scenario, world, robot, cluster, lambda tests, words: journal.record(Cluster(tests, words)))
 
 
 def _begin(journal: Journal, jobs: int, accept_mode: Literal["automatic", "ask"] | None) -> None:

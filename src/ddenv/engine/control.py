@@ -15,8 +15,7 @@ from ddenv.environment import Environment
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, parse, refusal
 from ddenv.guiding.course import AcceptMode, Change, GoBack, Pause, Resume, Step, Stop, Undo
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import Situation, label_of, numbers_of
 from ddenv.runfile.events import (
     AcceptedOther,

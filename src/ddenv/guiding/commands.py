@@ -26,8 +26,7 @@ from ddenv.guiding.course import (
     Stop,
     Undo,
 )
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin
+from ddenv.guiding.selections import Accept, AcceptOther, Adopt, Pin, Reject, Try, Unpin, Unveto, Veto
 from ddenv.guiding.situation import NO_MODELS, Situation
 from ddenv.runfile.state import RunState
 

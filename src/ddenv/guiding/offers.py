@@ -8,8 +8,19 @@ from dataclasses import dataclass
 from ddenv.errors import UserError
 from ddenv.guiding.commands import Command, refusal
 from ddenv.guiding.course import AcceptMode, Change, Pause, Resume, StartEngine, Step, Undo
-from ddenv.guiding.reductions import Accept, Reject, Unveto, Veto, round_over
-from ddenv.guiding.selections import AcceptOther, Adopt, Pin, Try, Unpin, nearest_other
+from ddenv.guiding.selections import (
+    Accept,
+    AcceptOther,
+    Adopt,
+    Pin,
+    Reject,
+    Try,
+    Unpin,
+    Unveto,
+    Veto,
+    nearest_other,
+    round_over,
+)
 from ddenv.guiding.situation import LONGEST, NO_FAILURE, Row, Situation, numbers_of
 from ddenv.map.names import shortened
 from ddenv.runfile.state import REFUSED, RunState, Trial

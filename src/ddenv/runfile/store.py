@@ -245,7 +245,7 @@ class RunFile:
     def send(self, kind: str, **data: Any) -> int:
         """Sends a command to the engine; returns its id. Raises UserError."""
         with self._writing() as db:
-            return _insert(db, "command", kind, data)
+            return _insert(db, "command", kind, data, time.time())
 
     def motion(self, test: int, model: str = ROBOT) -> array[float] | None:
         """Samples of a finished test, flat rows of `COLUMNS` floats; the robot's own by default."""
@@ -288,7 +288,6 @@ class RunFile:
         self._db.execute(f"PRAGMA busy_timeout = {ENGINE_WAIT * 1000:.0f}")
         with self._writing() as db:
             db.execute("DELETE FROM live")
-            db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
 
@@ -305,14 +304,13 @@ class RunFile:
                     raise
 
     def _append(self, event: Event, motions: Motions | None, command: int | None) -> Recorded:
-        data = plain(event) | ({} if command is None else {"command": command})
+        data, at = plain(event) | ({} if command is None else {"command": command}), time.time()
         with self._writing() as db:
             db.execute("BEGIN IMMEDIATE")
-            id = _insert(db, "event", NAMES[type(event)], data)
+            id = _insert(db, "event", NAMES[type(event)], data, at)
             if motions and isinstance(event, TestFinished | Implied):
                 rows = [(event.test, model, samples) for model, samples in motions.items()]
                 db.executemany("INSERT OR REPLACE INTO motion VALUES (?, ?, ?)", rows)
-            at = db.execute("SELECT time FROM event WHERE id = ?", (id,)).fetchone()[0]
             db.execute("COMMIT")
         if not self._logs:
             logs = [self.path.with_name(f"{self.path.name}{ending}") for ending in LOGS]
@@ -404,9 +402,9 @@ def _moment(value: Any) -> float:
     return float(value)
 
 
-def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any]) -> int:
+def _insert(db: sqlite3.Connection, table: str, kind: str, data: dict[str, Any], at: float) -> int:
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (time.time(), kind, text))
+    cursor = db.execute(f"INSERT INTO {table} (time, kind, data) VALUES (?, ?, ?)", (at, kind, text))
     assert cursor.lastrowid is not None
     return cursor.lastrowid
 

@@ -11,7 +11,7 @@ import pickle
 import platform
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -175,20 +175,21 @@ def _new(parts: bytes) -> Pool:
 def _end_unused() -> None:
     while True:
         time.sleep(UNUSED / 10)
-        with _lock:
-            old = [each for each in _idle if time.monotonic() - each.since > UNUSED]
-            for each in old:
-                _idle.remove(each)
-        for each in old:
-            each.child.close()
+        for child in _taken_out(lambda idle: time.monotonic() - idle.since > UNUSED):
+            child.close()
 
 
 def forget(run: str) -> None:
     """Ends the idle children of `run`."""
-    with _lock:
-        own = [each for each in _idle if each.run == run]
-        for each in own:
-            _idle.remove(each)
-    for each in own:
+    for child in _taken_out(lambda idle: idle.run == run):
         # This is the thread in which the worker talks with the scheduler.
-        threading.Thread(target=each.child.close).start()
+        threading.Thread(target=child.close).start()
+
+
+def _taken_out(which: Callable[[_Idle], bool]) -> list[Pool]:
+    """The idle children of this kind, which are idle no longer."""
+    with _lock:
+        taken = [idle for idle in _idle if which(idle)]
+        for idle in taken:
+            _idle.remove(idle)
+    return [idle.child for idle in taken]
