@@ -119,7 +119,7 @@ def test_the_map_of_a_run_shows_what_took_part(run, monkeypatch, capsys):
     assert said.returncode == 0
     with RunFile(run) as file:
         state = fold(file.events())
-    met = set().union(*(test.took_part.names(MODELS) for test in state.tests if test.phase == "baseline"))
+    met = set().union(*(test.took_part.names(state.elements) for test in state.tests if test.phase == "baseline"))
     for name in MODELS:
         assert (f"  {name}: " in said.stdout) == (name in met)
     assert f"{len(met)} models of {len(state.elements)} took part" in said.stdout
