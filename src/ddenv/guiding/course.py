@@ -21,7 +21,6 @@ class Pause:
     """Start no new test."""
 
     kind: ClassVar[str] = "pause"
-    offer: ClassVar[str] = "pause"
 
     def refusal(self, now: Situation) -> str:
         return now.needs_engine()
@@ -35,7 +34,6 @@ class Resume:
     """Go on; also ends a step."""
 
     kind: ClassVar[str] = "resume"
-    offer: ClassVar[str] = "resume"
 
     def refusal(self, now: Situation) -> str:
         return now.needs_engine()
@@ -49,7 +47,6 @@ class Step:
     """Run one test, or to the end of the round, then pause."""
 
     kind: ClassVar[str] = "step"
-    offer: ClassVar[str] = ""
     unit: Literal["test", "round"] = "test"
 
     def refusal(self, now: Situation) -> str:
@@ -65,7 +62,6 @@ class AcceptMode:
     """Make each reduction at once ("automatic"), or wait for accept or reject ("ask")."""
 
     kind: ClassVar[str] = "accept_mode"
-    offer: ClassVar[str] = ""
     mode: Literal["automatic", "ask"]
 
     def refusal(self, now: Situation) -> str:
@@ -82,7 +78,6 @@ class Stop:
     """End the engine; another one can go on from there."""
 
     kind: ClassVar[str] = "stop"
-    offer: ClassVar[str] = "stop"
 
     def refusal(self, now: Situation) -> str:
         return "no engine is running" if now.engine == "absent" else ""
@@ -94,8 +89,6 @@ class Stop:
 @dataclass(frozen=True, slots=True)
 class StartEngine:
     """Start an engine on the run. It is not a command: the run file does not have it."""
-
-    offer: ClassVar[str] = "start"
 
     def refusal(self, now: Situation) -> str:
         state = now.state
@@ -116,7 +109,6 @@ class Isolate:
     `again`: search also if that world is known.
     """
 
-    offer: ClassVar[str] = "isolate"
     again: bool = False
 
     def refusal(self, now: Situation) -> str:
@@ -136,7 +128,6 @@ class Undo:
     """Take back the last reduction, or the last accepted failure; the same reduction is not made again."""
 
     kind: ClassVar[str] = "undo"
-    offer: ClassVar[str] = "undo"
 
     def refusal(self, now: Situation) -> str:
         here = now.state.here
@@ -159,7 +150,6 @@ class GoBack:
     """Make the environment of a node the current one again; the run pauses there."""
 
     kind: ClassVar[str] = "go_back"
-    offer: ClassVar[str] = ""
     node: int
 
     def refusal(self, now: Situation) -> str:
@@ -184,7 +174,6 @@ class Change:
     """Go on with other settings, as in the scenario's section `reduction`; all names are in `CHANGEABLE`."""
 
     kind: ClassVar[str] = "change"
-    offer: ClassVar[str] = ""
     settings: Mapping[str, Value]
 
     def refusal(self, now: Situation) -> str:

@@ -14,7 +14,6 @@ from ddenv.guiding.situation import (
     LONGEST,
     NO_FAILURE,
     NO_MODELS,
-    ROUND_OVER,
     Row,
     Situation,
     Words,
@@ -36,7 +35,6 @@ class Accept:
     """Make the reduction that waits."""
 
     kind: ClassVar[str] = "accept"
-    offer: ClassVar[str] = "accept"
     round: int
     candidate: int
 
@@ -54,7 +52,6 @@ class Reject:
     """Go on as if the candidate that waits had not shown f."""
 
     kind: ClassVar[str] = "reject"
-    offer: ClassVar[str] = "reject"
     round: int
     candidate: int
 
@@ -70,7 +67,6 @@ class Veto:
     """Leave out a candidate that has no verdict yet."""
 
     kind: ClassVar[str] = "veto"
-    offer: ClassVar[str] = "veto"
     round: int
     candidate: int
 
@@ -92,7 +88,6 @@ class Unveto:
     """Try a vetoed or rejected candidate after all."""
 
     kind: ClassVar[str] = "unveto"
-    offer: ClassVar[str] = "take back"
     round: int
     candidate: int
 
@@ -110,7 +105,7 @@ class Unveto:
 
 def round_over(state: RunState) -> str:
     """Why candidates can no longer be left out."""
-    return "the rounds are over" if state.confirming and not state.ended else ROUND_OVER
+    return "the rounds are over" if state.confirming and not state.ended else "this round is over"
 
 
 _Of = Accept | Reject | Veto | Unveto
@@ -144,7 +139,6 @@ class Pin:
     """Keep models: they are in every candidate. `models` are numbers into the run's elements."""
 
     kind: ClassVar[str] = "pin"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -174,7 +168,6 @@ class Unpin:
     """Let pinned models be removed again."""
 
     kind: ClassVar[str] = "unpin"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -194,7 +187,6 @@ class Try:
     """Test a selection: `models` are the ones that are kept."""
 
     kind: ClassVar[str] = "try"
-    offer: ClassVar[str] = ""
     models: tuple[int, ...]
 
     def refusal(self, now: Situation) -> str:
@@ -224,7 +216,6 @@ class Adopt:
     """Make a try that showed f the environment."""
 
     kind: ClassVar[str] = "adopt"
-    offer: ClassVar[str] = "adopt"
     trial: int
 
     def refusal(self, now: Situation) -> str:
@@ -257,7 +248,6 @@ class AcceptOther:
     """
 
     kind: ClassVar[str] = "accept_other"
-    offer: ClassVar[str] = "count as f"
     test: int
     instead: bool = False
 

@@ -21,7 +21,6 @@ NAMED, LONGEST = 2, 32
 FINISHED = "the run is finished; u, h, f, c, p, w and o go on from there"
 NO_FAILURE = "f is not known yet: the baseline comes first"
 NO_MODELS = "no such models"
-ROUND_OVER = "this round is over"
 
 
 @dataclass(frozen=True, slots=True)
