@@ -42,6 +42,7 @@ CREATE TABLE command (id INTEGER PRIMARY KEY AUTOINCREMENT, time REAL NOT NULL, 
 CREATE TABLE motion (test INTEGER NOT NULL, model TEXT NOT NULL, samples BLOB NOT NULL, PRIMARY KEY (test, model)) WITHOUT ROWID;
 CREATE TABLE live (slot INTEGER PRIMARY KEY, test INTEGER NOT NULL, time REAL NOT NULL, pose TEXT NOT NULL);
 """
+_ROWS = "SELECT id, time, kind, data FROM {} WHERE id > ? ORDER BY id LIMIT ?"
 _TABLES = {statement.strip() for statement in _SCHEMA.split(";") if statement.strip()}
 # The endings of the files that SQLite keeps beside a run file while it is open. After a kill they stay.
 LOGS = ("-wal", "-shm", "-journal")
@@ -227,14 +228,17 @@ class RunFile:
 
     def read(self, after: int = 0, most: int = -1) -> Iterator[Recorded]:
         """The same, one after the other, so that those before a damaged one can be used."""
-        for row in self._rows("event", after, most):
-            yield recorded(*row)
+        try:
+            for row in self._db.execute(_ROWS.format("event"), (after, most)):
+                yield recorded(*row)
+        except (sqlite3.Error, OverflowError) as error:
+            raise UserError(f"{self.path}: damaged run file: {error}") from None
 
     def commands(self, after: int = 0) -> list[Request]:
         """The requests of viewers with an id above `after`, in order. Raises UserError."""
         return [
             Request(id, _moment(at), str(kind), _object(id, data))
-            for id, at, kind, data in self._rows("command", after)
+            for id, at, kind, data in self._all(_ROWS.format("command"), (after, -1))
         ]
 
     def last_command(self) -> int:
@@ -339,9 +343,6 @@ class RunFile:
         """Merges the write-ahead log into the run file, so that the run is one file again."""
         with suppress(NoRoom), self._writing() as db:
             db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-
-    def _rows(self, table: str, after: int, most: int = -1) -> list[tuple[Any, ...]]:
-        return self._all(f"SELECT id, time, kind, data FROM {table} WHERE id > ? ORDER BY id LIMIT ?", (after, most))
 
     def _one(self, query: str, values: tuple[Any, ...] = ()) -> tuple[Any, ...] | None:
         rows = self._all(query, values)
